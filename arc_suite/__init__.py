@@ -1,0 +1,13 @@
+"""Legged game creatures that walk in style: a dm_control task suite.
+
+import arc_suite
+environment = arc_suite.load("queen", "walk")
+"""
+
+from arc_suite import rendering
+
+rendering.select_backend()  # before anything imports dm_control
+
+from arc_suite.suite import ALL_TASKS, TASKS_BY_DOMAIN, load  # noqa: E402
+
+__all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load"]

@@ -1,0 +1,47 @@
+"""The one law of all demonstrators (the paper's Section 5), as pure functions of arrays.
+
+A leg's hip sweeps linearly, back in stance and forth in swing; its other joints add a half-sine
+bell to their centre. A PD loop turns the distance to these targets into torques.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Pattern(NamedTuple):
+    """One preset on one body, per joint: angles in rad, arrays (joints,).
+
+    Attributes:
+        frequency: of the cycle, Hz.
+        duty_factor: share of the cycle spent in stance.
+        offset: of the joint's leg, cycles.
+        sweep: hips: half of the sweep, signed so that the foot moves back in stance; else 0.
+        centre: about which the joint bends; for a hip 0.
+        stance: departure from the centre in mid-stance.
+        swing: departure from the centre in mid-swing.
+    """
+
+    frequency: float
+    duty_factor: float
+    offset: np.ndarray
+    sweep: np.ndarray
+    centre: np.ndarray
+    stance: np.ndarray
+    swing: np.ndarray
+
+
+def joint_targets(pattern: Pattern, time) -> np.ndarray:
+    """Joint angles (..., joints) wanted at a time (...) in s, in rad."""
+    cycle = (pattern.frequency * time[..., None] + pattern.offset) % 1.0
+    duty = pattern.duty_factor
+    in_stance = cycle < duty
+    progress = np.where(in_stance, cycle / duty, (cycle - duty) / (1.0 - duty))
+    sweep = np.where(in_stance, 1.0 - 2.0 * progress, 2.0 * progress - 1.0)
+    bend = np.where(in_stance, pattern.stance, pattern.swing)
+    return pattern.centre + pattern.sweep * sweep + bend * np.sin(np.pi * progress)
+
+
+def torques(targets, angles, velocities, stiffness, damping) -> np.ndarray:
+    """Actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s)."""
+    return (stiffness * (targets - angles) - damping * velocities).clip(-1.0, 1.0)

@@ -1,0 +1,371 @@
+"""What a legged body is, as frozen and validated data.
+
+A `Body` is a torso, its ballast and its legs; a `Leg` is a chain of `Link`s that ends in a
+`Foot`; a `Link` is rigid or turns about one motorised `Joint`. Lengths are metres, masses
+kilograms, angles degrees (the only place where they are). Frames: x forward, y left, z up; a
+child's origin is the end of the link before it, and a body stands with all joints at zero.
+
+Every class checks its own fields and raises `SpecError`, one line that names the field. This
+module needs nothing but the standard library.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+Vector = tuple[float, float, float]
+
+MAX_LENGTH = 100.0  # metres; far above any creature, far below what upsets MuJoCo
+_NAME = re.compile(r"[a-z0-9_]{1,32}")
+_SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
+
+
+class SpecError(ValueError):
+    """A spec that no body can be built from; the message is one line that names the field."""
+
+
+def _check_name(value: Any) -> str:
+    if not isinstance(value, str) or not _NAME.fullmatch(value):
+        raise SpecError(f"expected 1 to 32 characters out of [a-z0-9_], got {_shown(value)}")
+    return value
+
+
+def _check_number(value: Any, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise SpecError(f"expected a number, got {_shown(value)}")
+    if not low <= value <= high:  # also false for NaN
+        raise SpecError(f"expected a number from {low:g} to {high:g}, got {_shown(value)}")
+    return float(value)
+
+
+def _check_vector(value: Any, size: int, low: float, high: float) -> tuple[float, ...]:
+    if not isinstance(value, (tuple, list)) or len(value) != size:
+        raise SpecError(f"expected {size} numbers, got {_shown(value)}")
+    return tuple(_check_number(number, low, high) for number in value)
+
+
+def _check_lengths(value: Any) -> tuple[float, ...]:
+    if not isinstance(value, (tuple, list)) or not 1 <= len(value) <= 3:
+        raise SpecError(f"expected 1 to 3 lengths, got {_shown(value)}")
+    return tuple(_check_number(number, 1e-6, MAX_LENGTH) for number in value)
+
+
+def _check_choice(value: Any, choices: Iterable[str]) -> str:
+    if value not in tuple(choices):
+        raise SpecError(f"expected one of {', '.join(choices)}, got {_shown(value)}")
+    return value
+
+
+def _check_instance(value: Any, kind: type) -> Any:
+    if not isinstance(value, kind):
+        raise SpecError(f"expected a {kind.__name__}, got {_shown(value)}")
+    return value
+
+
+def _check_items(value: Any, kind: type, low: int, high: int) -> tuple:
+    if not isinstance(value, (tuple, list)):
+        raise SpecError(f"expected a sequence of {kind.__name__}s, got {_shown(value)}")
+    if not low <= len(value) <= high:
+        raise SpecError(f"expected {low} to {high} {kind.__name__}s, got {len(value)}")
+    return tuple(_check_instance(item, kind) for item in value)
+
+
+def _shown(value: Any) -> str:
+    plain = value is None or isinstance(value, (str, int, float, tuple, list))
+    text = repr(value) if plain else f"a {type(value).__name__}"
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _field(check, *args, default=dataclasses.MISSING, optional=False):
+    """A dataclass field whose value passes through `check(value, *args)`; None may pass if optional."""
+
+    def checked(value):
+        return None if optional and value is None else check(value, *args)
+
+    return dataclasses.field(default=default, metadata={"check": checked})
+
+
+def _name(**kwargs):
+    return _field(_check_name, **kwargs)
+
+
+def _number(low, high, **kwargs):
+    return _field(_check_number, low, high, **kwargs)
+
+
+def _length(**kwargs):
+    return _number(1e-6, MAX_LENGTH, **kwargs)
+
+
+def _angle(**kwargs):
+    return _number(-360.0, 360.0, **kwargs)
+
+
+def _position(**kwargs):
+    return _field(_check_vector, 3, -MAX_LENGTH, MAX_LENGTH, **kwargs)
+
+
+class _Spec:
+    """Runs every field's check, then the checks that concern several fields at once."""
+
+    def __post_init__(self):
+        for field in dataclasses.fields(self):
+            try:
+                value = field.metadata["check"](getattr(self, field.name))
+            except SpecError as error:
+                raise SpecError(f"{self._label()}.{field.name}: {error}") from None
+            object.__setattr__(self, field.name, value)
+        self._check_whole()
+
+    def _check_whole(self) -> None:
+        """Checks between fields; a subclass with any overrides this."""
+
+    def _fail(self, field: str, message: str):
+        raise SpecError(f"{self._label()}.{field}: {message}")
+
+    def _label(self) -> str:
+        name = getattr(self, "name", None)
+        kind = type(self).__name__
+        return f"{kind}({name})" if isinstance(name, str) and _NAME.fullmatch(name) else kind
+
+    def replace(self, **changes):
+        """A copy with some fields changed, validated like any other."""
+        return dataclasses.replace(self, **changes)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Motor(_Spec):
+    """A torque motor: control in [-1, 1], torque = gear (N m) x control."""
+
+    gear: float = _number(1e-9, 1e9)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Joint(_Spec):
+    """A limited hinge at a link's origin, driven by its motor.
+
+    Attributes:
+        name: `<leg>_<name>` is the joint's and its motor's name in the model.
+        axis: direction in the link's frame, any length but zero.
+        range_deg: lower and upper limit; zero, the standing pose, lies within.
+        armature: rotor inertia seen at the joint, kg m^2.
+        damping: viscous torque, N m s/rad.
+        motor: what drives it.
+    """
+
+    name: str = _name()
+    axis: Vector = _field(_check_vector, 3, -1e3, 1e3)
+    range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
+    armature: float = _number(0.0, 1e9)
+    damping: float = _number(0.0, 1e9)
+    motor: Motor = _field(_check_instance, Motor)
+
+    def _check_whole(self):
+        if math.hypot(*self.axis) < 1e-6:
+            self._fail("axis", "expected a direction, got one of no length")
+        low, high = self.range_deg
+        if not (low <= 0.0 <= high and low < high):
+            self._fail("range_deg", f"expected low <= 0 <= high and low < high, got {_shown(self.range_deg)}")
+
+    def mirrored(self) -> Joint:
+        """The joint of the leg across the x-z plane, so that equal angles give mirrored poses.
+
+        A reflection at y -> -y turns an axis (a, b, c) into (-a, b, -c). A vertical axis stays
+        instead, by the convention of the published robots, and its range changes sign.
+        """
+        a, b, c = self.axis
+        if a == b == 0.0:
+            low, high = self.range_deg
+            return self.replace(range_deg=(-high, -low))
+        return self.replace(axis=(-a, b, -c))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Link(_Spec):
+    """A capsule from the link's origin to `end`, rigid on its parent or turning about `joint`."""
+
+    name: str = _name()
+    end: Vector = _position()
+    radius: float = _length()
+    joint: Joint | None = _field(_check_instance, Joint, default=None, optional=True)
+
+    def _check_whole(self):
+        if math.hypot(*self.end) < 1e-6:
+            self._fail("end", "expected a point away from the link's origin")
+
+    def mirrored(self) -> Link:
+        """The link of the leg across the x-z plane."""
+        return self.replace(end=_reflected(self.end), joint=self.joint and self.joint.mirrored())
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Foot(_Spec):
+    """A sphere, rigid at the end of the last link; its height tells stance from swing."""
+
+    radius: float = _length()
+    name: str = _name(default="foot")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Leg(_Spec):
+    """A chain of links from a mount on the torso down to a foot.
+
+    Attributes:
+        name: prefix of all names in the leg.
+        mount: origin of the first link in the torso's frame.
+        links: from the torso outwards.
+        foot: the end of the chain.
+        yaw_deg: turn of the first link's frame about z.
+    """
+
+    name: str = _name()
+    mount: Vector = _position()
+    links: tuple[Link, ...] = _field(_check_items, Link, 1, 16)
+    foot: Foot = _field(_check_instance, Foot)
+    yaw_deg: float = _angle(default=0.0)
+
+    def _check_whole(self):
+        _check_unique(self, "links", [link.name for link in self.links] + [self.foot.name])
+        _check_unique(self, "links", [joint.name for joint in self.joints])
+        if not self.joints:
+            self._fail("links", "expected at least one link with a joint")
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """The joints, from the torso outwards."""
+        return tuple(link.joint for link in self.links if link.joint)
+
+    @property
+    def side(self) -> str:
+        """'left' or 'right', by where the foot stands; 'left' on the midline."""
+        return "right" if self.foot_position[1] < 0.0 else "left"
+
+    @property
+    def foot_position(self) -> Vector:
+        """The foot in the torso's frame with all joints at zero."""
+        x, y, z = (sum(link.end[i] for link in self.links) for i in range(3))
+        cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
+        return (self.mount[0] + cos * x - sin * y, self.mount[1] + sin * x + cos * y, self.mount[2] + z)
+
+    def full_name(self, part: Link | Foot | Joint) -> str:
+        """The name of a link's or foot's body, or of a joint and its motor, in the model."""
+        return f"{self.name}_{part.name}"
+
+    def mirrored(self, name: str) -> Leg:
+        """The leg across the x-z plane, under another name."""
+        return self.replace(
+            name=name,
+            mount=_reflected(self.mount),
+            yaw_deg=-self.yaw_deg,
+            links=tuple(link.mirrored() for link in self.links),
+        )
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Solid(_Spec):
+    """A shape fixed to the torso that has the body's density and touches the floor.
+
+    Attributes:
+        name: name of the geom.
+        shape: sphere, capsule, cylinder, ellipsoid or box.
+        size: half-extents as MuJoCo takes them for the shape.
+        position: centre in the torso's frame.
+        euler_deg: turns about the x, y and z axes of the turning frame, in that order.
+    """
+
+    name: str = _name()
+    shape: str = _field(_check_choice, _SIZES)
+    size: tuple[float, ...] = _field(_check_lengths)
+    position: Vector = _position(default=(0.0, 0.0, 0.0))
+    euler_deg: Vector = _field(_check_vector, 3, -360.0, 360.0, default=(0.0, 0.0, 0.0))
+
+    def _check_whole(self):
+        if len(self.size) != _SIZES[self.shape]:
+            self._fail("size", f"expected {_SIZES[self.shape]} lengths for a {self.shape}, got {len(self.size)}")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Ballast(Solid):
+    """A shape fixed to the torso that weighs `mass` and touches nothing."""
+
+    mass: float = _number(1e-9, 1e9)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Torso(_Spec):
+    """The free-floating root: solids around its origin, `standing_height` above the floor."""
+
+    standing_height: float = _length()
+    solids: tuple[Solid, ...] = _field(_check_items, Solid, 1, 64)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class TrackingCamera(_Spec):
+    """A camera that keeps `position` relative to the body's centre of mass, `xyaxes` as in MJCF."""
+
+    position: Vector = _position()
+    xyaxes: tuple[float, ...] = _field(_check_vector, 6, -1.0, 1.0, default=(1.0, 0.0, 0.0, 0.0, 0.5, 1.0))
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Body(_Spec):
+    """A whole creature.
+
+    The legs' order is that of bodies, actions, joint angles, joint velocities and contact forces.
+
+    Attributes:
+        name: the model's name.
+        torso: the root.
+        legs: every leg, right ones included.
+        camera: the side view that follows the body.
+        ballast: further weight on the torso.
+        density: of solids, links and feet, kg/m^3.
+    """
+
+    name: str = _name()
+    torso: Torso = _field(_check_instance, Torso)
+    legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, 64)
+    camera: TrackingCamera = _field(_check_instance, TrackingCamera)
+    density: float = _number(1e-9, 1e9)
+    ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
+
+    def _check_whole(self):
+        _check_unique(self, "legs", [leg.name for leg in self.legs])
+        _check_unique(self, "ballast", [part.name for part in (*self.torso.solids, *self.ballast)])
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, and of their motors, in the order of the action."""
+        return tuple(leg.full_name(joint) for leg in self.legs for joint in leg.joints)
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Names of the rigid bodies in the order of the contact forces, the torso first."""
+        return ("torso", *(leg.full_name(part) for leg in self.legs for part in (*leg.links, leg.foot)))
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """Names of the feet's bodies, in the order of the legs."""
+        return tuple(leg.full_name(leg.foot) for leg in self.legs)
+
+    @property
+    def ranks(self) -> tuple[int, ...]:
+        """For each leg, how many legs of its side stand in front of it: 0 is the front leg."""
+        return tuple(
+            sum(other.side == leg.side and other.foot_position[0] > leg.foot_position[0] for other in self.legs)
+            for leg in self.legs
+        )
+
+
+def _reflected(point: Vector) -> Vector:
+    return (point[0], -point[1], point[2])
+
+
+def _check_unique(spec: _Spec, field: str, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            spec._fail(field, f"the name {name!r} occurs twice")

@@ -1,0 +1,342 @@
+"""Walk: forward at the target speed, in the prescribed gait, for 50 seconds."""
+
+import collections
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from dm_control import mujoco
+from dm_control.rl import control
+
+from arc_suite import names
+from arc_suite.physics import Physics
+from arc_suite.spec import Body
+from arc_suite.tasks import rewards
+from arc_suite.tasks.readings import Readings, layout, read
+
+SUBSTEPS = 25
+TIME_LIMIT = 50.0  # s: 1000 control steps
+
+# Signed weights of the ten terms (Section 4), the same for all robots but for "control".
+WEIGHTS = {
+    "forward": 1.5,
+    "healthy": 1.0,
+    "gait_bonus": 1.5,
+    "gait_cost": -0.1,
+    "control": -0.05,
+    "smoothness": -0.02,
+    "contact": -0.0005,
+    "angular_velocity": -0.05,
+    "vertical_velocity": -0.02,
+    "posture": -0.001,
+}
+
+# What a robot does not set itself.
+COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1}
+
+_TRIPOD = (math.pi, 0.0, math.pi, 0.0, math.pi, 0.0)  # of l1 l2 l3 r1 r2 r3
+_TROT = (0.0, math.pi, math.pi, 0.0)  # of fl fr rl rr
+
+# The numbers of task x robot: units as in `rewards.Parameters` and `Settings`.
+SETTINGS = {
+    "queen": {
+        "target_velocity": 0.5,
+        "velocity_band": 0.3,
+        "gait_frequency": 1.5,
+        "phase_offsets": _TRIPOD,
+        "stance_threshold": 0.12,
+        "healthy_range": (0.25, 1.2),
+        "base_noise": 0.02,
+        "weights": {"control": -0.05},
+    },
+    "bastion": {
+        "target_velocity": 0.5,
+        "velocity_band": 0.3,
+        "gait_frequency": 1.5,
+        "phase_offsets": _TRIPOD,
+        "stance_threshold": 0.08,
+        "healthy_range": (0.15, 1.0),
+        "base_noise": 0.1,
+        "weights": {"control": -0.08},
+    },
+    "tick": {
+        "target_velocity": 0.33,
+        "velocity_band": 0.33,
+        "gait_frequency": 1.5,
+        "phase_offsets": _TRIPOD,
+        "stance_threshold": 0.06,
+        "healthy_range": (0.08, 0.35),
+        "base_noise": 0.02,
+        "weights": {"control": -0.05},
+    },
+    "leaper": {
+        "target_velocity": 0.6,
+        "velocity_band": 0.4,
+        "gait_frequency": 1.2,
+        "phase_offsets": _TROT,
+        "stance_threshold": 0.08,
+        "healthy_range": (0.2, 1.0),
+        "base_noise": 0.1,
+        "weights": {"control": -0.1},
+    },
+}
+
+
+class Settings(NamedTuple):
+    """What a walk is made of, beside the body.
+
+    Attributes:
+        parameters: what the reward's terms read.
+        weights: signed weight of every term.
+        base_noise: of a reset: half-width of the uniform noise on the torso's position (m) and
+            quaternion, and standard deviation of the torso's velocity (m/s, rad/s).
+        joint_noise: the same for joint angles (rad) and joint velocities (rad/s).
+    """
+
+    parameters: rewards.Parameters
+    weights: dict[str, float]
+    base_noise: float
+    joint_noise: float
+
+
+def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
+    """The settings of a robot, some of them overridden.
+
+    Args:
+        body: a robot of the table.
+        overrides: fields of `rewards.Parameters`, "base_noise", "joint_noise", and "weights", a
+            mapping of the terms to change.
+
+    Returns:
+        The settings, checked.
+
+    Raises:
+        ValueError: an unknown name, or a value that does not fit; one line that names it.
+    """
+    table = COMMON | SETTINGS[names.check(body.name, SETTINGS, "walker")]
+    for name in overrides:
+        names.check(name, table, "setting of walk")
+    weights = WEIGHTS | table["weights"]
+    for name, weight in dict(overrides.get("weights") or {}).items():
+        weights[names.check(name, WEIGHTS, "weight")] = _number(f"weights[{name!r}]", weight)
+    values = table | dict(overrides)
+    numbers = {
+        name: _number(name, values[name], low, high)
+        for name, low, high in (
+            ("target_velocity", -math.inf, math.inf),
+            ("velocity_band", 1e-9, math.inf),
+            ("gait_frequency", 0.0, math.inf),
+            ("duty_factor", 0.0, 1.0),
+            ("stance_threshold", -math.inf, math.inf),
+        )
+    }
+    parameters = rewards.Parameters(
+        **numbers,
+        phase_offsets=_array("phase_offsets", values["phase_offsets"], len(body.legs)),
+        healthy_range=_healthy_range(values["healthy_range"]),
+        default_angles=_array("default_angles", values["default_angles"], len(body.joint_names)),
+    )
+    noise = {name: _number(name, values[name], 0.0, math.inf) for name in ("base_noise", "joint_noise")}
+    return Settings(parameters, weights, **noise)
+
+
+def _number(name: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not real or not math.isfinite(value) or not low <= value <= high:
+        raise ValueError(f"{name}: expected a finite number from {low:g} to {high:g}, got {value!r}")
+    return float(value)
+
+
+def _array(name: str, value: Any, size: int) -> np.ndarray:
+    array = np.asarray(value)
+    if array.dtype.kind not in "if" or array.shape not in ((), (size,)) or not np.isfinite(array).all():
+        raise ValueError(f"{name}: expected one finite number or {size} of them, got {value!r}")
+    return np.broadcast_to(array, size).astype(float)
+
+
+def _healthy_range(value: Any) -> tuple[float, float]:
+    low, high = _array("healthy_range", value, 2)
+    if not low < high:
+        raise ValueError(f"healthy_range: expected low < high, got {value!r}")
+    return float(low), float(high)
+
+
+def initial_state(qpos0: np.ndarray, nv: int, settings: Settings, random: np.random.RandomState):
+    """Draws the state in which an episode starts.
+
+    Args:
+        qpos0: (nq,) the standing pose: torso position and quaternion, then joint angles.
+        nv: number of velocities.
+        settings: of the walk, for the noise.
+        random: what to draw from.
+
+    Returns:
+        qpos (nq,) and qvel (nv,).
+    """
+    base, joint = settings.base_noise, settings.joint_noise
+    joints = nv - 6
+    qpos = qpos0 + np.concatenate([random.uniform(-base, base, 7), random.uniform(-joint, joint, joints)])
+    qpos[3:7] /= np.linalg.norm(qpos[3:7])
+    qvel = np.concatenate([base * random.standard_normal(6), joint * random.standard_normal(joints)])
+    return qpos, qvel
+
+
+def observation(readings: Readings, phase) -> collections.OrderedDict:
+    """The named blocks whose flattening is the paper's observation vector (Section 3).
+
+    Args:
+        readings: of the simulation, (...).
+        phase: (...) of the gait clock, rad.
+
+    Returns:
+        posture (..., 5 + joints): torso height, torso quaternion, joint angles;
+        velocities (..., 6 + joints): torso linear (world) and angular (body), joints;
+        contact_forces (..., 6 * parts): torque and force on each part, clipped to [-1, 1];
+        gait_clock (..., 2): sine and cosine of the phase.
+    """
+    r = readings
+    return collections.OrderedDict(
+        posture=np.concatenate([r.torso_height[..., None], r.torso_quaternion, r.joint_angles], axis=-1),
+        velocities=np.concatenate([r.linear_velocity, r.angular_velocity, r.joint_velocities], axis=-1),
+        contact_forces=r.contact_forces,
+        gait_clock=np.stack([np.sin(phase), np.cos(phase)], axis=-1),
+    )
+
+
+def checked_action(action, size: int) -> np.ndarray:
+    """The action as float64, clipped to [-1, 1].
+
+    Args:
+        action: (..., size)
+        size: number of motors.
+
+    Raises:
+        ValueError: another shape, not numbers, or NaN; one line that names the index.
+    """
+    try:
+        array = np.asarray(action, dtype=float)
+    except (TypeError, ValueError):
+        raise ValueError(f"action: expected {size} numbers, got {type(action).__name__}") from None
+    if array.shape[-1:] != (size,):
+        raise ValueError(f"action: expected shape ({size},), got {array.shape}")
+    invalid = np.isnan(array)
+    if invalid.any():
+        index = np.argwhere(invalid)[0]
+        raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
+    return array.clip(-1.0, 1.0)
+
+
+class Walk(control.Task):
+    """Walking, as a dm_control task: glue between a simulation, the gait clock and the reward.
+
+    Attributes:
+        body: what walks.
+        settings: the numbers.
+        terms: the ten unweighted terms of the latest reward by name; empty before the first step.
+        visualize_reward: whether rendered pictures show the reward as a colour.
+    """
+
+    def __init__(self, body: Body, settings: Settings, physics: Physics, random=None):
+        """Prepares to walk.
+
+        Args:
+            body: what walks.
+            settings: the numbers.
+            physics: the simulation of the body; only its model is read here.
+            random: a `RandomState`, or what one is seeded with.
+        """
+        self.body = body
+        self.settings = settings
+        self.terms: dict[str, float] = {}
+        self.visualize_reward = False
+        self._random = random if isinstance(random, np.random.RandomState) else np.random.RandomState(random)
+        self._layout = layout(physics.model.ptr, body.joint_names, body.part_names, body.foot_names)
+        self._control_timestep = SUBSTEPS * physics.timestep()
+        self._size = physics.model.nu
+        self._restart()
+
+    def _restart(self) -> None:
+        self._phase = np.float64(0.0)
+        self._x = 0.0
+        self._forward_velocity = 0.0
+        self._action = np.zeros(self._size)
+        self._previous_action = self._action
+
+    @property
+    def random(self) -> np.random.RandomState:
+        """What resets draw from."""
+        return self._random
+
+    def action_spec(self, physics):
+        """One control in [-1, 1] for each motor."""
+        return mujoco.action_spec(physics)
+
+    def initialize_episode(self, physics):
+        """Puts the body on its feet, with noise, and the gait clock at 0."""
+        model, data = physics.model.ptr, physics.data.ptr
+        data.qpos[:], data.qvel[:] = initial_state(model.qpos0, model.nv, self.settings, self._random)
+        self._restart()
+
+    def before_step(self, action, physics):
+        """Applies the action, clipped to [-1, 1].
+
+        Raises:
+            ValueError: the action has another shape or holds NaN; nothing has changed then.
+        """
+        action = checked_action(action, self._size)
+        if action.ndim != 1:
+            raise ValueError(f"action: expected shape ({self._size},), got {action.shape}")
+        self._previous_action, self._action = self._action, action
+        self._x = physics.data.ptr.qpos[0]
+        physics.set_control(action)
+
+    def after_step(self, physics):
+        """Advances the gait clock and measures the step's progress."""
+        clock = rewards.TWO_PI * self.settings.parameters.gait_frequency * self._control_timestep
+        self._phase = (self._phase + clock) % rewards.TWO_PI
+        self._forward_velocity = (physics.data.ptr.qpos[0] - self._x) / self._control_timestep
+
+    def get_observation(self, physics):
+        """The four blocks; see `observation`."""
+        return observation(read(physics.data.ptr, self._layout), self._phase)
+
+    def get_reward(self, physics):
+        """The weighted sum of the ten terms, which stay in `terms`."""
+        step = rewards.Step(self._phase, self._forward_velocity, self._action, self._previous_action)
+        readings = read(physics.data.ptr, self._layout)
+        self.terms = rewards.terms(readings, step, self.settings.parameters)
+        return rewards.total(self.terms, self.settings.weights)
+
+    def get_termination(self, physics):
+        """0 when the torso's height has left its healthy range, else None."""
+        low, high = self.settings.parameters.healthy_range
+        return None if low <= physics.data.ptr.qpos[2] <= high else 0.0
+
+
+def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kwargs=None, **overrides):
+    """An environment in which the body walks.
+
+    Args:
+        body: a robot of `SETTINGS`.
+        time_limit: s.
+        random: a `RandomState`, or what one is seeded with.
+        environment_kwargs: `flat_observation`, to get one vector in place of the blocks.
+        **overrides: of `settings`.
+
+    Returns:
+        A `control.Environment`.
+
+    Raises:
+        ValueError: an unknown name, or a value that does not fit; one line that names it.
+    """
+    chosen = settings(body, overrides)
+    time_limit = _number("time_limit", time_limit, 1e-9)
+    for name in environment_kwargs or {}:
+        names.check(name, ["flat_observation"], "environment setting")
+    physics = Physics.from_body(body)
+    task = Walk(body, chosen, physics, random)
+    # legacy_step would move the contact forces and foot heights one substep on.
+    return control.Environment(
+        physics, task, time_limit, n_sub_steps=SUBSTEPS, legacy_step=False, **(environment_kwargs or {})
+    )
