@@ -1,0 +1,34 @@
+# make demo    Queen walks: installs everything, leaves out/queen.png and out/queen.mp4
+# make test    installs everything, runs all tests
+# make check   lint and tests: what CI runs
+SHELL := /bin/bash
+VENV ?= .venv
+PYTHON := $(VENV)/bin/python
+INSTALLED := $(VENV)/installed
+
+.PHONY: demo test check lint clean
+
+demo: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	mkdir -p out
+	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.png
+	$(PYTHON) tools/render.py --robot queen --policy cpg --steps 1000 --output out/queen.mp4
+
+test: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) -m pytest
+
+check: lint test
+
+lint: $(INSTALLED)
+	$(PYTHON) -m pip install -q -e '.[lint]'
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+
+$(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
+	tools/ensure_venv.sh $(VENV)
+	$(PYTHON) -m pip install -q -e '.[test]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) out build *.egg-info
