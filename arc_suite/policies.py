@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from arc_suite import names
-from arc_suite.cpg import Demonstrator
+from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.robots import ROBOTS
 
 POLICIES = ("cpg", "zero", "random")
@@ -27,6 +27,7 @@ def policy(name: str, robot: str, preset: str = "medium", seed: int | None = Non
         ValueError: an unknown name; one line that names it and the nearest valid one.
     """
     names.check(name, POLICIES, "policy")
+    names.check(preset, PRESETS, "preset")
     if name == "cpg":
         return Demonstrator(robot, preset)
     size = len(ROBOTS[names.check(robot, ROBOTS, "robot")].joint_names)
