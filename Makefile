@@ -1,12 +1,14 @@
 # make demo    Queen walks: installs everything, leaves out/queen.png and out/queen.mp4
 # make test    installs everything, runs all tests
 # make check   lint and tests: what CI runs
+# make mutants plants mistakes and tells which test catches each; takes minutes
+# make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
 SHELL := /bin/bash
 VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint clean
+.PHONY: demo test check lint mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -29,6 +31,12 @@ $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)
 	$(PYTHON) -m pip install -q -e '.[test]'
 	touch $@
+
+mutants: $(INSTALLED)
+	$(PYTHON) tests/mutants.py
+
+golden: $(INSTALLED)
+	$(PYTHON) tests/golden.py
 
 clean:
 	rm -rf $(VENV) out build *.egg-info

@@ -117,8 +117,10 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
     table = COMMON | SETTINGS[names.check(body.name, SETTINGS, "walker")]
     for name in overrides:
         names.check(name, table, "setting of walk")
-    weights = WEIGHTS | table["weights"]
-    for name, weight in dict(overrides.get("weights") or {}).items():
+    weights, changed = WEIGHTS | table["weights"], overrides.get("weights") or {}
+    if not isinstance(changed, Mapping):
+        raise ValueError(f"weights: expected a mapping of names to numbers, got {changed!r}")
+    for name, weight in changed.items():
         weights[names.check(name, WEIGHTS, "weight")] = _number(f"weights[{name!r}]", weight)
     values = table | dict(overrides)
     numbers = {
@@ -319,7 +321,7 @@ def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kw
 
     Args:
         body: a robot of `SETTINGS`.
-        time_limit: s.
+        time_limit: s; may be infinite.
         random: a `RandomState`, or what one is seeded with.
         environment_kwargs: `flat_observation`, to get one vector in place of the blocks.
         **overrides: of `settings`.
@@ -331,7 +333,8 @@ def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kw
         ValueError: an unknown name, or a value that does not fit; one line that names it.
     """
     chosen = settings(body, overrides)
-    time_limit = _number("time_limit", time_limit, 1e-9)
+    if time_limit != math.inf:
+        time_limit = _number("time_limit", time_limit, 1e-9)
     for name in environment_kwargs or {}:
         names.check(name, ["flat_observation"], "environment setting")
     physics = Physics.from_body(body)

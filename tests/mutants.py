@@ -1,0 +1,114 @@
+"""Plants mistakes on purpose, one at a time, in a copy of the project, and tells which test catches each.
+
+`python tests/mutants.py` runs all; exit status 1 if one survives. It takes minutes: `make mutants`.
+"""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+from typing import NamedTuple
+
+from tqdm import tqdm
+
+ROOT = pathlib.Path(__file__).parents[1]
+
+
+class Mutant(NamedTuple):
+    """A mistake: in a file of the package, one text in place of another that occurs once."""
+
+    mistake: str
+    file: str
+    old: str
+    new: str
+
+
+MUTANTS = (
+    Mutant("swapped leg", "robots/queen.py", "leg.mirrored(leg.name.replace", "leg.replace(name=leg.name.replace"),
+    Mutant("mirrored axis keeps its sign", "spec.py", "axis=(-a, b, -c)", "axis=(a, b, -c)"),
+    Mutant(
+        "leg order",
+        "robots/leaper.py",
+        '(left, left.mirrored(left.name[0] + "r"))',
+        '(left.mirrored(left.name[0] + "r"), left)',
+    ),
+    Mutant("dropped clip of the action", "tasks/walk.py", "return array.clip(-1.0, 1.0)", "return array"),
+    Mutant("dropped clip of the contact forces", "tasks/readings.py", ".clip(-1.0, 1.0)", ""),
+    Mutant("sign of a weight", "tasks/walk.py", '"smoothness": -0.02', '"smoothness": 0.02'),
+    Mutant("sign of the sweep", "cpg/demonstrator.py", "(-1.0 if leg.side", "(1.0 if leg.side"),
+    Mutant("ignored seed", "tasks/walk.py", "np.random.RandomState(random)\n", "np.random.RandomState()\n"),
+    Mutant("wrong number of substeps", "tasks/walk.py", "SUBSTEPS = 25", "SUBSTEPS = 24"),
+    Mutant(
+        "gait clock advances too late",
+        "tasks/walk.py",
+        "self._phase = (self._phase + clock)",
+        "self._phase = (self._phase + 0.5 * clock)",
+    ),
+    Mutant(
+        "previous action forgotten",
+        "tasks/walk.py",
+        "self._previous_action, self._action = self._action, action",
+        "self._previous_action, self._action = action, action",
+    ),
+    Mutant(
+        "velocity of the wrong frame",
+        "tasks/readings.py",
+        "angular_velocity=qvel[..., 3:6]",
+        "angular_velocity=qvel[..., 0:3]",
+    ),
+    Mutant("yaw rate penalised", "tasks/rewards.py", "angular_velocity[..., :2]", "angular_velocity[..., :3]"),
+    Mutant("stance and swing exchanged", "tasks/rewards.py", "% TWO_PI < TWO_PI", "% TWO_PI > TWO_PI"),
+    Mutant("quaternion not normalised", "tasks/walk.py", "    qpos[3:7] /= np.linalg.norm(qpos[3:7])\n", ""),
+    Mutant(
+        "reset noise of the joints halved",
+        "tasks/walk.py",
+        "random.uniform(-joint, joint, joints)",
+        "random.uniform(0.0, joint, joints)",
+    ),
+    Mutant("fall reported as a time limit", "tasks/walk.py", "<= high else 0.0", "<= high else 1.0"),
+    Mutant("no sensors, so no contact forces", "physics.py", "self._option.disableflags &= ~_SENSOR", "pass"),
+    Mutant("one substep too few", "physics.py", "nstep - 1)", "nstep - 2)"),
+    Mutant("contact margin doubled", "robots/builder.py", '"margin": 0.005', '"margin": 0.01'),
+    Mutant("armature of the hip", "robots/tick.py", "armature=1.0", "armature=2.0"),
+    Mutant("ballast touches the floor", "robots/builder.py", '{"contype": 0,', '{"contype": 1,'),
+    Mutant("NaN let through", "tasks/walk.py", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
+    Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
+)
+
+
+def plant(mutant: Mutant, folder: pathlib.Path) -> None:
+    """Copies the project to a folder and plants the mistake there."""
+    shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", ".venv", "out", "__pycache__", "*.egg-info"))
+    path = folder / "arc_suite" / mutant.file
+    text = path.read_text()
+    if text.count(mutant.old) != 1:
+        raise ValueError(f"{mutant.file}: expected {mutant.old!r} once, found it {text.count(mutant.old)} times")
+    path.write_text(text.replace(mutant.old, mutant.new))
+
+
+def caught_by(folder: pathlib.Path) -> str | None:
+    """The first test of a project that fails, or None."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    failed = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return failed[0].split(" - ")[0] if failed else None
+
+
+def main() -> int:
+    """Tries every mutant and prints a table."""
+    survivors = 0
+    for mutant in tqdm(MUTANTS, unit="mutant"):
+        with tempfile.TemporaryDirectory() as folder:
+            copy = pathlib.Path(folder) / "project"
+            plant(mutant, copy)
+            test = caught_by(copy)
+        survivors += test is None
+        tqdm.write(f"{mutant.mistake:<40} {test or 'SURVIVES'}")
+    return int(survivors > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
