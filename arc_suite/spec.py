@@ -181,7 +181,7 @@ class Joint(_Spec):
         if a == b == 0.0:
             low, high = self.range_deg
             return self.replace(range_deg=(-high, -low))
-        return self.replace(axis=(-a, b, -c))
+        return self.replace(axis=(0.0 - a, b, 0.0 - c))  # 0.0 - 0.0 is no negative zero
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -286,6 +286,8 @@ class Solid(_Spec):
     def _check_whole(self):
         if len(self.size) != _SIZES[self.shape]:
             self._fail("size", f"expected {_SIZES[self.shape]} lengths for a {self.shape}, got {len(self.size)}")
+        if self.name == "floor":
+            self._fail("name", "'floor' is what the body stands on")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -301,6 +303,9 @@ class Torso(_Spec):
 
     standing_height: float = _length()
     solids: tuple[Solid, ...] = _field(_check_items, Solid, 1, 64)
+
+    def _check_whole(self):
+        _check_unique(self, "solids", [solid.name for solid in self.solids])
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -335,7 +340,11 @@ class Body(_Spec):
 
     def _check_whole(self):
         _check_unique(self, "legs", [leg.name for leg in self.legs])
-        _check_unique(self, "ballast", [part.name for part in (*self.torso.solids, *self.ballast)])
+        shapes = [part.name for part in (*self.torso.solids, *self.ballast)]
+        _check_unique(self, "ballast", shapes)
+        # Names in the model: leg a's part b_c would meet leg a_b's part c.
+        _check_unique(self, "legs", [*shapes, *self.part_names[1:]])
+        _check_unique(self, "legs", self.joint_names)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -362,10 +371,12 @@ class Body(_Spec):
 
 
 def _reflected(point: Vector) -> Vector:
-    return (point[0], -point[1], point[2])
+    return (point[0], 0.0 - point[1], point[2])
 
 
-def _check_unique(spec: _Spec, field: str, names: list[str]) -> None:
+def _check_unique(spec: _Spec, field: str, names: Iterable[str]) -> None:
+    seen = set()
     for name in names:
-        if names.count(name) > 1:
+        if name in seen:
             spec._fail(field, f"the name {name!r} occurs twice")
+        seen.add(name)
