@@ -7,6 +7,4 @@ from arc_suite.robots.builder import CONTACT
 
 def add_floor(root: mjcf.RootElement) -> None:
     """Adds `floor`, an endless flat plane at height 0."""
-    root.worldbody.add(
-        "geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, rgba=(0.3, 0.32, 0.35, 1.0), **CONTACT
-    )
+    root.worldbody.add("geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **CONTACT)

@@ -6,6 +6,7 @@ import mujoco
 from dm_control import mujoco as dm_mujoco
 
 from arc_suite import models, names, rendering
+from arc_suite.robots import looks
 from arc_suite.spec import Body
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -17,6 +18,10 @@ class Physics(dm_mujoco.Physics):
     A step leaves everything as `mj_step` does, with derived quantities one substep behind the
     state. Only the last of its substeps computes sensors, and with them `cfrc_ext`, so that the
     result is bit-equal to plain substeps and cheaper.
+
+    Attributes:
+        shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
+            whatever glows; None leaves it its own colour.
     """
 
     @classmethod
@@ -30,6 +35,7 @@ class Physics(dm_mujoco.Physics):
         super()._reload_from_data(data)
         self.body = None
         self._decorated = None
+        self.shown_reward = None
         self._option = self.model.ptr.opt
 
     def step(self, nstep: int = 1) -> None:
@@ -54,6 +60,8 @@ class Physics(dm_mujoco.Physics):
         decorated.set_state(self.get_state())
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
             update(decorated.model.ptr, decorated.data.ptr)
+        share = self.shown_reward
+        decorated.model.ptr.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
         return decorated.render(height, width, camera_id, **kwargs)
 
     def _decorate(self) -> dm_mujoco.Physics:
@@ -62,6 +70,7 @@ class Physics(dm_mujoco.Physics):
             decorated = dm_mujoco.Physics.from_xml_string(xml)
             with rendering.errors():
                 decorated.contexts  # noqa: B018 (opens OpenGL)
+            self._glow = decorated.model.ptr.material("glow").rgba.copy()
             self._decorated = decorated
         return self._decorated
 

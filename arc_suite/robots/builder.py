@@ -2,8 +2,10 @@
 
 import math
 
+import numpy as np
 from dm_control import mjcf
 
+from arc_suite.robots.outline import outline
 from arc_suite.spec import Body, Leg, Solid
 
 TIMESTEP = 0.002  # s, of one substep
@@ -17,7 +19,10 @@ CONTACT = {"condim": 3, "friction": (1.0, 0.5, 0.5), "margin": 0.005}
 _TOUCHES_FLOOR = {"contype": 1, "conaffinity": 0, **CONTACT}
 _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
-_GREY = (0.55, 0.57, 0.6, 1.0)
+# Cameras that ride along: azimuth from straight ahead and elevation, rad.
+_VIEWS = (("portrait", math.radians(-35.0), math.radians(13.0)), ("profile", math.radians(-80.0), math.radians(12.0)))
+_FOVY = 30.0  # degrees, as MJCF wants it whatever the compiler's angle
+_ASPECT, _MARGIN = 4.0 / 3.0, 1.12
 
 
 def build(body: Body) -> mjcf.RootElement:
@@ -41,7 +46,6 @@ def build(body: Body) -> mjcf.RootElement:
     root.option.iterations = SOLVER_ITERATIONS
     root.option.flag.filterparent = "enable"
     root.option.flag.island = "disable"  # a single creature is one island: finding it only costs time
-    root.default.geom.rgba = _GREY
 
     torso = root.worldbody.add("body", name="torso", pos=(0.0, 0.0, body.torso.standing_height))
     torso.add("freejoint", name="root")
@@ -110,15 +114,28 @@ def _add_joint(root, link, leg: Leg, joint) -> None:
 
 
 def _add_cameras(torso, body: Body) -> None:
-    """Adds `tracking`, the side view of the spec, and `portrait`, a nearer one from the front."""
+    """Adds `tracking`, the side view of the spec, and two that the body fills: `portrait` and `profile`."""
     camera = body.camera
     torso.add("camera", name="tracking", mode="trackcom", pos=camera.position, xyaxes=camera.xyaxes)
-    reach = max(math.hypot(*leg.foot_position[:2]) for leg in body.legs)
-    distance = 1.35 * max(2.0 * reach, body.torso.standing_height)
-    torso.add(
-        "camera",
-        name="portrait",
-        mode="trackcom",
-        pos=(0.8 * distance, -0.75 * distance, 0.45 * distance),
-        xyaxes=(0.75, 0.8, 0.0, -0.28, 0.27, 0.92),
+    for name, azimuth, elevation in _VIEWS:
+        torso.add("camera", name=name, mode="trackcom", fovy=_FOVY, **_framing(body, azimuth, elevation))
+
+
+def _framing(body: Body, azimuth: float, elevation: float) -> dict:
+    """The nearest place from which a camera that looks in a direction sees the whole standing body.
+
+    With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
+    the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and
+    likewise for v: each side of the picture is a plane that touches the hull of the outline.
+    """
+    back = np.array(
+        (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))
     )
+    right = np.array((-math.sin(azimuth), math.cos(azimuth), 0.0))
+    axes = np.stack((right, np.cross(back, right), back))
+    points = outline(body) @ axes.T
+    half_field = math.tan(math.radians(_FOVY / 2.0)) / _MARGIN * np.array((_ASPECT, 1.0))
+    depth = half_field * points[:, 2:]
+    high, low = (points[:, :2] + depth).max(axis=0), (points[:, :2] - depth).min(axis=0)
+    place = (*((high + low) / 2.0), ((high - low) / (2.0 * half_field)).max())
+    return {"pos": tuple(place @ axes), "xyaxes": tuple(axes[:2].ravel())}

@@ -103,3 +103,8 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
 def total(terms: Mapping, weights: Mapping):
     """The reward: the sum of the terms times their signed weights, in the order of the weights."""
     return sum(weight * terms[name] for name, weight in weights.items())
+
+
+def greatest(weights: Mapping) -> float:
+    """The most that a step can earn: bonuses, whose weights are positive, are at most 1, costs at least 0."""
+    return sum(weight for weight in weights.values() if weight > 0.0)

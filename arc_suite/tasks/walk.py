@@ -278,6 +278,7 @@ class Walk(control.Task):
         """Puts the body on its feet, with noise, and the gait clock at 0."""
         model, data = physics.model.ptr, physics.data.ptr
         data.qpos[:], data.qvel[:] = initial_state(model.qpos0, model.nv, self.settings, self._random)
+        physics.shown_reward = None
         self._restart()
 
     def before_step(self, action, physics):
@@ -308,7 +309,10 @@ class Walk(control.Task):
         step = rewards.Step(self._phase, self._forward_velocity, self._action, self._previous_action)
         readings = read(physics.data.ptr, self._layout)
         self.terms = rewards.terms(readings, step, self.settings.parameters)
-        return rewards.total(self.terms, self.settings.weights)
+        reward = rewards.total(self.terms, self.settings.weights)
+        if self.visualize_reward:
+            physics.shown_reward = reward / (rewards.greatest(self.settings.weights) or 1.0)
+        return reward
 
     def get_termination(self, physics):
         """0 when the torso's height has left its healthy range, else None."""

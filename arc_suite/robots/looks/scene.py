@@ -1,0 +1,69 @@
+"""The place in which creatures are shown: sky, ground, light and the quality of pictures."""
+
+import math
+
+import numpy as np
+from dm_control import mjcf
+
+MAX_WIDTH, MAX_HEIGHT = 1920, 1440  # pixels of the largest picture
+
+_SKY = {"rgb1": (0.20, 0.28, 0.40), "rgb2": (0.62, 0.68, 0.74)}
+_HORIZON = tuple((top + bottom) / 2.0 for top, bottom in zip(_SKY["rgb1"], _SKY["rgb2"], strict=True))
+_GROUND = {"rgb1": (0.33, 0.37, 0.42), "rgb2": (0.29, 0.33, 0.375), "markrgb": (0.50, 0.56, 0.62)}
+
+
+def add_scene(root: mjcf.RootElement, height: float) -> None:
+    """Adds sky and light, and a grid on the geom `floor` that makes motion over it visible.
+
+    Args:
+        root: holds the body `torso` and the geom `floor`.
+        height: of the creature, m; a cell of the grid is about that wide.
+    """
+    getattr(root.visual, "global").set_attributes(offwidth=MAX_WIDTH, offheight=MAX_HEIGHT)
+    root.visual.quality.shadowsize = 4096
+    root.visual.map.shadowclip = 4.0
+    root.visual.quality.offsamples = 4
+    root.visual.map.znear = 0.02
+    root.visual.rgba.haze = (*_HORIZON, 1.0)
+    root.visual.headlight.set_attributes(
+        ambient=(0.28, 0.29, 0.32), diffuse=(0.22, 0.22, 0.22), specular=(0.1, 0.1, 0.1)
+    )
+    root.asset.add("texture", name="sky", type="skybox", builtin="gradient", width=256, height=1536, **_SKY)
+    root.asset.add(
+        "texture", name="ground", type="2d", builtin="checker", mark="edge", width=256, height=256, **_GROUND
+    )
+    root.asset.add(
+        "material",
+        name="ground",
+        texture="ground",
+        texuniform=True,
+        texrepeat=(0.5 / _round_length(height),) * 2,
+        specular=0.1,
+        shininess=0.1,
+    )
+    root.find("geom", "floor").material = "ground"
+
+    # Lights ride on the torso, so that shadows stay sharp however far the creature walks.
+    torso = root.find("body", "torso")
+    for name, towards, strength, casts in (
+        ("sun", (-0.4, 0.28, -1.0), 0.62, True),
+        ("rim", (0.6, 0.5, -0.35), 0.25, False),
+    ):
+        direction = np.array(towards) / np.linalg.norm(towards)
+        torso.add(
+            "light",
+            name=name,
+            mode="trackcom",
+            directional=True,
+            castshadow=casts,
+            pos=tuple(-6.0 * height * direction),
+            dir=tuple(direction),
+            diffuse=(strength, 0.98 * strength, 0.94 * strength),
+            specular=(0.35, 0.35, 0.35),
+        )
+
+
+def _round_length(length: float) -> float:
+    """The nearest of ..., 0.1, 0.2, 0.5, 1, 2, ... m."""
+    decade = 10.0 ** math.floor(math.log10(length))
+    return min((decade * step for step in (1.0, 2.0, 5.0, 10.0)), key=lambda step: abs(math.log(step / length)))
