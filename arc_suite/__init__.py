@@ -2,12 +2,18 @@
 
 import arc_suite
 environment = arc_suite.load("queen", "walk")
+
+import gymnasium
+env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
 from arc_suite import rendering
 
 rendering.select_backend()  # before anything imports dm_control
 
+from arc_suite import registration  # noqa: E402
 from arc_suite.suite import ALL_TASKS, TASKS_BY_DOMAIN, load  # noqa: E402
+
+registration.register()
 
 __all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load"]

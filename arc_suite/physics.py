@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+
 import mujoco
 from dm_control import mujoco as dm_mujoco
 
@@ -33,7 +35,6 @@ class Physics(dm_mujoco.Physics):
 
     def _reload_from_data(self, data):
         super()._reload_from_data(data)
-        self.body = None
         self._decorated = None
         self.shown_reward = None
         self._option = self.model.ptr.opt
@@ -52,33 +53,39 @@ class Physics(dm_mujoco.Physics):
         """A picture of the decorated body, (height, width, 3) uint8; other arguments as in dm_control.
 
         Raises:
-            ValueError: no such camera.
+            ValueError: no such camera, or a size beyond the model's offscreen buffer; one line.
             RenderingUnavailable: no OpenGL here.
         """
-        self._check_camera(camera_id)
-        decorated = self._decorate()
+        self.check_camera(camera_id)
+        decorated = self.decorated()
+        most = decorated.model.vis.global_
+        for name, size, limit in (("height", height, most.offheight), ("width", width, most.offwidth)):
+            if size not in range(1, limit + 1):
+                raise ValueError(f"{name}: expected an integer from 1 to {limit}, got {size!r}")
+        with rendering.errors():
+            decorated.contexts  # noqa: B018 (opens OpenGL)
+        return decorated.render(height, width, camera_id, **kwargs)
+
+    def decorated(self) -> dm_mujoco.Physics:
+        """The decorated body in the present pose, to look at; the same object at every call."""
+        if self._decorated is None:
+            xml = models.assemble(self.body, decorated=True).to_xml_string()
+            self._decorated = dm_mujoco.Physics.from_xml_string(xml)
+            self._glow = self._decorated.model.ptr.material("glow").rgba.copy()
+        decorated = self._decorated
         decorated.set_state(self.get_state())
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
             update(decorated.model.ptr, decorated.data.ptr)
         share = self.shown_reward
         decorated.model.ptr.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
-        return decorated.render(height, width, camera_id, **kwargs)
+        return decorated
 
-    def _decorate(self) -> dm_mujoco.Physics:
-        if self._decorated is None:
-            xml = models.assemble(self.body, decorated=True).to_xml_string()
-            decorated = dm_mujoco.Physics.from_xml_string(xml)
-            with rendering.errors():
-                decorated.contexts  # noqa: B018 (opens OpenGL)
-            self._glow = decorated.model.ptr.material("glow").rgba.copy()
-            self._decorated = decorated
-        return self._decorated
-
-    def _check_camera(self, camera_id) -> None:
+    def check_camera(self, camera_id) -> None:
+        """Raises ValueError, one line, if there is no such camera (a name, an index, or -1 for the free one)."""
         cameras = [self.model.id2name(i, "camera") for i in range(self.model.ncam)]
         if isinstance(camera_id, str):
             names.check(camera_id, cameras, "camera")
-        elif not -1 <= camera_id < len(cameras):
+        elif camera_id not in range(-1, len(cameras)):
             raise ValueError(f"no camera {camera_id}: expected -1 (free) to {len(cameras) - 1}, or one of {cameras}")
 
     def free(self) -> None:
@@ -89,8 +96,9 @@ class Physics(dm_mujoco.Physics):
         super().free()
 
     def copy(self, share_model: bool = False) -> Physics:
-        """An independent copy of the simulation."""
+        """An independent copy of the simulation, as it stands."""
         copied = super().copy(share_model)
+        mujoco.mj_copyData(copied.data.ptr, copied.model.ptr, self.data.ptr)
         copied.body = self.body
         return copied
 
@@ -98,6 +106,8 @@ class Physics(dm_mujoco.Physics):
         return super().__getstate__(), self.body
 
     def __setstate__(self, state):
-        data, body = state
+        data, self.body = state
+        # dm_control recomputes the derived quantities; here they are one substep behind the state.
+        as_it_stands = copy.copy(data.ptr)
         super().__setstate__(data)
-        self.body = body
+        mujoco.mj_copyData(data.ptr, data.model.ptr, as_it_stands)

@@ -11,7 +11,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 
 # From the bottom up; a module may import from its own layer's row only what stands before it.
 LAYERS = (
-    ("names", "rendering"),
+    ("names", "rendering", "seeding"),
     ("spec",),
     ("robots", "arenas", "models"),
     ("physics",),
@@ -20,7 +20,7 @@ LAYERS = (
     ("cpg",),
     ("evaluation", "policies"),
     ("registration",),
-    ("gym", "vector"),
+    ("window", "gym", "vector"),
     ("commands",),
 )
 ORDER = [name for layer in LAYERS for name in layer]

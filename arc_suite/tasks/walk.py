@@ -9,7 +9,7 @@ import numpy as np
 from dm_control import mujoco
 from dm_control.rl import control
 
-from arc_suite import names
+from arc_suite import names, seeding
 from arc_suite.physics import Physics
 from arc_suite.spec import Body
 from arc_suite.tasks import rewards
@@ -252,7 +252,9 @@ class Walk(control.Task):
         self.settings = settings
         self.terms: dict[str, float] = {}
         self.visualize_reward = False
-        self._random = random if isinstance(random, np.random.RandomState) else np.random.RandomState(random)
+        if not isinstance(random, np.random.RandomState):
+            random = np.random.RandomState(None if random is None else seeding.check(random))
+        self._random = random
         self._layout = layout(physics.model.ptr, body.joint_names, body.part_names, body.foot_names)
         self._control_timestep = SUBSTEPS * physics.timestep()
         self._size = physics.model.nu
