@@ -93,8 +93,9 @@ def test_metadata_is_nobody_elses():
 
     env = gymnasium.make(IDS[0])
     env.unwrapped.metadata["render_fps"] = 7
-    assert gymnasium.make(IDS[0]).metadata["render_fps"] == 20
     assert Env.metadata["render_fps"] == 20
+    assert gymnasium.make(IDS[0]).metadata["render_fps"] == 20
+    assert env.metadata["render_fps"] == 7
     assert DmControlCompatibilityV0.metadata["render_fps"] == 10  # shimmy's own default, untouched
 
 

@@ -110,8 +110,8 @@ def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
             {"MUJOCO_GL": "vulkan"},
             None,
             "cannot render with MUJOCO_GL=vulkan: Environment variable MUJOCO_GL must be one of ['', '0', '1', "
-            "'disable', 'disabled', 'egl', 'enable', 'enabled', 'false', 'glfw', 'off', 'on', 'osmesa', 'true']: got 'vulkan'.; "
-            + REMEDY,
+            "'disable', 'disabled', 'egl', 'enable', 'enabled', 'false', 'glfw', 'off', 'on', 'osmesa', 'true']: "
+            f"got 'vulkan'.; {REMEDY}",
         ),
     ],
     ids=["no library", "egl, no library", "no driver", "egl, no driver", "disable", "glfw, no display", "unknown"],
