@@ -19,7 +19,7 @@ class _Viewer(WindowViewer):
 
 
 class Window:
-    """Opens at the first picture; once a person has closed it, it stays closed."""
+    """Stays closed once a person has closed it, by its button or the escape key."""
 
     def __init__(self, physics, camera_id: int | str, width: int, height: int):
         """Opens the window.
