@@ -1,6 +1,7 @@
 # make demo    Queen walks: installs everything, leaves out/queen.png and out/queen.mp4
 # make test    installs everything, runs all tests
 # make check   lint and tests: what CI runs
+# make check-sb3  stable-baselines3's checker and a short SAC run, in an environment of their own
 # make mutants plants mistakes and tells which test catches each; takes minutes
 # make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
 SHELL := /bin/bash
@@ -8,7 +9,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint mutants golden clean
+.PHONY: demo test check lint check-sb3 mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -32,6 +33,16 @@ $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 	$(PYTHON) -m pip install -q -e '.[test]'
 	touch $@
 
+# torch comes first, so that stable-baselines3 keeps it. Where the default build is one for GPUs, a CPU
+# build is had with PIP_EXTRA_INDEX_URL set to PyTorch's CPU index and TORCH=torch==2.13.0+cpu.
+TORCH ?= torch==2.13.0
+check-sb3: VENV := .venv-sb3
+check-sb3: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q '$(TORCH)'
+	$(VENV)/bin/python -m pip install -q -e '.[sb3]'
+	$(VENV)/bin/python tools/check_sb3.py --steps 500
+
 mutants: $(INSTALLED)
 	$(PYTHON) tests/mutants.py
 
@@ -39,4 +50,4 @@ golden: $(INSTALLED)
 	$(PYTHON) tests/golden.py
 
 clean:
-	rm -rf $(VENV) out build *.egg-info
+	rm -rf .venv .venv-sb3 out build *.egg-info

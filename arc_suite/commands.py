@@ -12,7 +12,7 @@ from absl import app, flags
 from arc_suite.rendering import RenderingUnavailable
 
 
-def run(main: Callable[[], None]) -> None:
+def run(main: Callable[[], int | None]) -> None:
     """Parses the command line into absl's flags, calls `main` and exits the process.
 
     A wrong flag, a stray argument, and a ValueError, OSError or RenderingUnavailable from `main`
@@ -20,7 +20,7 @@ def run(main: Callable[[], None]) -> None:
     and keeps its traceback. `--help` shows the docstring of the tool's module and its flags.
 
     Args:
-        main: reads `absl.flags.FLAGS`; takes nothing.
+        main: reads `absl.flags.FLAGS`; takes nothing, returns an exit status or None.
     """
 
     def parse(arguments):
@@ -33,7 +33,7 @@ def run(main: Callable[[], None]) -> None:
         try:
             if arguments[1:]:
                 raise ValueError(f"unexpected argument {arguments[1]!r}; see --help")
-            main()
+            return main()
         except (ValueError, OSError, RenderingUnavailable) as error:
             return _fail(error)
 

@@ -352,10 +352,10 @@ def test_actions_out_of_range_are_clipped():
     [
         (
             {"camera_id": "trackin"},
-            "unknown camera 'trackin'; did you mean 'tracking'? (there are: tracking, portrait)",
+            "unknown camera 'trackin'; did you mean 'tracking'? (there are: tracking, portrait, profile)",
         ),
-        ({"camera_id": 2}, "no camera 2: expected -1 (free) to 1, or one of ['tracking', 'portrait']"),
-        ({"camera_id": None}, "no camera None: expected -1 (free) to 1, or one of ['tracking', 'portrait']"),
+        ({"camera_id": 3}, "no camera 3: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
+        ({"camera_id": None}, "no camera None: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
         (
             {"task_kwargs": {"weights": {"controll": 1.0}}},
             f"unknown weight 'controll'; did you mean 'control'? (there are: {', '.join(WEIGHTS)})",

@@ -5,17 +5,17 @@
 Prints a line for each id and exits with status 1 if a check fails or the checker warns.
 """
 
-import sys
 import time
 import warnings
 
 import gymnasium
 import numpy as np
-from absl import app, flags
+from absl import flags
 from stable_baselines3 import SAC
 from stable_baselines3.common.env_checker import check_env
 
 import arc_suite
+from arc_suite import commands
 
 _STEPS = flags.DEFINE_integer("steps", 500, "Environment steps of the SAC run.", lower_bound=200)
 _ROBOT = flags.DEFINE_enum("robot", "queen", list(arc_suite.TASKS_BY_DOMAIN), "Who learns in the SAC run.")
@@ -41,9 +41,8 @@ def train(env_id: str) -> str:
     return "" if learned else f"after {agent.num_timesteps} steps the action is {action}"
 
 
-def main(argv):
-    if len(argv) > 1:
-        raise app.UsageError(f"unexpected argument {argv[1]!r}")
+def main() -> int:
+    """Prints a line for each check; returns the exit status."""
     ids = [f"arc_suite/{domain}-{task}-v0" for domain, task in arc_suite.ALL_TASKS]
     jobs = [("check_env", check, env_id) for env_id in ids]
     jobs.append((f"SAC {_STEPS.value} steps", train, f"arc_suite/{_ROBOT.value}-walk-v0"))
@@ -56,8 +55,8 @@ def main(argv):
             problem = f"{type(error).__name__}: {error}"
         failed |= bool(problem)
         print(f"{env_id:26}{name:18}{time.perf_counter() - start:6.1f} s  {problem or 'ok'}", flush=True)
-    sys.exit(failed)
+    return int(failed)
 
 
 if __name__ == "__main__":
-    app.run(main)
+    commands.run(main)
