@@ -55,4 +55,4 @@ def errors():
     try:
         yield
     except (RuntimeError, ImportError, AttributeError) as error:
-        raise RenderingUnavailable(f"cannot render: {error}; {_REMEDY}".replace("\n", " ")) from None
+        raise RenderingUnavailable(f"cannot render: {str(error).rstrip('.')}; {_REMEDY}".replace("\n", " ")) from None
