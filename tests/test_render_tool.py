@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from arc_suite import pictures
+
 TOOL = Path(__file__).parents[1] / "tools" / "render.py"
 
 
@@ -86,6 +88,19 @@ def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     assert about["fps"] == 20
     assert about["size"] == (66, 50)
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 1.0
+
+
+def test_a_take_stays_at_its_end():
+    take = pictures.Take("leaper", "random", "medium", 0, "profile", (64, 48))
+    for _ in range(200):
+        if take.ended:
+            break
+        take.step()
+    before = take.steps, take.earned
+    take.step()
+    assert take.ended
+    assert (take.steps, take.earned) == before
+    take.close()
 
 
 @pytest.mark.parametrize(
