@@ -18,7 +18,7 @@ LAYERS = (
     ("tasks",),
     ("suite",),
     ("cpg",),
-    ("evaluation", "policies"),
+    ("evaluation", "policies", "pictures"),
     ("registration",),
     ("window", "gym", "vector"),
     ("commands",),
