@@ -135,7 +135,7 @@ def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):
 
 def test_without_opengl_it_says_what_to_install_and_leaves_the_old_file(tmp_path):
     (tmp_path / "queen.png").write_text("old")
-    done = render(tmp_path, "--output=queen.png", MUJOCO_GL="disable")
+    done = render(tmp_path, "--output=queen.png", MUJOCO_GL="vulkan")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert done.stderr.startswith("render.py: cannot render: ")
     assert "apt-get install libegl1 libgl1 libgl1-mesa-dri" in done.stderr
