@@ -137,6 +137,6 @@ def test_without_opengl_it_says_what_to_install_and_leaves_the_old_file(tmp_path
     (tmp_path / "queen.png").write_text("old")
     done = render(tmp_path, "--output=queen.png", MUJOCO_GL="vulkan")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith("render.py: cannot render: ")
+    assert done.stderr.startswith("render.py: cannot render with MUJOCO_GL=vulkan: ")
     assert "apt-get install libegl1 libgl1 libgl1-mesa-dri" in done.stderr
     assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]
