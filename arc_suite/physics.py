@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 
 import mujoco
+import numpy as np
 from dm_control import mujoco as dm_mujoco
 
 from arc_suite import models, names, rendering
@@ -19,7 +20,12 @@ class Physics(dm_mujoco.Physics):
     A step leaves everything as `mj_step` does, with derived quantities one substep behind the
     state. Only the last of its substeps computes sensors, and with them `cfrc_ext`, so that the
     result is bit-equal to plain substeps and cheaper.
+
+    Attributes:
+        divergence: how the physics diverged in the latest step, in one line, or None.
     """
+
+    divergence: str | None = None
 
     @classmethod
     def from_body(cls, body: Body) -> Physics:
@@ -34,14 +40,25 @@ class Physics(dm_mujoco.Physics):
         self._option = self.model.ptr.opt
 
     def step(self, nstep: int = 1) -> None:
-        """Advances by `nstep` substeps."""
-        with self.check_invalid_state():
-            model, data = self.model.ptr, self.data.ptr
-            if nstep > 1:
-                self._option.disableflags |= _SENSOR
-                mujoco.mj_step(model, data, nstep - 1)
-                self._option.disableflags &= ~_SENSOR
-            mujoco.mj_step(model, data)
+        """Advances by `nstep` substeps.
+
+        Where these diverge, MuJoCo goes on from the model's default state; `divergence` then says
+        what happened, and nothing is raised.
+        """
+        model, data = self.model.ptr, self.data.ptr
+        time = data.time
+        self._warnings.fill(0)
+        if nstep > 1:
+            self._option.disableflags |= _SENSOR
+            mujoco.mj_step(model, data, nstep - 1)
+            self._option.disableflags &= ~_SENSOR
+        mujoco.mj_step(model, data)
+        self.divergence = self._describe_divergence(time) if np.count_nonzero(self._warnings) else None
+
+    def _describe_divergence(self, time: float) -> str:
+        kind = int(self._warnings.argmax())
+        cause = mujoco.mju_warningText(kind, int(self.data.warning.lastinfo[kind])).split(". ")[0]
+        return f"physics diverged in the step from {time:.3f} s: {cause}"
 
     def render(self, height=480, width=640, camera_id="tracking", **kwargs):
         """A picture of the decorated body, (height, width, 3) uint8; other arguments as in dm_control.

@@ -15,7 +15,7 @@ class Layout(NamedTuple):
     joint_positions: slice  # in qpos
     joint_velocities: slice  # in qvel
     parts: slice  # in cfrc_ext
-    feet: np.ndarray  # in xpos
+    feet: slice | np.ndarray  # in xpos
 
 
 class Readings(NamedTuple):
@@ -62,7 +62,7 @@ def layout(model, joints, parts, feet) -> Layout:
         joint_positions=_span([model.joint(name).qposadr[0] for name in joints]),
         joint_velocities=_span([model.joint(name).dofadr[0] for name in joints]),
         parts=_span([model.body(name).id for name in parts]),
-        feet=np.array([model.body(name).id for name in feet]),
+        feet=_evenly_spaced([model.body(name).id for name in feet]),
     )
 
 
@@ -71,6 +71,28 @@ def _span(indices) -> slice:
     if list(indices) != list(range(start, stop)):
         raise ValueError(f"expected adjacent entries in ascending order, got {[int(i) for i in indices]}")
     return slice(start, stop)
+
+
+def _evenly_spaced(indices) -> slice | np.ndarray:
+    """The indices as a slice if they are evenly spaced: a view is several times cheaper than a selection."""
+    steps = set(np.diff(indices))
+    if len(steps) == 1 and min(steps) > 0:
+        return slice(int(indices[0]), int(indices[-1]) + 1, int(steps.pop()))
+    return np.array(indices)
+
+
+def component(vectors, index: int):
+    """One component of vectors (..., n): (...).
+
+    A single vector gives a scalar, with which numpy computes ten times faster than with an array
+    of no axes.
+    """
+    return vectors[..., index][()]
+
+
+def torso_height(data):
+    """(...) m."""
+    return component(data.qpos, 2)
 
 
 def read(data, layout: Layout) -> Readings:
@@ -89,12 +111,12 @@ def read(data, layout: Layout) -> Readings:
     qpos, qvel = data.qpos, data.qvel
     forces = data.cfrc_ext[..., layout.parts, :]
     return Readings(
-        torso_height=qpos[..., 2],
+        torso_height=torso_height(data),
         torso_quaternion=qpos[..., 3:7],
         joint_angles=qpos[..., layout.joint_positions],
         linear_velocity=qvel[..., 0:3],
         angular_velocity=qvel[..., 3:6],
         joint_velocities=qvel[..., layout.joint_velocities],
-        contact_forces=forces.reshape(*forces.shape[:-2], -1).clip(-1.0, 1.0),
+        contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),
         foot_heights=data.xpos[..., layout.feet, 2],
     )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.tasks.readings import Readings
+from arc_suite.tasks.readings import Readings, component
 
 TWO_PI = 2.0 * np.pi
 
@@ -65,10 +65,10 @@ def stance_errors(readings: Readings, step: Step, parameters: Parameters):
     return stance != stance_targets(step.phase, parameters)
 
 
-def healthy(readings: Readings, parameters: Parameters):
-    """Whether the torso's height lies in its healthy range: (...) booleans."""
+def healthy(torso_height, parameters: Parameters):
+    """Whether the torso's height (...) lies in its healthy range: (...) booleans."""
     low, high = parameters.healthy_range
-    return (low <= readings.torso_height) & (readings.torso_height <= high)
+    return (low <= torso_height) & (torso_height <= high)
 
 
 def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
@@ -87,17 +87,22 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
     errors = stance_errors(readings, step, p)
     wrong_feet = errors.sum(axis=-1)
     return {
-        "forward": (1.0 - abs(step.forward_velocity - p.target_velocity) / p.velocity_band).clip(0.0),
-        "healthy": healthy(readings, p) * 1.0,
+        "forward": _positive(1.0 - abs(step.forward_velocity - p.target_velocity) / p.velocity_band),
+        "healthy": healthy(readings.torso_height, p) * 1.0,
         "gait_bonus": 1.0 - wrong_feet / errors.shape[-1],
         "gait_cost": wrong_feet * 1.0,
         "control": (step.action**2).sum(axis=-1),
         "smoothness": ((step.action - step.previous_action) ** 2).sum(axis=-1),
         "contact": (readings.contact_forces**2).sum(axis=-1),
-        "angular_velocity": (readings.angular_velocity[..., :2] ** 2).sum(axis=-1),
-        "vertical_velocity": readings.linear_velocity[..., 2] ** 2,
+        "angular_velocity": component(readings.angular_velocity, 0) ** 2 + component(readings.angular_velocity, 1) ** 2,
+        "vertical_velocity": component(readings.linear_velocity, 2) ** 2,
         "posture": ((readings.joint_angles - p.default_angles) ** 2).sum(axis=-1),
     }
+
+
+def _positive(x):
+    """`x.clip(0.0)`, several times faster where x is a scalar."""
+    return abs(x) * (x > 0.0)
 
 
 def total(terms: Mapping, weights: Mapping):
