@@ -236,9 +236,13 @@ class Walk(control.Task):
 
     def initialize_episode(self, physics):
         """Puts the body on its feet, with noise, and the gait clock at 0."""
-        model, data = physics.model.ptr, physics.data.ptr
-        data.qpos[:], data.qvel[:] = initial_state(model.qpos0, model.nv, self.settings, self._random)
+        data = physics.data.ptr
+        data.qpos[:], data.qvel[:] = self.initial_state(physics, self._random)
         self._walker.restart()
+
+    def initial_state(self, physics, random: np.random.RandomState):
+        """Draws the state in which an episode starts; see the function `initial_state`."""
+        return initial_state(physics.model.ptr.qpos0, physics.model.nv, self.settings, random)
 
     def before_step(self, action, physics):
         """Applies the action, clipped to [-1, 1].
