@@ -86,6 +86,8 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
     p = parameters
     errors = stance_errors(readings, step, p)
     wrong_feet = errors.sum(axis=-1)
+    roll, pitch = component(readings.angular_velocity, 0), component(readings.angular_velocity, 1)
+    vertical = component(readings.linear_velocity, 2)  # numpy's `vertical**2` rounds otherwise for scalars
     return {
         "forward": _positive(1.0 - abs(step.forward_velocity - p.target_velocity) / p.velocity_band),
         "healthy": healthy(readings.torso_height, p) * 1.0,
@@ -94,8 +96,8 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
         "control": (step.action**2).sum(axis=-1),
         "smoothness": ((step.action - step.previous_action) ** 2).sum(axis=-1),
         "contact": (readings.contact_forces**2).sum(axis=-1),
-        "angular_velocity": component(readings.angular_velocity, 0) ** 2 + component(readings.angular_velocity, 1) ** 2,
-        "vertical_velocity": component(readings.linear_velocity, 2) ** 2,
+        "angular_velocity": roll * roll + pitch * pitch,
+        "vertical_velocity": vertical * vertical,
         "posture": ((readings.joint_angles - p.default_angles) ** 2).sum(axis=-1),
     }
 
