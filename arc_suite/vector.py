@@ -234,7 +234,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _seeds(self, seed) -> list[int | None]:
         """A seed for each row."""
-        if isinstance(seed, Sequence | np.ndarray):
+        if np.ndim(seed) == 1:
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: expected one for each of {self.num_envs} rows, got {len(seed)}")
             return [None if row is None else seeding.check(row) for row in seed]

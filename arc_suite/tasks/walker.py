@@ -84,6 +84,7 @@ class Walker:
         self._control_timestep = control_timestep
         self._clock = rewards.TWO_PI * settings.parameters.gait_frequency * control_timestep  # rad a step
         self._shape = (*rows, joints)
+        self.terms = {}
         self.restart()
 
     def restart(self, rows=None) -> None:
@@ -93,7 +94,6 @@ class Walker:
             rows: mask or indices of the walks of a batch that begin; None for all.
         """
         if rows is None:
-            self.terms = {}
             self._phase = np.zeros(self._shape[:-1])
             self._action = np.zeros(self._shape)
             self._readings = None
@@ -131,7 +131,7 @@ class Walker:
         step = rewards.Step(self._phase, self._forward_velocity, self._action, self._previous_action)
         terms = rewards.terms(self._readings, step, self._parameters)
         if diverged is not None:
-            terms = {name: np.where(diverged, 0.0, term) for name, term in terms.items()}
+            terms = {name: np.where(diverged, 0.0, term)[()] for name, term in terms.items()}
         self.terms = terms
         return rewards.total(terms, self._weights)
 
