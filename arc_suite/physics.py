@@ -47,13 +47,14 @@ class Physics(dm_mujoco.Physics):
         Where these diverge, MuJoCo goes on from the model's default state; `divergence` then says
         what happened, and nothing is raised.
         """
-        model, data = self.model.ptr, self.data.ptr
+        model, data, option = self.model.ptr, self.data.ptr, self._option
         time = data.time
         self._warnings.fill(0)
         if nstep > 1:
-            self._option.disableflags |= _SENSOR
+            flags = option.disableflags
+            option.disableflags = flags | _SENSOR
             mujoco.mj_step(model, data, nstep - 1)
-            self._option.disableflags &= ~_SENSOR
+            option.disableflags = flags
         mujoco.mj_step(model, data)
         self.divergence = self._describe_divergence(time) if np.count_nonzero(self._warnings) else None
 

@@ -163,10 +163,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._walker.after_step(data)
         self._steps += 1
 
-        reward = np.where(stepping, self._walker.reward(diverged if diverged.any() else None), 0.0)
+        reward = np.where(stepping, self._walker.reward(data, diverged if diverged.any() else None), 0.0)
         observation = self._observe()
         time_is_up = self._steps >= self._time_limit
-        terminated = stepping & (diverged | self._walker.fallen(data)) & ~time_is_up
+        terminated = stepping & self._walker.failed() & ~time_is_up
         truncated = stepping & (time_is_up | (self._steps >= self._step_limit))
         self._ended = terminated | truncated
 

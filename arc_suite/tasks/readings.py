@@ -12,7 +12,9 @@ import numpy as np
 class Layout(NamedTuple):
     """Where a body's quantities lie in the simulation's arrays, looked up by name once."""
 
-    joint_positions: slice  # in qpos
+    pose: slice  # in qpos: torso height, torso quaternion, joint angles
+    joint_angles: slice  # in qpos
+    velocities: slice  # in qvel: torso linear and angular, joints
     joint_velocities: slice  # in qvel
     parts: slice  # in cfrc_ext
     feet: slice | np.ndarray  # in xpos
@@ -56,11 +58,18 @@ def layout(model, joints, parts, feet) -> Layout:
 
     Raises:
         KeyError: a name is not in the model.
-        ValueError: joints or parts do not lie side by side in the given order.
+        ValueError: joints or parts do not lie side by side in the given order, the joints next to
+            the torso's.
     """
+    angles = _span([model.joint(name).qposadr[0] for name in joints])
+    velocities = _span([model.joint(name).dofadr[0] for name in joints])
+    if (angles.start, velocities.start) != (7, 6):
+        raise ValueError(f"expected the joints next to the torso's, at 7 in qpos, got {angles.start}")
     return Layout(
-        joint_positions=_span([model.joint(name).qposadr[0] for name in joints]),
-        joint_velocities=_span([model.joint(name).dofadr[0] for name in joints]),
+        pose=slice(2, angles.stop),
+        joint_angles=angles,
+        velocities=slice(0, velocities.stop),
+        joint_velocities=velocities,
         parts=_span([model.body(name).id for name in parts]),
         feet=_evenly_spaced([model.body(name).id for name in feet]),
     )
@@ -90,11 +99,6 @@ def component(vectors, index: int):
     return vectors[..., index][()]
 
 
-def torso_height(data):
-    """(...) m."""
-    return component(data.qpos, 2)
-
-
 def read(data, layout: Layout) -> Readings:
     """Takes the readings of a simulation.
 
@@ -111,9 +115,9 @@ def read(data, layout: Layout) -> Readings:
     qpos, qvel = data.qpos, data.qvel
     forces = data.cfrc_ext[..., layout.parts, :]
     return Readings(
-        torso_height=torso_height(data),
+        torso_height=component(qpos, 2),
         torso_quaternion=qpos[..., 3:7],
-        joint_angles=qpos[..., layout.joint_positions],
+        joint_angles=qpos[..., layout.joint_angles],
         linear_velocity=qvel[..., 0:3],
         angular_velocity=qvel[..., 3:6],
         joint_velocities=qvel[..., layout.joint_velocities],

@@ -65,10 +65,10 @@ def stance_errors(readings: Readings, step: Step, parameters: Parameters):
     return stance != stance_targets(step.phase, parameters)
 
 
-def healthy(torso_height, parameters: Parameters):
-    """Whether the torso's height (...) lies in its healthy range: (...) booleans."""
+def healthy(readings: Readings, parameters: Parameters):
+    """Whether the torso's height lies in its healthy range: (...) booleans."""
     low, high = parameters.healthy_range
-    return (low <= torso_height) & (torso_height <= high)
+    return (low <= readings.torso_height) & (readings.torso_height <= high)
 
 
 def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
@@ -85,14 +85,14 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
     """
     p = parameters
     errors = stance_errors(readings, step, p)
-    wrong_feet = errors.sum(axis=-1)
+    wrong_feet = errors.sum(axis=-1, dtype=float)
     roll, pitch = component(readings.angular_velocity, 0), component(readings.angular_velocity, 1)
     vertical = component(readings.linear_velocity, 2)  # numpy's `vertical**2` rounds otherwise for scalars
     return {
         "forward": _positive(1.0 - abs(step.forward_velocity - p.target_velocity) / p.velocity_band),
-        "healthy": healthy(readings.torso_height, p) * 1.0,
+        "healthy": healthy(readings, p).astype(float),
         "gait_bonus": 1.0 - wrong_feet / errors.shape[-1],
-        "gait_cost": wrong_feet * 1.0,
+        "gait_cost": wrong_feet,
         "control": (step.action**2).sum(axis=-1),
         "smoothness": ((step.action - step.previous_action) ** 2).sum(axis=-1),
         "contact": (readings.contact_forces**2).sum(axis=-1),

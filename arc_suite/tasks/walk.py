@@ -269,11 +269,11 @@ class Walk(control.Task):
 
     def get_reward(self, physics):
         """The weighted sum of the ten terms, which stay in `terms`."""
-        return self._walker.reward(None if physics.divergence is None else True)
+        return self._walker.reward(physics.data.ptr, None if physics.divergence is None else True)
 
     def get_termination(self, physics):
         """0 when the torso's height has left its healthy range or the physics has diverged, else None."""
-        return 0.0 if physics.divergence is not None or self._walker.fallen(physics.data.ptr) else None
+        return 0.0 if self._walker.failed() else None
 
 
 def walk(

@@ -5,7 +5,7 @@ import collections
 import numpy as np
 
 from arc_suite.tasks import rewards
-from arc_suite.tasks.readings import Layout, Readings, read, torso_height
+from arc_suite.tasks.readings import Layout, component, read
 
 
 def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
@@ -30,33 +30,6 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
         index = np.argwhere(invalid)[0]
         raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
     return array.clip(-1.0, 1.0)
-
-
-def observation_vector(readings: Readings, phase) -> np.ndarray:
-    """The paper's observation (Section 3), in new memory.
-
-    Args:
-        readings: of the simulation, (...).
-        phase: (...) of the gait clock, rad.
-
-    Returns:
-        (..., 13 + 2 * joints + 6 * parts): torso height, torso quaternion, joint angles; torso
-        linear (world) and angular (body) velocity, joint velocities; torque and force on each
-        part, clipped to [-1, 1]; sine and cosine of the phase.
-    """
-    r = readings
-    blocks = (
-        r.torso_height[..., None],
-        r.torso_quaternion,
-        r.joint_angles,
-        r.linear_velocity,
-        r.angular_velocity,
-        r.joint_velocities,
-        r.contact_forces,
-        np.sin(phase)[..., None],
-        np.cos(phase)[..., None],
-    )
-    return np.concatenate(blocks, axis=-1)
 
 
 class Walker:
@@ -113,33 +86,50 @@ class Walker:
         """
         action = checked_action(action, self._shape)
         self._previous_action, self._action = self._action, action
-        self._x = data.qpos[..., 0] + 0.0  # not a view
+        self._x = component(data.qpos, 0) + 0.0  # not a view
         data.ctrl[...] = action
 
     def after_step(self, data) -> None:
         """Advances the gait clock, measures the step's progress and takes the readings."""
         self._phase = (self._phase + self._clock) % rewards.TWO_PI
-        self._forward_velocity = (data.qpos[..., 0] - self._x) / self._control_timestep
+        self._forward_velocity = (component(data.qpos, 0) - self._x) / self._control_timestep
         self._readings = read(data, self._layout)
 
-    def reward(self, diverged=None):
+    def reward(self, data, diverged=None):
         """The weighted sum (...) of the ten terms after a step; the terms stay in `terms`.
 
         Args:
+            data: `MjData`, or anything with its fields under the walker's leading axes.
             diverged: (...) whose physics diverged within the step, with all terms 0; None for nobody's.
         """
         step = rewards.Step(self._phase, self._forward_velocity, self._action, self._previous_action)
-        terms = rewards.terms(self._readings, step, self._parameters)
+        terms = rewards.terms(self._readings or read(data, self._layout), step, self._parameters)
         if diverged is not None:
             terms = {name: np.where(diverged, 0.0, term)[()] for name, term in terms.items()}
         self.terms = terms
         return rewards.total(terms, self._weights)
 
     def observation_vector(self, data) -> np.ndarray:
-        """The observation (..., size); see `observation_vector`."""
+        """The paper's observation (Section 3), in new memory.
+
+        Args:
+            data: `MjData`, or anything with its fields under the walker's leading axes.
+
+        Returns:
+            (..., 13 + 2 * joints + 6 * parts): torso height, torso quaternion, joint angles; torso
+            linear (world) and angular (body) velocity, joint velocities; torque and force on each
+            part, clipped to [-1, 1]; sine and cosine of the phase.
+        """
         # The readings that after_step took serve the observation of that step, but no later one.
         readings, self._readings = self._readings, None
-        return observation_vector(readings or read(data, self._layout), self._phase)
+        blocks = (
+            data.qpos[..., self._layout.pose],
+            data.qvel[..., self._layout.velocities],
+            (readings or read(data, self._layout)).contact_forces,
+            np.sin(self._phase)[..., None],
+            np.cos(self._phase)[..., None],
+        )
+        return np.concatenate(blocks, axis=-1)
 
     def observation(self, data) -> collections.OrderedDict:
         """The observation vector as named blocks, views of it in its order.
@@ -158,6 +148,6 @@ class Walker:
             gait_clock=vector[..., -2:],
         )
 
-    def fallen(self, data):
-        """Whose torso has left its healthy range: (...) booleans."""
-        return ~rewards.healthy(torso_height(data), self._parameters)
+    def failed(self):
+        """Whose latest reward found the torso out of its healthy range or the physics diverged: (...) booleans."""
+        return self.terms["healthy"] == 0.0
