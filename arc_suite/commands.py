@@ -1,0 +1,79 @@
+"""What command-line tools share: errors of one line, and files that are whole or not there."""
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from absl import app, flags
+
+from arc_suite.rendering import RenderingUnavailable
+
+
+def run(main: Callable[[], None]) -> None:
+    """Parses the command line into absl's flags, calls `main` and exits the process.
+
+    A wrong flag, a stray argument, and a ValueError, OSError or RenderingUnavailable from `main`
+    become one line on standard error and exit status 1; any other exception is a mistake of ours
+    and keeps its traceback. `--help` shows the docstring of the tool's module and its flags.
+
+    Args:
+        main: reads `absl.flags.FLAGS`; takes nothing.
+    """
+
+    def parse(arguments):
+        try:
+            return flags.FLAGS(arguments)
+        except flags.Error as error:
+            sys.exit(_fail(error))
+
+    def wrapped(arguments):
+        try:
+            if arguments[1:]:
+                raise ValueError(f"unexpected argument {arguments[1]!r}; see --help")
+            main()
+        except (ValueError, OSError, RenderingUnavailable) as error:
+            return _fail(error)
+
+    app.run(wrapped, flags_parser=parse)
+
+
+def _fail(error: Exception) -> int:
+    print(f"{Path(sys.argv[0]).name}: {' '.join(str(error).split())}", file=sys.stderr)
+    return 1
+
+
+@contextlib.contextmanager
+def writing(path: str | os.PathLike) -> Iterator[Path]:
+    """Writes a file atomically: `with writing("a.png") as temporary: save(temporary)`.
+
+    The temporary file lies beside the target and has its extension; it takes the target's place
+    when the block ends and is deleted if the block raises. Open the block before any long work:
+    what cannot be written is found out at once.
+
+    Args:
+        path: the target; a file that is there is replaced.
+
+    Yields:
+        The path to write to.
+
+    Raises:
+        OSError: the target cannot be written; one line that names it.
+    """
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.stem[:32]}.{os.getpid()}{target.suffix}")
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        temporary.touch()
+    except OSError as error:
+        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+    try:
+        yield temporary
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
