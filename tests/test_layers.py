@@ -22,6 +22,7 @@ LAYERS = (
     ("registration",),
     ("window", "gym", "vector"),
     ("commands",),
+    ("benchmark",),
 )
 ORDER = [name for layer in LAYERS for name in layer]
 
