@@ -270,6 +270,11 @@ class Walk(control.Task):
         """What resets draw from."""
         return self._random
 
+    @property
+    def phase(self) -> float:
+        """Of the gait clock at the latest step, rad in [0, 2 pi)."""
+        return self._phase
+
     def action_spec(self, physics):
         """One control in [-1, 1] for each motor."""
         return mujoco.action_spec(physics)
