@@ -1,7 +1,7 @@
 """The evaluation protocol, in one place: ten seeded episodes, deterministic actions, and how figures are summed up."""
 
 import importlib.metadata
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -86,20 +86,18 @@ def run(environment, policy, seed: int, max_steps: int | None = None) -> Episode
     return Episode(float(total), length, float(speed), float(compliance / length))
 
 
-def episodes(environment, policy, count: int = EPISODES, seed: int = 0, progress: Callable = iter) -> list[Episode]:
-    """Runs episodes seeded `seed`, `seed + 1`, ...
+def episodes(environment, policy, seeds: Iterable[int] = range(EPISODES)) -> list[Episode]:
+    """Runs one episode for each seed.
 
     Args:
         environment: of `arc_suite.load`.
         policy: maps a `TimeStep` to an action.
-        count: how many.
-        seed: of the first.
-        progress: wraps the iteration over seeds, such as `tqdm`.
+        seeds: of the episodes; those of the protocol if not given.
 
     Returns:
         One `Episode` for each seed.
     """
-    return [run(environment, policy, s) for s in progress(range(seed, seed + count))]
+    return [run(environment, policy, seed) for seed in seeds]
 
 
 def summary(values: Sequence[float]) -> Summary:

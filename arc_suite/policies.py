@@ -1,6 +1,6 @@
 """Policies by name: TimeStep -> action. Some need no training; any other is found on Python's path."""
 
-import importlib
+import pkgutil
 from collections.abc import Callable
 
 import numpy as np
@@ -44,9 +44,8 @@ def policy(name: str, robot: str, preset: str = "medium", seed: int | None = Non
 
 
 def _from_path(path: str, robot: str) -> Callable:
-    module, _, attribute = path.partition(":")
     try:
-        factory = getattr(importlib.import_module(module), attribute)
+        factory = pkgutil.resolve_name(path)
     except (ImportError, ValueError, AttributeError) as error:
         raise ValueError(f"policy {path!r}: {error}") from None
     if not callable(factory):

@@ -19,6 +19,7 @@ LAYERS = (
     ("suite",),
     ("cpg",),
     ("evaluation", "policies"),
+    ("style",),
     ("registration",),
     ("gym", "vector"),
     ("commands",),
@@ -37,6 +38,7 @@ THIRD_PARTY = {
     "tasks.rewards": {"numpy"},
     "cpg.law": {"numpy"},
     "cpg.presets": set(),
+    "style.metrics": {"numpy"},
 }
 
 

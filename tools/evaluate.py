@@ -6,8 +6,6 @@ Example:
   python tools/evaluate.py --robot all --policy cpg --preset medium --episodes 10
 """
 
-import functools
-
 import numpy as np
 from absl import flags
 from tqdm import tqdm
@@ -30,8 +28,8 @@ COLUMNS = "{:<8} {:>16} {:>26} {:>12} {:>14} {:>12} {:>13}"
 def evaluate(robot: str, policy) -> list[evaluation.Episode]:
     """Runs the episodes of one robot behind a progress bar."""
     environment = arc_suite.load(robot, "walk")
-    progress = functools.partial(tqdm, desc=robot, unit="episode", leave=False)
-    return evaluation.episodes(environment, policy, FLAGS.episodes, FLAGS.seed, progress)
+    with tqdm(range(FLAGS.seed, FLAGS.seed + FLAGS.episodes), desc=robot, unit="episode", leave=False) as seeds:
+        return evaluation.episodes(environment, policy, seeds)
 
 
 def report(robot: str, episodes: list[evaluation.Episode]) -> dict:

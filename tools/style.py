@@ -33,8 +33,8 @@ flags.DEFINE_string("output", None, "Folder to write pictures to; it is made if 
 def record(label: str, policy) -> list[style.Track]:
     """Records the episodes of a policy behind a progress bar."""
     environment = arc_suite.load(FLAGS.robot, "walk")
-    seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
-    return [style.record(environment, policy, s) for s in tqdm(seeds, desc=label, unit="episode", leave=False)]
+    with tqdm(range(FLAGS.seed, FLAGS.seed + FLAGS.episodes), desc=label, unit="episode", leave=False) as seeds:
+        return [style.record(environment, policy, seed) for seed in seeds]
 
 
 def report(tracks: list[style.Track]) -> dict:

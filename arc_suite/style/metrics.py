@@ -90,10 +90,11 @@ def _between_touchdowns(track, difference) -> np.ndarray:
 
 
 def foot_slip(track: Track) -> np.ndarray:
-    """Way that a foot slides over the floor while it touches, m for each m that the torso travels; (feet,).
+    """Way that a foot slides over the floor while it touches, by the way that the torso travels, m/m; (feet,).
 
-    Integral of the horizontal speed of the foot's lowest point, so that rolling does not count
-    (the foot slip of Rudin et al. and others, as a length in place of a speed).
+    Integral of the horizontal speed of the foot's lowest point, so that rolling does not count (the
+    foot slippage of Hwangbo et al., "Learning agile and dynamic motor skills for legged robots",
+    2019, as a length).
     """
     sliding = np.hypot(track.foot_velocities[..., 0], track.foot_velocities[..., 1]) * track.contacts
     return _per_metre(track, sliding.sum(axis=0) * track.time_step)

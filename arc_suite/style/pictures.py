@@ -132,7 +132,7 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
                     facecolor=TERM_COLOURS.get(name, FAINT),
                     edgecolor="white",
                     linewidth=0.3,
-                    label=f"{weighted[name].mean():+.2f}  {name.replace('_', ' ')}",
+                    label=f"{weighted[name].mean():+z.3f}  {name.replace('_', ' ')}",
                 )
                 floor = ceiling
         (total,) = axis.plot(
@@ -140,12 +140,12 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
             _over_a_cycle(track, track.rewards),
             color="black",
             linewidth=1.2,
-            label=f"{track.rewards.mean():+.2f}  reward",
+            label=f"{track.rewards.mean():+z.3f}  reward",
         )
         axis.axhline(0.0, color="white", linewidth=0.8)
         axis.set_title(f"{label}: return {track.rewards.sum():.0f}")
         axis.set_ylabel("reward a step")
-        axis.margins(x=0)
+        axis.set_xlim(0.0, track.times[-1])
         axis.legend(
             handles=[total, *(handles[name] for name in (*reversed(gains), *costs))],
             title="mean a step",
@@ -162,8 +162,8 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
 
 @_drawn
 def speed(tracks: Mapping[str, Track]) -> Figure:
-    """Forward speed over time, step by step and as a mean over a gait cycle, against target and reward's band."""
-    figure = Figure(figsize=(_WIDTH, 3.2), layout="constrained")
+    """Forward speed over time against the target: its mean over a gait cycle, and within it the range of the steps."""
+    figure = Figure(figsize=(_WIDTH, 3.5), layout="constrained")
     axis = figure.subplots()
     parameters = next(iter(tracks.values())).parameters
     target, band = parameters.target_velocity, parameters.velocity_band
@@ -173,54 +173,58 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
     axis.text(1.01, target, f"target\n{target:.2f} m/s", **beside)
     axis.text(1.01, target + band, "reward's\nband", color=FAINT, **beside)
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
-        steps = np.diff(track.positions[:, 0]) / track.time_step
-        axis.plot(track.times[1:], steps, color=colour, linewidth=0.5, alpha=0.35)
+        x = track.positions[:, 0]
+        steps = np.diff(x) / track.time_step if len(x) > 1 else np.array([np.nan])
+        times = track.times[-len(steps) :]
+        low, high = _range_over_a_cycle(track, steps)
+        axis.fill_between(times, low, high, color=colour, alpha=0.2, linewidth=0)
         name = f"{label}: {metrics.speed(track):.2f} m/s"
-        axis.plot(track.times[1:], _over_a_cycle(track, steps), color=colour, linewidth=1.8, label=name)
-    axis.set_title("Forward speed")
+        axis.plot(times, _over_a_cycle(track, steps), color=colour, linewidth=1.8, label=name)
+    axis.set_title("Forward speed: mean over a gait cycle, and range of the steps within")
     axis.set_ylabel("speed (m/s)")
     axis.set_xlabel("time (s)")
-    axis.margins(x=0)
-    _legend_above(axis)
+    axis.set_xlim(0.0, max(track.times[-1] for track in tracks.values()))
+    figure.legend(loc="outside lower center", ncols=2, handlelength=1.4)
     return figure
 
 
 @_drawn
 def path(tracks: Mapping[str, Track]) -> Figure:
-    """Path of the torso from above, equal scales; arrows show every five seconds where the robot faces."""
-    figure = Figure(figsize=(_WIDTH, 3.2), layout="constrained")
-    axis = figure.subplots()
-    axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
+    """Path of the torso from above, in equal scales; arrows show where the robot faces."""
     points = np.concatenate([track.positions[:, :2] for track in tracks.values()])
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
-    extent = max(right - left, 3.0 * (high - low), 1.0)
+    width = 1.1 * max(right - left, 1.5 * (high - low), 1.0)
+    height = max(1.3 * (high - low), 0.16 * width)
+    figure = Figure(figsize=(_WIDTH, 0.92 * _WIDTH * height / width + 1.5), layout="constrained")
+    axis = figure.subplots()
+    axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x, y = track.positions[:, 0], track.positions[:, 1]
-        axis.plot(x, y, color=colour, linewidth=1.8, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
-        every = slice(0, None, round(5.0 / track.time_step))
-        forward = metrics.forward_axes(track)[every, :2]
+        axis.plot(x, y, color=colour, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
+        way = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
+        arrows = np.flatnonzero(np.diff(way // (0.08 * width))) + 1
         axis.quiver(
-            x[every],
-            y[every],
-            *forward.T,
+            x[arrows],
+            y[arrows],
+            *metrics.forward_axes(track)[arrows, :2].T,
             color=colour,
             angles="xy",
             scale_units="xy",
-            scale=1.0 / (0.035 * extent),
-            width=0.0028,
-            headwidth=4.5,
-            headlength=5,
-            headaxislength=4.5,
+            scale=25.0 / width,
+            width=0.003,
+            headwidth=5,
+            headlength=5.5,
+            headaxislength=5,
         )
     axis.plot(*points[0], "o", color=INK, markersize=5, zorder=5)
-    centre, half = 0.5 * (low + high), 0.5 * max(high - low, 0.12 * extent) + 0.06 * extent
-    axis.set_xlim(0.5 * (left + right) - 0.55 * extent, 0.5 * (left + right) + 0.55 * extent)
-    axis.set_ylim(centre - half, centre + half)
+    axis.set_xlim(0.5 * (left + right - width), 0.5 * (left + right + width))
+    axis.set_ylim(0.5 * (low + high - height), 0.5 * (low + high + height))
     axis.set_aspect("equal")
-    axis.set_title("Path of the torso, from above")
+    axis.locator_params(axis="y", nbins=4)
+    axis.set_title("Path of the torso from above")
     axis.set_xlabel("x (m), the way to go")
     axis.set_ylabel("y (m)")
-    _legend_above(axis)
+    figure.legend(loc="outside lower center", ncols=2, handlelength=1.4)
     return figure
 
 
@@ -232,18 +236,28 @@ def _rows(tracks, height, **shared):
     return figure, figure.subplots(len(tracks), squeeze=False, **shared)[:, 0]
 
 
-def _legend_above(axis) -> None:
-    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, borderaxespad=0.2, handlelength=1.4)
-
-
 def _runs(mask):
     """First and one past the last index of every run of true values."""
     return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int))).reshape(-1, 2)
 
 
+def _steps_in_a_cycle(track) -> float:
+    """Of the gait clock; the whole track if the clock stands."""
+    return 1.0 / (max(track.parameters.gait_frequency, 1.0 / track.times[-1]) * track.time_step)
+
+
 def _over_a_cycle(track, values):
-    """Moving average over a cycle of the gait clock, over what there is of it at the ends."""
-    frequency = track.parameters.gait_frequency
-    width = max(1, min(len(values), round(1.0 / (frequency * track.time_step)) if frequency else 1))
-    window = np.ones(width)
-    return np.convolve(values, window, "same") / np.convolve(np.ones(len(values)), window, "same")
+    """Moving average over a cycle, which need not be whole steps; at the ends over what there is of it."""
+    width = _steps_in_a_cycle(track)
+    reach = int(np.ceil(width / 2))
+    window = (0.5 * width + 0.5 - abs(np.arange(-reach, reach + 1))).clip(0.0, 1.0)
+    sums, weights = (np.convolve(x, window)[reach:-reach] for x in (values, np.ones(len(values))))
+    return sums / weights
+
+
+def _range_over_a_cycle(track, values):
+    """Least and greatest of the values in the cycle about each."""
+    reach = round(_steps_in_a_cycle(track) / 2)
+    padded = np.pad(values, reach, mode="reflect" if len(values) > reach else "edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+    return windows.min(axis=-1), windows.max(axis=-1)

@@ -18,7 +18,10 @@ class Track(NamedTuple):
         time_step: s between rows.
         positions: (steps, 3) of the torso.
         quaternions: (steps, 4) of the torso, w first.
+        linear_velocities: (steps, 3) of the torso, world frame.
+        angular_velocities: (steps, 3) of the torso, its own frame.
         joint_angles: (steps, joints)
+        joint_velocities: (steps, joints)
         actions: (steps, joints), as applied.
         torques: (steps, joints) of the motors, N m.
         foot_positions: (steps, feet, 3) of the feet's centres.
@@ -39,7 +42,10 @@ class Track(NamedTuple):
     time_step: float
     positions: np.ndarray
     quaternions: np.ndarray
+    linear_velocities: np.ndarray
+    angular_velocities: np.ndarray
     joint_angles: np.ndarray
+    joint_velocities: np.ndarray
     actions: np.ndarray
     torques: np.ndarray
     foot_positions: np.ndarray
@@ -103,11 +109,14 @@ def record(environment, policy, seed: int, max_steps: int | None = None) -> Trac
         row = {
             "positions": data.qpos[:3],
             "quaternions": data.qpos[3:7],
+            "linear_velocities": data.qvel[:3],
+            "angular_velocities": data.qvel[3:6],
             "joint_angles": data.qpos[layout.joint_positions],
+            "joint_velocities": data.qvel[layout.joint_velocities],
             "actions": data.ctrl,
             "torques": data.qfrc_actuator[layout.joint_velocities],
             "foot_positions": data.xpos[feet],
-            "foot_velocities": _velocities_of_lowest_points(model, data, feet, radii),
+            "foot_velocities": lowest_point_velocities(model, data, feet, radii),
             "contacts": data.cfrc_ext[feet].any(axis=-1),
             "phases": task.phase,
         }
@@ -137,7 +146,15 @@ def mirrors(body: Body) -> np.ndarray:
     return np.where(apart & (distances.min(axis=1) < 1e-6), nearest, -1)
 
 
-def _velocities_of_lowest_points(model, data, feet, radii) -> np.ndarray:
+def lowest_point_velocities(model, data, feet, radii) -> np.ndarray:
+    """Velocities of the feet where they would touch the floor: (feet, 3) m/s in the world frame.
+
+    Args:
+        model: `mujoco.MjModel`
+        data: `mujoco.MjData`
+        feet: ids of the feet's bodies, spheres about their origins.
+        radii: (feet,) m.
+    """
     velocities = np.empty((len(feet), 6))
     for foot, velocity in zip(feet, velocities, strict=True):
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, foot, velocity, 0)
