@@ -56,6 +56,13 @@ def test_report_of_two_policies(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["gait.png", "path.png", "reward.png", "speed.png"]
 
 
+def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
+    (tmp_path / "matplotlib.py").write_text("raise ModuleNotFoundError(\"No module named 'matplotlib'\")")
+    done = run(f"--output={tmp_path}", path=tmp_path)
+    message = "pictures need matplotlib: pip install 'arc_suite[plot]' (No module named 'matplotlib')"
+    assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -65,6 +72,7 @@ def test_report_of_two_policies(tmp_path):
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
         (["--policy=own_walkers:broken", "--robot=leaper"], "action[0]: expected a number from -1 to 1, got nan"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
+        ([f"--output={TOOL}"], f"cannot make folder {TOOL}: file exists"),
         (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
     ],
 )

@@ -103,7 +103,10 @@ def pictures():
     except ImportError as error:
         raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
     folder = pathlib.Path(FLAGS.output)
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make folder {folder}: {error.strerror.lower()}") from None
     with contextlib.ExitStack() as stack:
         files = {name: stack.enter_context(commands.writing(folder / f"{name}.png")) for name in PICTURES}
         yield lambda tracks: [PICTURES[name](tracks).savefig(file) for name, file in files.items()]

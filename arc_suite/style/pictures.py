@@ -4,6 +4,7 @@ Each function takes labelled tracks, one or two to compare, and returns a figure
 (extra `plot`). Colours are Okabe and Ito's and Tol's, told apart by colour-blind eyes too.
 """
 
+import functools
 from collections.abc import Mapping
 
 import matplotlib
@@ -53,6 +54,7 @@ _WINDOW = 4.0  # s of footfalls
 
 
 def _drawn(draw):
+    @functools.wraps(draw)
     def wrapped(tracks: Mapping[str, Track]) -> Figure:
         with matplotlib.rc_context(_LOOK):
             figure = draw(tracks)
@@ -60,7 +62,6 @@ def _drawn(draw):
             figure.draw_without_rendering()  # while the look holds
             return figure
 
-    wrapped.__doc__, wrapped.__name__ = draw.__doc__, draw.__name__
     return wrapped
 
 
@@ -68,7 +69,7 @@ def _drawn(draw):
 def gait(tracks: Mapping[str, Track]) -> Figure:
     """Gait diagram: bars of stance over time, by leg, on the prescribed schedule; four seconds amid the track."""
     legs = max(len(track.legs) for track in tracks.values())
-    figure, axes = _rows(tracks, 0.36 * legs + 0.75, sharex=False)
+    figure, axes = _rows(tracks, 0.36 * legs + 0.75)
     for (label, track), axis in zip(tracks.items(), axes, strict=True):
         middle, half = len(track.times) // 2, round(0.5 * _WINDOW / track.time_step)
         rows = slice(max(0, middle - half), middle + half)
