@@ -19,6 +19,7 @@ LAYERS = (
     ("suite",),
     ("cpg",),
     ("evaluation", "policies", "pictures"),
+    ("style",),
     ("registration",),
     ("window", "gym", "vector"),
     ("commands",),
@@ -38,6 +39,7 @@ THIRD_PARTY = {
     "tasks.rewards": {"numpy"},
     "cpg.law": {"numpy"},
     "cpg.presets": set(),
+    "style.metrics": {"numpy"},
 }
 
 

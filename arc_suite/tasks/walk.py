@@ -232,6 +232,11 @@ class Walk(control.Task):
         """The ten unweighted terms of the latest reward by name; empty before the first step."""
         return self._walker.terms
 
+    @property
+    def phase(self) -> float:
+        """Of the gait clock at the latest step, rad in [0, 2 pi)."""
+        return self._walker.phase
+
     def action_spec(self, physics):
         """One control in [-1, 1] for each motor."""
         return mujoco.action_spec(physics)

@@ -39,6 +39,7 @@ class Walker:
     `observation` or `observation_vector`.
 
     Attributes:
+        phase: (...) of the gait clock, rad in [0, 2 pi).
         terms: the ten unweighted terms of the latest reward by name, each (...); empty before it.
     """
 
@@ -67,11 +68,11 @@ class Walker:
             rows: mask or indices of the walks of a batch that begin; None for all.
         """
         if rows is None:
-            self._phase = np.zeros(self._shape[:-1])
+            self.phase = np.zeros(self._shape[:-1])
             self._action = np.zeros(self._shape)
             self._readings = None
         else:
-            self._phase[rows] = 0.0
+            self.phase[rows] = 0.0
             self._action[rows] = 0.0
 
     def before_step(self, action, data) -> None:
@@ -91,7 +92,7 @@ class Walker:
 
     def after_step(self, data) -> None:
         """Advances the gait clock, measures the step's progress and takes the readings."""
-        self._phase = (self._phase + self._clock) % rewards.TWO_PI
+        self.phase = (self.phase + self._clock) % rewards.TWO_PI
         self._forward_velocity = (component(data.qpos, 0) - self._x) / self._control_timestep
         self._readings = read(data, self._layout)
 
@@ -102,7 +103,7 @@ class Walker:
             data: `MjData`, or anything with its fields under the walker's leading axes.
             diverged: (...) whose physics diverged within the step, with all terms 0; None for nobody's.
         """
-        step = rewards.Step(self._phase, self._forward_velocity, self._action, self._previous_action)
+        step = rewards.Step(self.phase, self._forward_velocity, self._action, self._previous_action)
         terms = rewards.terms(self._readings or read(data, self._layout), step, self._parameters)
         if diverged is not None:
             terms = {name: np.where(diverged, 0.0, term)[()] for name, term in terms.items()}
@@ -126,8 +127,8 @@ class Walker:
             data.qpos[..., self._layout.pose],
             data.qvel[..., self._layout.velocities],
             (readings or read(data, self._layout)).contact_forces,
-            np.sin(self._phase)[..., None],
-            np.cos(self._phase)[..., None],
+            np.sin(self.phase)[..., None],
+            np.cos(self.phase)[..., None],
         )
         return np.concatenate(blocks, axis=-1)
 
