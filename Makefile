@@ -1,4 +1,4 @@
-# make demo    Queen walks: installs everything, leaves out/queen.png and out/queen.mp4
+# make demo    Queen walks: installs everything, prints an episode's return, leaves out/queen.png and out/queen.mp4
 # make test    installs everything, runs all tests
 # make check   lint and tests: what CI runs
 # make check-sb3  stable-baselines3's checker and a short SAC run, in an environment of their own
@@ -14,8 +14,9 @@ INSTALLED := $(VENV)/installed
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	mkdir -p out
+	$(PYTHON) tools/evaluate.py --robot queen --policy cpg --episodes 1
 	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.png
-	$(PYTHON) tools/render.py --robot queen --policy cpg --steps 1000 --output out/queen.mp4
+	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.mp4
 
 test: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)

@@ -2,6 +2,8 @@
 
 import contextlib
 import errno
+import json
+import math
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -77,3 +79,32 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
+    """Writes a file of JSON as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
+
+    Args:
+        path: the target; with None nothing is written.
+
+    Yields:
+        A dictionary to fill. NaN and infinities in it become null, as JSON has none.
+
+    Raises:
+        OSError: the target cannot be written; one line that names it.
+    """
+    report = {}
+    with contextlib.nullcontext() if path is None else writing(path) as temporary:
+        yield report
+        if temporary:
+            temporary.write_text(json.dumps(_plain(report), indent=2, allow_nan=False) + "\n")
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        fields = getattr(value, "_asdict", None)  # of a NamedTuple
+        return _plain(fields()) if fields else [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,11 +1,14 @@
-"""The simulation of one body: dm_control's `Physics`, cheaper to step and good to look at."""
+"""Simulations of a body: one, as dm_control's `Physics`, or many at once on a thread pool."""
 
 from __future__ import annotations
 
 import copy
 import functools
+import types
 
 import mujoco
+import mujoco.batch
+import numpy as np
 from dm_control import mujoco as dm_mujoco
 
 from arc_suite import forks, models, names, rendering
@@ -26,7 +29,10 @@ class Physics(dm_mujoco.Physics):
     Attributes:
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
             whatever glows; None leaves it its own colour.
+        divergence: how the physics diverged in the latest step, in one line, or None.
     """
+
+    divergence: str | None = None
 
     @classmethod
     def from_body(cls, body: Body) -> Physics:
@@ -48,15 +54,27 @@ class Physics(dm_mujoco.Physics):
         super().reset(keyframe_id)
 
     def step(self, nstep: int = 1) -> None:
-        """Advances by `nstep` substeps."""
+        """Advances by `nstep` substeps.
+
+        Where these diverge, MuJoCo goes on from the model's default state; `divergence` then says
+        what happened, and nothing is raised.
+        """
         self._check_process()
-        with self.check_invalid_state():
-            model, data = self.model.ptr, self.data.ptr
-            if nstep > 1:
-                self._option.disableflags |= _SENSOR
-                mujoco.mj_step(model, data, nstep - 1)
-                self._option.disableflags &= ~_SENSOR
-            mujoco.mj_step(model, data)
+        model, data, option = self.model.ptr, self.data.ptr, self._option
+        time = data.time
+        self._warnings.fill(0)
+        if nstep > 1:
+            flags = option.disableflags
+            option.disableflags = flags | _SENSOR
+            mujoco.mj_step(model, data, nstep - 1)
+            option.disableflags = flags
+        mujoco.mj_step(model, data)
+        self.divergence = self._describe_divergence(time) if np.count_nonzero(self._warnings) else None
+
+    def _describe_divergence(self, time: float) -> str:
+        kind = int(self._warnings.argmax())
+        cause = mujoco.mju_warningText(kind, int(self.data.warning.lastinfo[kind])).split(". ")[0]
+        return f"physics diverged in the step from {time:.3f} s: {cause}"
 
     def _check_process(self) -> None:
         if self._forks != forks.count:
@@ -156,3 +174,74 @@ class Decorated(dm_mujoco.Physics):
 
 # The decorated bodies that pictures are drawn of, whatever simulation asks for them.
 _shared = functools.lru_cache(maxsize=8)(Decorated.from_body)
+
+
+class Batch:
+    """Many simulations of one model, bit-equal to as many `Physics`, on a thread pool.
+
+    Attributes:
+        data: live arrays under the names of `MjData`, with a leading axis for the rows. Writing
+            qpos, qvel or ctrl writes the simulations' state.
+    """
+
+    def __init__(self, model: mujoco.MjModel, rows: int, threads: int = 0):
+        """Allocates the simulations, which share the model.
+
+        Args:
+            model: of them all; copied.
+            rows: how many.
+            threads: to step on; 0 for as many as there are CPUs.
+        """
+        self._forks = forks.count
+        self._simulations = mujoco.batch.Batch(model, rows, threads)
+        forks.keep(self._simulations)
+        self._silent = copy.copy(model)
+        self._silent.opt.disableflags |= _SENSOR
+        # What is bound is filled by every call, so it must be bound before the first.
+        fields = ("qpos", "qvel", "ctrl", "cfrc_ext", "xpos")
+        self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
+
+    def step(self, nstep: int, rows: np.ndarray) -> np.ndarray:
+        """Advances some rows by `nstep` substeps, as `Physics.step` does.
+
+        Where these diverge, MuJoCo goes on from the model's default state, says nothing and counts
+        a warning.
+
+        Args:
+            nstep: number of substeps, at least 2.
+            rows: mask (rows,) of whom to advance.
+
+        Returns:
+            Mask (rows,) of those that diverged.
+
+        Raises:
+            ForkError: made before a fork.
+        """
+        self._check_process()
+        simulations = self._simulations
+        simulations.warning[...] = 0
+        simulations.set_models(self._silent)
+        simulations.step(rows, nstep - 1)
+        simulations.set_models(None)
+        simulations.step(rows)
+        return simulations.warning[..., 1].any(axis=-1)
+
+    def reset(self, rows: np.ndarray, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Restarts some rows, as dm_control's `reset_context` does.
+
+        Args:
+            rows: mask (rows,) of whom to restart.
+            qpos: (restarted, nq) their positions.
+            qvel: (restarted, nv) their velocities.
+
+        Raises:
+            ForkError: made before a fork.
+        """
+        self._check_process()
+        self._simulations.reset(rows)  # runs mj_forward, from whose result the solver starts next
+        self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
+        self._simulations.forward(rows)
+
+    def _check_process(self) -> None:
+        if self._forks != forks.count:
+            forks.refuse("vector environment")

@@ -1,5 +1,6 @@
-"""Policies that need no training, by name: TimeStep -> action."""
+"""Policies by name: TimeStep -> action. Some need no training; any other is found on Python's path."""
 
+import pkgutil
 from collections.abc import Callable
 
 import numpy as np
@@ -9,13 +10,15 @@ from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.robots import ROBOTS
 
 POLICIES = ("cpg", "zero", "random")
+HELP = f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name."
 
 
 def policy(name: str, robot: str, preset: str = "medium", seed: int | None = None) -> Callable:
     """Makes a policy for one environment.
 
     Args:
-        name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1].
+        name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1]; or
+            `module:attribute`, a function on Python's path that makes a policy from a robot's name.
         robot: queen, bastion, tick or leaper.
         preset: of the demonstrator: slow, medium or fast.
         seed: of the random policy.
@@ -26,12 +29,28 @@ def policy(name: str, robot: str, preset: str = "medium", seed: int | None = Non
     Raises:
         ValueError: an unknown name; one line that names it and the nearest valid one.
     """
-    names.check(name, POLICIES, "policy")
     names.check(preset, PRESETS, "preset")
+    names.check(robot, ROBOTS, "robot")
+    if ":" in name:
+        return _from_path(name, robot)
+    names.check(name, POLICIES, "policy")
     if name == "cpg":
         return Demonstrator(robot, preset)
-    size = len(ROBOTS[names.check(robot, ROBOTS, "robot")].joint_names)
+    size = len(ROBOTS[robot].joint_names)
     if name == "zero":
         return lambda time_step: np.zeros(size)
     random = np.random.default_rng(seed)
     return lambda time_step: random.uniform(-1.0, 1.0, size)
+
+
+def _from_path(path: str, robot: str) -> Callable:
+    try:
+        factory = pkgutil.resolve_name(path)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise ValueError(f"policy {path!r}: {error}") from None
+    if not callable(factory):
+        raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
+    made = factory(robot)
+    if not callable(made):
+        raise ValueError(f"policy {path!r}: expected it to return a function of a TimeStep, got {type(made).__name__}")
+    return made

@@ -15,6 +15,7 @@ def register() -> None:
             gymnasium.register(
                 env_id,
                 entry_point="arc_suite.gym:Env",
+                vector_entry_point="arc_suite.vector:VectorEnv",
                 max_episode_steps=MAX_EPISODE_STEPS,
                 kwargs={"domain_name": domain_name, "task_name": task_name},
             )

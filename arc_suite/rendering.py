@@ -275,7 +275,7 @@ def _explain(error: Exception) -> str:
     if isinstance(error, AttributeError):  # PyOpenGL's way to say that a library is not there
         reason = "the OpenGL library is missing"
     else:
-        reason = " ".join(str(error.__cause__ or error).split())
+        reason = " ".join(str(error.__cause__ or error).split()).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
     return f"cannot render{backend}: {reason}; {_REMEDY}"
 

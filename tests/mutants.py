@@ -74,6 +74,10 @@ MUTANTS = (
     Mutant("armature of the hip", "robots/tick.py", "armature=1.0", "armature=2.0"),
     Mutant("ballast touches the floor", "robots/builder.py", '{"contype": 0,', '{"contype": 1,'),
     Mutant("NaN let through", "tasks/walk.py", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
+    Mutant("feet in the air slip", "style/metrics.py", " * track.contacts", ""),
+    Mutant("early taken for late", "style/metrics.py", "actual * wanted.conj()", "wanted * actual.conj()"),
+    Mutant("mirror image of a foot's path forgotten", "style/metrics.py", " * (1.0, -1.0, 1.0)", ""),
+    Mutant("motors win back what they brake", "style/metrics.py", ".clip(0.0).sum()", ".sum()"),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
 )
 

@@ -1,11 +1,13 @@
 """Tools fail with one line, and leave whole files or none."""
 
+import collections
+import json
 import subprocess
 import sys
 
 import pytest
 
-from arc_suite.commands import writing
+from arc_suite.commands import writing, writing_json
 
 TOOL = '''"""Counts."""
 from absl import flags
@@ -113,3 +115,21 @@ def test_writing_refuses_before_the_work_starts(tmp_path, monkeypatch, path, rea
     (tmp_path / "folder").mkdir()
     with pytest.raises(OSError, match=f"^cannot write {path}: {reason}$"), writing(path):
         pytest.fail("the block ran")
+
+
+def test_writing_json_is_strict_json(tmp_path):
+    pair = collections.namedtuple("pair", "left right")
+    with writing_json(tmp_path / "a.json") as report:
+        report["a"] = pair(1.5, (float("nan"), float("inf"), {"b": "c"}))
+    assert json.loads((tmp_path / "a.json").read_text(), parse_constant=pytest.fail) == {
+        "a": {"left": 1.5, "right": [None, None, {"b": "c"}]}
+    }
+
+
+def test_writing_json_writes_nothing_without_a_path_or_after_an_error(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with writing_json(None) as report:
+        report["a"] = 1
+    with pytest.raises(KeyError), writing_json("a.json") as report:
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []

@@ -18,10 +18,12 @@ LAYERS = (
     ("tasks",),
     ("suite",),
     ("cpg",),
-    ("evaluation", "policies"),
+    ("evaluation", "policies", "pictures"),
+    ("style",),
     ("registration",),
     ("window", "gym", "vector"),
     ("commands",),
+    ("benchmark",),
 )
 ORDER = [name for layer in LAYERS for name in layer]
 
@@ -37,6 +39,7 @@ THIRD_PARTY = {
     "tasks.rewards": {"numpy"},
     "cpg.law": {"numpy"},
     "cpg.presets": set(),
+    "style.metrics": {"numpy"},
 }
 
 

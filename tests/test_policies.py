@@ -39,3 +39,40 @@ def test_unknown_names_are_named(arguments, message):
     with pytest.raises(ValueError) as error:
         policy(*arguments)
     assert str(error.value) == message
+
+
+OWN = """
+import arc_suite.cpg
+number = 3
+def walk(robot): return arc_suite.cpg.Demonstrator(robot)
+def forgets(robot): return None
+"""
+
+
+@pytest.fixture
+def own(tmp_path, monkeypatch):
+    (tmp_path / "own_policies.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def test_policies_from_pythons_path(own):
+    time_step = arc_suite.load("tick", "walk", {"random": 0}).reset()
+    expected = policy("cpg", "tick")(time_step)
+    for path in ("own_policies:walk", "arc_suite.cpg:Demonstrator"):
+        np.testing.assert_array_equal(policy(path, "tick")(time_step), expected)
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        ("own_polices:walk", "No module named 'own_polices'"),
+        (":walk", "invalid format: ':walk'"),
+        ("own_policies:wlak", "module 'own_policies' has no attribute 'wlak'"),
+        ("own_policies:number", "expected a function that makes a policy from a robot's name"),
+        ("own_policies:forgets", "expected it to return a function of a TimeStep, got NoneType"),
+    ],
+)
+def test_paths_that_lead_nowhere_are_named(own, path, message):
+    with pytest.raises(ValueError) as error:
+        policy(path, "tick")
+    assert str(error.value) == f"policy {path!r}: {message}"

@@ -85,13 +85,13 @@ def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
             "",
             NO_DRIVER,
             {"MUJOCO_GL": "egl"},
-            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display.; {REMEDY}",
+            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
         ),
         (
             "",
             NO_DRIVER | {"MUJOCO_GL": "egl"},
             None,
-            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display.; {REMEDY}",
+            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
         ),
         (
             "",
@@ -111,7 +111,7 @@ def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
             None,
             "cannot render with MUJOCO_GL=vulkan: Environment variable MUJOCO_GL must be one of ['', '0', '1', "
             "'disable', 'disabled', 'egl', 'enable', 'enabled', 'false', 'glfw', 'off', 'on', 'osmesa', 'true']: "
-            f"got 'vulkan'.; {REMEDY}",
+            f"got 'vulkan'; {REMEDY}",
         ),
     ],
     ids=["no library", "egl, no library", "no driver", "egl, no driver", "disable", "glfw, no display", "unknown"],

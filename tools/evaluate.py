@@ -1,11 +1,12 @@
 """Judges a policy: return, episode length, speed and gait compliance, beside the paper's expert line.
 
+IQM is the interquartile mean of the return, with a stratified bootstrap interval.
+
 Example:
   python tools/evaluate.py --robot all --policy cpg --preset medium --episodes 10
 """
 
-import functools
-
+import numpy as np
 from absl import flags
 from tqdm import tqdm
 
@@ -15,46 +16,81 @@ from arc_suite.robots import ROBOTS
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("robot", "all", "queen, bastion, tick, leaper or all.")
-flags.DEFINE_string("policy", "cpg", f"One of {', '.join(policies.POLICIES)}.")
+flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string("preset", "medium", "Of the cpg: slow, medium or fast.")
-flags.DEFINE_integer("episodes", 10, "How many episodes for each robot.", lower_bound=1)
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
+flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")
 
-COLUMNS = "{:<8} {:>16} {:>12} {:>14} {:>12} {:>13}"
+COLUMNS = "{:<8} {:>16} {:>26} {:>12} {:>14} {:>12} {:>13}"
 
 
 def evaluate(robot: str, policy) -> list[evaluation.Episode]:
     """Runs the episodes of one robot behind a progress bar."""
     environment = arc_suite.load(robot, "walk")
-    progress = functools.partial(tqdm, desc=robot, unit="episode", leave=False)
-    return evaluation.episodes(environment, policy, FLAGS.episodes, FLAGS.seed, progress)
+    with tqdm(range(FLAGS.seed, FLAGS.seed + FLAGS.episodes), desc=robot, unit="episode", leave=False) as seeds:
+        return evaluation.episodes(environment, policy, seeds)
 
 
-def row(robot: str, episodes: list[evaluation.Episode]) -> str:
+def report(robot: str, episodes: list[evaluation.Episode]) -> dict:
+    """The figures of one robot, as they go into the JSON."""
+    total, length, speed, compliance = (evaluation.summary(values) for values in np.transpose(episodes))
+    return {
+        "expert_return": evaluation.EXPERT_RETURNS[robot],
+        "return": total,
+        "length": length,
+        "speed": speed,
+        "compliance": compliance,
+        "episodes": episodes,
+    }
+
+
+def row(robot: str, figures: dict) -> str:
     """One line of the table."""
-    mean, deviation = evaluation.mean_and_deviation([episode.total for episode in episodes])
-    length, speed, compliance = (
-        evaluation.mean_and_deviation([getattr(episode, name) for episode in episodes])[0]
-        for name in ("length", "speed", "compliance")
-    )
+    total = figures["return"]
     return COLUMNS.format(
         robot,
-        f"{mean:.1f} +- {deviation:.1f}",
-        f"{evaluation.EXPERT_RETURNS[robot]:.0f}",
-        f"{length:.1f} steps",
-        f"{speed:.3f} m/s",
-        f"{100 * compliance:.1f} %",
+        f"{total.mean:.1f} +- {total.deviation:.1f}",
+        "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
+        f"{figures['expert_return']:.0f}",
+        f"{figures['length'].mean:.1f} steps",
+        f"{figures['speed'].mean:.3f} m/s",
+        f"{100 * figures['compliance'].mean:.1f} %",
     )
+
+
+def over_all(reports: dict) -> dict:
+    """The returns of all robots as shares of the paper's demonstrators', with robots as strata."""
+    shares = [[episode.total / r["expert_return"] for episode in r["episodes"]] for r in reports.values()]
+    iqm, interval = evaluation.iqm_and_interval(shares)
+    return {"iqm": iqm, "interval": interval}
 
 
 def main():
-    """Prints the table."""
+    """Prints the table and writes the JSON."""
     robots = list(ROBOTS) if FLAGS.robot == "all" else [names.check(FLAGS.robot, [*ROBOTS, "all"], "robot")]
     walkers = {robot: policies.policy(FLAGS.policy, robot, FLAGS.preset, FLAGS.seed) for robot in robots}
-    header = COLUMNS.format("robot", "return", "paper's cpg", "length", "speed", "compliance")
-    print(header, "-" * len(header), sep="\n")
-    for robot, policy in walkers.items():
-        print(row(robot, evaluate(robot, policy)), flush=True)
+    with commands.writing_json(FLAGS.json) as file:
+        header = COLUMNS.format(
+            "robot", "return", "IQM [95 % interval]", "paper's cpg", "length", "speed", "compliance"
+        )
+        print(header, "-" * len(header), sep="\n")
+        reports = {}
+        for robot, policy in walkers.items():
+            reports[robot] = report(robot, evaluate(robot, policy))
+            print(row(robot, reports[robot]), flush=True)
+        file.update(
+            policy=FLAGS.policy,
+            preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
+            seed=FLAGS.seed,
+            robots=reports,
+            versions=evaluation.versions(),
+        )
+        if len(reports) > 1:
+            file["return_over_expert"] = total = over_all(reports)
+            print(
+                "all      IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]".format(total["iqm"], *total["interval"])
+            )
 
 
 if __name__ == "__main__":

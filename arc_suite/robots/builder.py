@@ -20,9 +20,10 @@ _TOUCHES_FLOOR = {"contype": 1, "conaffinity": 0, **CONTACT}
 _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
 # Cameras that ride along: azimuth from straight ahead and elevation, rad.
-_VIEWS = (("portrait", math.radians(-35.0), math.radians(13.0)), ("profile", math.radians(-80.0), math.radians(12.0)))
+_VIEWS = (("portrait", math.radians(-35.0), math.radians(13.0)), ("profile", math.radians(-65.0), math.radians(12.0)))
+CAMERAS = ("tracking", *(name for name, *_ in _VIEWS))
 _FOVY = 30.0  # degrees, as MJCF wants it whatever the compiler's angle
-_ASPECT, _MARGIN = 4.0 / 3.0, 1.12
+_ASPECT, _MARGIN = 4.0 / 3.0, 1.3  # of the picture; room for legs that swing
 
 
 def build(body: Body) -> mjcf.RootElement:

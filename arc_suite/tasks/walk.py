@@ -1,6 +1,5 @@
 """Walk: forward at the target speed, in the prescribed gait, for 50 seconds."""
 
-import collections
 import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -13,7 +12,8 @@ from arc_suite import names, seeding
 from arc_suite.physics import Physics
 from arc_suite.spec import Body
 from arc_suite.tasks import rewards
-from arc_suite.tasks.readings import Readings, layout, read
+from arc_suite.tasks.readings import layout
+from arc_suite.tasks.walker import Walker
 
 SUBSTEPS = 25
 TIME_LIMIT = 50.0  # s: 1000 control steps
@@ -184,62 +184,17 @@ def initial_state(qpos0: np.ndarray, nv: int, settings: Settings, random: np.ran
     return qpos, qvel
 
 
-def observation(readings: Readings, phase) -> collections.OrderedDict:
-    """The named blocks whose flattening is the paper's observation vector (Section 3).
-
-    Args:
-        readings: of the simulation, (...).
-        phase: (...) of the gait clock, rad.
-
-    Returns:
-        posture (..., 5 + joints): torso height, torso quaternion, joint angles;
-        velocities (..., 6 + joints): torso linear (world) and angular (body), joints;
-        contact_forces (..., 6 * parts): torque and force on each part, clipped to [-1, 1];
-        gait_clock (..., 2): sine and cosine of the phase.
-    """
-    r = readings
-    return collections.OrderedDict(
-        posture=np.concatenate([r.torso_height[..., None], r.torso_quaternion, r.joint_angles], axis=-1),
-        velocities=np.concatenate([r.linear_velocity, r.angular_velocity, r.joint_velocities], axis=-1),
-        contact_forces=r.contact_forces,
-        gait_clock=np.stack([np.sin(phase), np.cos(phase)], axis=-1),
-    )
-
-
-def checked_action(action, size: int) -> np.ndarray:
-    """The action as float64, clipped to [-1, 1].
-
-    Args:
-        action: (..., size)
-        size: number of motors.
-
-    Raises:
-        ValueError: another shape, not numbers, or NaN; one line that names the index.
-    """
-    try:
-        array = np.asarray(action, dtype=float)
-    except (TypeError, ValueError):
-        raise ValueError(f"action: expected {size} numbers, got {type(action).__name__}") from None
-    if array.shape[-1:] != (size,):
-        raise ValueError(f"action: expected shape ({size},), got {array.shape}")
-    invalid = np.isnan(array)
-    if invalid.any():
-        index = np.argwhere(invalid)[0]
-        raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
-    return array.clip(-1.0, 1.0)
-
-
 class Walk(control.Task):
-    """Walking, as a dm_control task: glue between a simulation, the gait clock and the reward.
+    """Walking, as a dm_control task: glue between a simulation and its `Walker`.
 
     Attributes:
         body: what walks.
         settings: the numbers.
-        terms: the ten unweighted terms of the latest reward by name; empty before the first step.
+        layout: where the body lies in the simulation.
         visualize_reward: whether rendered pictures show the reward as a colour.
     """
 
-    def __init__(self, body: Body, settings: Settings, physics: Physics, random=None):
+    def __init__(self, body: Body, settings: Settings, physics: Physics, random=None, on_divergence: str = "raise"):
         """Prepares to walk.
 
         Args:
@@ -247,30 +202,40 @@ class Walk(control.Task):
             settings: the numbers.
             physics: the simulation of the body; only its model is read here.
             random: a `RandomState`, or what one is seeded with.
+            on_divergence: what a step does whose physics diverges: "raise" an error, or "terminate"
+                the episode with reward 0.
+
+        Raises:
+            ValueError: an unknown `on_divergence`, or not a seed.
         """
         self.body = body
         self.settings = settings
-        self.terms: dict[str, float] = {}
         self.visualize_reward = False
         if not isinstance(random, np.random.RandomState):
             random = np.random.RandomState(None if random is None else seeding.check(random))
         self._random = random
-        self._layout = layout(physics.model.ptr, body.joint_names, body.part_names, body.foot_names)
-        self._control_timestep = SUBSTEPS * physics.timestep()
-        self._size = physics.model.nu
-        self._restart()
+        self.layout = layout(physics.model.ptr, body.joint_names, body.part_names, body.foot_names)
+        self._on_divergence = names.check(on_divergence, ("raise", "terminate"), "on_divergence")
+        self._walker = self.walker(physics)
 
-    def _restart(self) -> None:
-        self._phase = np.float64(0.0)
-        self._x = 0.0
-        self._forward_velocity = 0.0
-        self._action = np.zeros(self._size)
-        self._previous_action = self._action
+    def walker(self, physics, rows: tuple[int, ...] = ()) -> Walker:
+        """What remembers the course of this walk, or of a batch of such walks with leading axes `rows`."""
+        return Walker(self.settings, self.layout, SUBSTEPS * physics.timestep(), physics.model.nu, rows)
 
     @property
     def random(self) -> np.random.RandomState:
         """What resets draw from."""
         return self._random
+
+    @property
+    def terms(self) -> dict[str, float]:
+        """The ten unweighted terms of the latest reward by name; empty before the first step."""
+        return self._walker.terms
+
+    @property
+    def phase(self) -> float:
+        """Of the gait clock at the latest step, rad in [0, 2 pi)."""
+        return self._walker.phase
 
     def action_spec(self, physics):
         """One control in [-1, 1] for each motor."""
@@ -278,10 +243,14 @@ class Walk(control.Task):
 
     def initialize_episode(self, physics):
         """Puts the body on its feet, with noise, and the gait clock at 0."""
-        model, data = physics.model.ptr, physics.data.ptr
-        data.qpos[:], data.qvel[:] = initial_state(model.qpos0, model.nv, self.settings, self._random)
+        data = physics.data.ptr
+        data.qpos[:], data.qvel[:] = self.initial_state(physics, self._random)
         physics.shown_reward = None
-        self._restart()
+        self._walker.restart()
+
+    def initial_state(self, physics, random: np.random.RandomState):
+        """Draws the state in which an episode starts; see the function `initial_state`."""
+        return initial_state(physics.model.ptr.qpos0, physics.model.nv, self.settings, random)
 
     def before_step(self, action, physics):
         """Applies the action, clipped to [-1, 1].
@@ -289,46 +258,50 @@ class Walk(control.Task):
         Raises:
             ValueError: the action has another shape or holds NaN; nothing has changed then.
         """
-        action = checked_action(action, self._size)
-        if action.ndim != 1:
-            raise ValueError(f"action: expected shape ({self._size},), got {action.shape}")
-        self._previous_action, self._action = self._action, action
-        self._x = physics.data.ptr.qpos[0]
-        physics.set_control(action)
+        self._walker.before_step(action, physics.data.ptr)
 
     def after_step(self, physics):
-        """Advances the gait clock and measures the step's progress."""
-        clock = rewards.TWO_PI * self.settings.parameters.gait_frequency * self._control_timestep
-        self._phase = (self._phase + clock) % rewards.TWO_PI
-        self._forward_velocity = (physics.data.ptr.qpos[0] - self._x) / self._control_timestep
+        """Advances the gait clock, measures the step's progress and takes the readings.
+
+        Raises:
+            PhysicsError: the physics diverged and is not to terminate the episode; one line that
+                names robot, time and cause.
+        """
+        if physics.divergence is not None and self._on_divergence == "raise":
+            raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
+        self._walker.after_step(physics.data.ptr)
 
     def get_observation(self, physics):
-        """The four blocks; see `observation`."""
-        return observation(read(physics.data.ptr, self._layout), self._phase)
+        """The four blocks; see `Walker.observation`."""
+        return self._walker.observation(physics.data.ptr)
 
     def get_reward(self, physics):
         """The weighted sum of the ten terms, which stay in `terms`."""
-        step = rewards.Step(self._phase, self._forward_velocity, self._action, self._previous_action)
-        readings = read(physics.data.ptr, self._layout)
-        self.terms = rewards.terms(readings, step, self.settings.parameters)
-        reward = rewards.total(self.terms, self.settings.weights)
+        reward = self._walker.reward(physics.data.ptr, None if physics.divergence is None else True)
         if self.visualize_reward:
             physics.shown_reward = reward / (rewards.greatest(self.settings.weights) or 1.0)
         return reward
 
     def get_termination(self, physics):
-        """0 when the torso's height has left its healthy range, else None."""
-        low, high = self.settings.parameters.healthy_range
-        return None if low <= physics.data.ptr.qpos[2] <= high else 0.0
+        """0 when the torso's height has left its healthy range or the physics has diverged, else None."""
+        return 0.0 if self._walker.failed() else None
 
 
-def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kwargs=None, **overrides):
+def walk(
+    body: Body,
+    time_limit: float = TIME_LIMIT,
+    random=None,
+    on_divergence: str = "raise",
+    environment_kwargs=None,
+    **overrides,
+):
     """An environment in which the body walks.
 
     Args:
         body: a robot of `SETTINGS`.
         time_limit: s; may be infinite.
         random: a `RandomState`, or what one is seeded with.
+        on_divergence: "raise" or "terminate"; see `Walk`.
         environment_kwargs: `flat_observation`, to get one vector in place of the blocks.
         **overrides: of `settings`.
 
@@ -344,7 +317,7 @@ def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kw
     for name in environment_kwargs or {}:
         names.check(name, ["flat_observation"], "environment setting")
     physics = Physics.from_body(body)
-    task = Walk(body, chosen, physics, random)
+    task = Walk(body, chosen, physics, random, on_divergence)
     # legacy_step would move the contact forces and foot heights one substep on.
     return control.Environment(
         physics, task, time_limit, n_sub_steps=SUBSTEPS, legacy_step=False, **(environment_kwargs or {})

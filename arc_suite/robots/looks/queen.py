@@ -21,8 +21,8 @@ LOOK = Look(
         Ornament("socket", "frame", "ellipsoid", (0.06, 0.10, 0.06), (0.385, 0.0, -0.005)),
         Ornament("eye", "eye", "ellipsoid", (0.03, 0.055, 0.042), (0.425, 0.0, -0.005)),
         Ornament("vent", "frame", "box", (0.05, 0.10, 0.045), (0.40, 0.25, 0.195), (0, 20, 30), paired=True),
-        Ornament("vent_upper", "glow", "box", (0.051, 0.08, 0.008), (0.402, 0.251, 0.21), (0, 20, 30), paired=True),
-        Ornament("vent_lower", "glow", "box", (0.051, 0.08, 0.008), (0.394, 0.246, 0.185), (0, 20, 30), paired=True),
+        Ornament("vent_upper", "glow", "box", (0.062, 0.08, 0.008), (0.402, 0.251, 0.21), (0, 20, 30), paired=True),
+        Ornament("vent_lower", "glow", "box", (0.052, 0.08, 0.008), (0.394, 0.246, 0.18), (0, 20, 30), paired=True),
     ),
     glowing=("hip", "knee"),
 )

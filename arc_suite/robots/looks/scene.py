@@ -5,7 +5,7 @@ import math
 import numpy as np
 from dm_control import mjcf
 
-MAX_WIDTH, MAX_HEIGHT = 1920, 1440  # pixels of the largest picture
+MAX_WIDTH, MAX_HEIGHT = 1280, 960  # pixels of the largest picture
 
 _SKY = {"rgb1": (0.20, 0.28, 0.40), "rgb2": (0.62, 0.68, 0.74)}
 _HORIZON = tuple((top + bottom) / 2.0 for top, bottom in zip(_SKY["rgb1"], _SKY["rgb2"], strict=True))
@@ -20,8 +20,8 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
         height: of the creature, m; a cell of the grid is about that wide.
     """
     getattr(root.visual, "global").set_attributes(offwidth=MAX_WIDTH, offheight=MAX_HEIGHT)
-    root.visual.quality.shadowsize = 4096
-    root.visual.map.shadowclip = 4.0
+    root.visual.quality.shadowsize = 2048
+    root.visual.map.shadowclip = 3.0  # a smaller map speckles the ground
     root.visual.quality.offsamples = 4
     root.visual.map.znear = 0.02
     root.visual.rgba.haze = (*_HORIZON, 1.0)
@@ -46,7 +46,7 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
     # Lights ride on the torso, so that shadows stay sharp however far the creature walks.
     torso = root.find("body", "torso")
     for name, towards, strength, casts in (
-        ("sun", (-0.4, 0.28, -1.0), 0.62, True),
+        ("sun", (-0.3, 0.2, -1.0), 0.62, True),
         ("rim", (0.6, 0.5, -0.35), 0.25, False),
     ):
         direction = np.array(towards) / np.linalg.norm(towards)

@@ -1,0 +1,306 @@
+"""Metrics of style: pure functions of a track, numpy only, one definition each.
+
+A metric of legs gives one value for each, (feet,), and the robot's value is their mean; any other
+gives a number. A value is NaN where what it measures did not happen, such as the stride of a robot
+that stands. A robot that gets nowhere, over less than 5 % of the way that the target speed asks
+for, has no course, and its expenses per metre are infinite.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.style.tracks import Track
+
+TWO_PI = 2.0 * np.pi
+
+_NOWHERE = 0.05  # of the way asked for
+_UNLOCKED = 0.1  # of the schedule's own vector strength; below it a leg follows another rhythm or none
+_BINS = 20  # of a cycle, over which paths of feet are averaged
+
+
+def gait_compliance(track: Track) -> np.ndarray:
+    """Share of time that a foot is in stance or swing as prescribed (the paper's Section 4); (feet,) in 0 to 1."""
+    return (track.stance == track.schedule).mean(axis=0)
+
+
+def duty_factor(track: Track) -> np.ndarray:
+    """Share of time in stance (Alexander, "The gaits of bipedal and quadrupedal animals", 1984); (feet,) in 0 to 1.
+
+    Stance is a foot below the paper's threshold, as everywhere in the gait's metrics.
+    """
+    return track.stance.mean(axis=0)
+
+
+def phase_error(track: Track) -> np.ndarray:
+    """How late the middle of stance comes against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
+
+    The middle of stance is its circular mean over the clock (Fisher, "Statistical analysis of
+    circular data", 1993), taken of the schedule on the same samples too. NaN for a leg that never
+    changes between stance and swing, or does so in another rhythm than the clock's.
+    """
+    turns = np.exp(1j * (track.phases[:, None] + track.parameters.phase_offsets))
+
+    def middle(stance):
+        return ((stance - stance.mean(axis=0)) * turns).mean(axis=0)
+
+    actual, wanted = middle(track.stance), middle(track.schedule)
+    locked = (abs(actual) > _UNLOCKED * abs(wanted)) & (abs(wanted) > 1e-9)
+    return np.where(locked, np.angle(actual * wanted.conj()) / TWO_PI, np.nan)
+
+
+def phase_scatter(track: Track) -> float:
+    """How far the legs' phase errors differ from one another: their circular variance (Fisher, 1993), 0 to 1.
+
+    0 if all legs are late by the same time, so that the gait is the prescribed one but for a lag;
+    1 if half of the legs are half a cycle off the others, as in a hop. NaN for fewer than two legs
+    that have a phase.
+    """
+    errors = phase_error(track)
+    errors = errors[~np.isnan(errors)]
+    return float(1.0 - abs(np.exp(1j * TWO_PI * errors).mean())) if errors.size > 1 else np.nan
+
+
+def stride_length(track: Track) -> np.ndarray:
+    """Mean way of a foot from touchdown to touchdown along world x, the way to go (Alexander, 1984), m; (feet,).
+
+    Negative backwards. NaN for a foot without two touchdowns.
+    """
+    return _between_touchdowns(track, lambda leg, rows: np.diff(track.foot_positions[rows, leg, 0])[0])
+
+
+def stride_frequency(track: Track) -> np.ndarray:
+    """Strides, from touchdown to touchdown, in a second (Alexander, 1984), Hz; (feet,).
+
+    NaN for a foot without two touchdowns.
+    """
+    return 1.0 / _between_touchdowns(track, lambda leg, rows: track.time_step * (rows[1] - rows[0]))
+
+
+def _between_touchdowns(track, difference) -> np.ndarray:
+    """A difference between the first and the last touchdown of each leg, by number of strides; (feet,)."""
+    touchdown = track.stance[1:] & ~track.stance[:-1]
+    means = np.full(len(track.legs), np.nan)
+    for leg in range(len(track.legs)):
+        rows = np.flatnonzero(touchdown[:, leg]) + 1
+        if rows.size > 1:
+            means[leg] = difference(leg, rows[[0, -1]]) / (rows.size - 1)
+    return means
+
+
+def foot_slip(track: Track) -> np.ndarray:
+    """Way that a foot slides over the floor while it touches, by the way that the torso travels, m/m; (feet,).
+
+    Integral of the horizontal speed of the foot's lowest point, so that rolling does not count (the
+    foot slippage of Hwangbo et al., "Learning agile and dynamic motor skills for legged robots",
+    2019, as a length).
+    """
+    sliding = np.hypot(track.foot_velocities[..., 0], track.foot_velocities[..., 1]) * track.contacts
+    return _per_metre(track, sliding.sum(axis=0) * track.time_step)
+
+
+def foot_clearance(track: Track) -> np.ndarray:
+    """Greatest height of a foot's lowest point over the floor, mean over the clock's cycles, m; (feet,).
+
+    The usual peak height of swing, but also defined for a foot that never swings, where it is the
+    height it is dragged at. Cycles that the track cuts short do not count unless there is no other.
+    """
+    heights = track.foot_positions[..., 2] - track.foot_radii
+    starts = np.flatnonzero(np.diff(track.phases) < 0.0) + 1
+    cycles = np.split(heights, starts)
+    return np.mean([cycle.max(axis=0) for cycle in cycles[1:-1] or cycles], axis=0)
+
+
+def speed(track: Track) -> float:
+    """Mean velocity of the torso along world x, the way to go (the paper's Section 4), m/s; NaN for a single step."""
+    seconds = _seconds(track)
+    return float((track.positions[-1, 0] - track.positions[0, 0]) / seconds) if seconds else np.nan
+
+
+def heading_error(track: Track) -> float:
+    """Mean angle between the torso's forward axis and world x, seen from above, rad; 0 to pi."""
+    forward = forward_axes(track)
+    return float(abs(np.arctan2(forward[:, 1], forward[:, 0])).mean())
+
+
+def lateral_drift(track: Track) -> float:
+    """Way to the side, along world y, for each m of the straight line from start to end, m/m; 0 to 1.
+
+    The sine of the angle between the course and world x: 1 for a robot that walks sideways. NaN
+    for a robot that gets nowhere.
+    """
+    sideways = abs(track.positions[-1, 1] - track.positions[0, 1])
+    travelled = _travelled(track)
+    return float(sideways / travelled) if travelled else np.nan
+
+
+def torso_pitch(track: Track) -> float:
+    """Root mean square of the torso's pitch, the angle of its forward axis to the horizontal, rad."""
+    return _rms(np.arcsin(forward_axes(track)[:, 2].clip(-1.0, 1.0)))
+
+
+def torso_roll(track: Track) -> float:
+    """Root mean square of the torso's roll, its turn about its forward axis out of the horizontal, rad."""
+    rotations = _rotations(track)
+    return _rms(np.arctan2(rotations[:, 2, 1], rotations[:, 2, 2]))
+
+
+def height_variation(track: Track) -> float:
+    """Standard deviation of the torso's height, m."""
+    return float(track.positions[:, 2].std())
+
+
+def posture_deviation(track: Track) -> np.ndarray:
+    """Root mean square angle of a leg's joints from the standing pose (of the paper's posture cost), rad; (feet,)."""
+    return _rms_by_leg(track, track.joint_angles - track.parameters.default_angles)
+
+
+def action_change(track: Track) -> np.ndarray:
+    """Root mean square change of a leg's actions from step to step (of the paper's smoothness cost); (feet,) in 0 to 2.
+
+    Actions are shares of the full torque; before the first there is 0, as in the reward.
+    """
+    return _rms_by_leg(track, np.diff(track.actions, axis=0, prepend=0.0))
+
+
+def torque(track: Track) -> np.ndarray:
+    """Root mean square torque of a leg's motors, N m; (feet,)."""
+    return _rms_by_leg(track, track.torques)
+
+
+def asymmetry(track: Track) -> np.ndarray:
+    """Distance between a foot's mean path and the mirror image of that of the foot across, m; (feet,).
+
+    Paths are relative to the torso, averaged over the leg's own cycle of the schedule in bins of a
+    twentieth; the distance is the root mean square over the cycle. 0 for a symmetrical gait in
+    Hildebrand's sense ("Symmetrical gaits of horses", 1965), whose left and right feet do the same
+    half a cycle apart. NaN for a leg that has no counterpart.
+    """
+    torso = track.positions[:, None]
+    paths = np.einsum("tij,tfi->tfj", _rotations(track), track.foot_positions - torso)
+    cycles = (track.phases[:, None] + track.parameters.phase_offsets) / TWO_PI % 1.0
+    bins = (cycles * _BINS).astype(int)
+    means = np.full((len(track.legs), _BINS, 3), np.nan)
+    for leg in range(len(track.legs)):
+        for occupied in np.unique(bins[:, leg]):
+            means[leg, occupied] = paths[bins[:, leg] == occupied, leg].mean(axis=0)
+    squares = ((means - means[track.mirrors] * (1.0, -1.0, 1.0)) ** 2).sum(axis=-1)
+    both = ~np.isnan(squares) & (track.mirrors >= 0)[:, None]
+    return np.sqrt(_mean_where(squares, both))
+
+
+def cost_of_transport(track: Track) -> float:
+    """Positive work of the motors by weight and way (Collins et al., "Efficient bipedal robots", 2005), J/(N m).
+
+    The motors do not win back what they brake. Torque is constant over a control step, so that its
+    work is torque times the turn of the joint.
+    """
+    work = (track.torques[1:] * np.diff(track.joint_angles, axis=0)).clip(0.0).sum()
+    return float(_per_metre(track, work / (track.mass * track.gravity)))
+
+
+def forward_axes(track: Track) -> np.ndarray:
+    """Where the torso faces: its x axis in the world, (steps, 3)."""
+    return _rotations(track)[:, :, 0]
+
+
+def _seconds(track) -> float:
+    return track.time_step * (len(track.positions) - 1)
+
+
+def _travelled(track) -> float:
+    """Length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
+    way = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
+    return way if way > _NOWHERE * abs(track.parameters.target_velocity) * _seconds(track) else 0.0
+
+
+def _per_metre(track, amount):
+    travelled = _travelled(track)
+    return amount / travelled if travelled else np.full_like(amount, np.inf)
+
+
+def _rotations(track) -> np.ndarray:
+    """(steps, 3, 3) torso to world."""
+    w, x, y, z = track.quaternions.T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def _rms(values) -> float:
+    return float(np.sqrt((values**2).mean()))
+
+
+def _rms_by_leg(track, values) -> np.ndarray:
+    """Root mean square over time and over the joints of each leg: (steps, joints) to (feet,)."""
+    squares = (values**2).mean(axis=0)
+    counts = np.bincount(track.joint_legs, minlength=len(track.legs))
+    return np.sqrt(np.bincount(track.joint_legs, squares, len(track.legs)) / counts)
+
+
+def _mean_where(values, mask) -> np.ndarray:
+    """Mean over the last axis where the mask is true, NaN where it is nowhere."""
+    counts = mask.sum(axis=-1)
+    sums = np.where(mask, values, 0.0).sum(axis=-1)
+    return np.where(counts > 0, sums / counts.clip(1), np.nan)
+
+
+class Metric(NamedTuple):
+    """A metric's function and its unit; shares and indices have none."""
+
+    function: Callable[[Track], np.ndarray | float]
+    unit: str
+
+
+class Measurement(NamedTuple):
+    """The robot's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
+
+    value: float
+    legs: Mapping[str, float]
+
+
+METRICS = {
+    function.__name__: Metric(function, unit)
+    for function, unit in (
+        (gait_compliance, ""),
+        (duty_factor, ""),
+        (phase_error, "cycles"),
+        (phase_scatter, ""),
+        (stride_length, "m"),
+        (stride_frequency, "Hz"),
+        (foot_slip, "m/m"),
+        (foot_clearance, "m"),
+        (speed, "m/s"),
+        (heading_error, "rad"),
+        (lateral_drift, "m/m"),
+        (torso_pitch, "rad"),
+        (torso_roll, "rad"),
+        (height_variation, "m"),
+        (posture_deviation, "rad"),
+        (action_change, ""),
+        (torque, "N m"),
+        (asymmetry, "m"),
+        (cost_of_transport, "J/(N m)"),
+    )
+}
+
+
+def measure(track: Track) -> dict[str, Measurement]:
+    """All metrics of a track, by name.
+
+    A robot's phase error is the mean size of its legs' errors, so that early and late do not
+    cancel. Legs whose value is NaN do not count; NaN if that is all of them.
+    """
+    return {name: _measurement(track, name, metric.function(track)) for name, metric in METRICS.items()}
+
+
+def _measurement(track, name, values) -> Measurement:
+    if np.ndim(values) == 0:
+        return Measurement(float(values), {})
+    counted = abs(values) if name == "phase_error" else values
+    value = float(_mean_where(counted, ~np.isnan(counted)))
+    return Measurement(value, dict(zip(track.legs, map(float, values), strict=True)))

@@ -1,0 +1,264 @@
+"""Pictures of tracks: footfalls against the schedule, reward by term, speed against target, path of the torso.
+
+Each function takes labelled tracks, one or two to compare, and returns a figure. Needs matplotlib
+(extra `plot`). Colours are Okabe and Ito's and Tol's, told apart by colour-blind eyes too.
+"""
+
+import functools
+from collections.abc import Mapping
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from arc_suite.style import metrics
+from arc_suite.style.tracks import Track
+
+BLUE, VERMILION = "#0072B2", "#D55E00"
+INK, FAINT, PALE = "#333333", "#8C8C8C", "#E3E3E3"
+TERM_COLOURS = {
+    "forward": BLUE,
+    "healthy": "#56B4E9",
+    "gait_bonus": "#009E73",
+    "gait_cost": VERMILION,
+    "control": "#E69F00",
+    "smoothness": "#F0E442",
+    "contact": "#CC79A7",
+    "angular_velocity": "#882255",
+    "vertical_velocity": "#332288",
+    "posture": "#999933",
+}
+
+_LOOK = {
+    "font.size": 9.5,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlepad": 9,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": FAINT,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "text.color": INK,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "savefig.dpi": 150,
+}
+_WIDTH = 9.5  # inches
+_WINDOW = 4.0  # s of footfalls
+
+
+def _drawn(draw):
+    @functools.wraps(draw)
+    def wrapped(tracks: Mapping[str, Track]) -> Figure:
+        with matplotlib.rc_context(_LOOK):
+            figure = draw(tracks)
+            figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.04)
+            figure.draw_without_rendering()  # while the look holds
+            return figure
+
+    return wrapped
+
+
+@_drawn
+def gait(tracks: Mapping[str, Track]) -> Figure:
+    """Gait diagram: bars of stance over time, by leg, on the prescribed schedule; four seconds amid the track."""
+    legs = max(len(track.legs) for track in tracks.values())
+    figure, axes = _rows(tracks, 0.36 * legs + 0.75)
+    for (label, track), axis in zip(tracks.items(), axes, strict=True):
+        middle, half = len(track.times) // 2, round(0.5 * _WINDOW / track.time_step)
+        rows = slice(max(0, middle - half), middle + half)
+        start, dt = track.times[rows][0] - track.time_step, track.time_step
+        stance, schedule = track.stance[rows], track.schedule[rows]
+        for leg in range(len(track.legs)):
+            for mask, height, colour in (
+                (schedule[:, leg], 0.84, PALE),
+                (stance[:, leg] & schedule[:, leg], 0.4, BLUE),
+                (stance[:, leg] & ~schedule[:, leg], 0.4, VERMILION),
+            ):
+                spans = [(start + dt * first, dt * (last - first)) for first, last in _runs(mask)]
+                axis.broken_barh(spans, (leg - height / 2, height), color=colour, linewidth=0)
+        compliance, error = metrics.gait_compliance(track), metrics.phase_error(track)
+        for column, heading, texts in (
+            (1.055, "compliance", [f"{100 * share:.0f} %" for share in compliance]),
+            (1.15, "late by", ["–" if np.isnan(late) else f"{late:+.2f} cycles" for late in error]),
+        ):
+            place = {"transform": axis.get_yaxis_transform(), "va": "center", "ha": "center", "fontsize": 8.5}
+            axis.text(column, -0.85, heading, color=FAINT, **place)
+            for leg, text in enumerate(texts):
+                axis.text(column, leg, text, **place)
+        axis.set_title(label)
+        axis.set_yticks(range(len(track.legs)), track.legs)
+        axis.set_ylim(len(track.legs) - 0.5, -0.5)
+        axis.set_xlim(start, start + dt * len(stance))
+        axis.tick_params(axis="y", length=0)
+        axis.spines["left"].set_visible(False)
+    axes[-1].set_xlabel("time (s)")
+    entries = {
+        "prescribed stance": PALE,
+        "stance as prescribed": BLUE,
+        "stance in place of swing": VERMILION,
+    }
+    figure.legend(
+        handles=[Patch(color=colour, label=text) for text, colour in entries.items()],
+        loc="outside lower center",
+        ncols=3,
+        handlelength=1.4,
+    )
+    return figure
+
+
+@_drawn
+def reward(tracks: Mapping[str, Track]) -> Figure:
+    """Weighted terms of the reward over time, gains stacked upwards and costs downwards; means over a gait cycle."""
+    figure, axes = _rows(tracks, 2.75, sharey=True)
+    for (label, track), axis in zip(tracks.items(), axes, strict=True):
+        weighted = {name: weight * track.terms[name] for name, weight in track.weights.items()}
+        gains = [name for name, weight in track.weights.items() if weight > 0.0]
+        costs = [name for name in track.weights if name not in gains]
+        handles = {}
+        for names in (gains, costs):
+            floor = np.zeros(len(track.times))
+            for name in names:
+                ceiling = floor + _over_a_cycle(track, weighted[name])
+                handles[name] = axis.fill_between(
+                    track.times,
+                    floor,
+                    ceiling,
+                    facecolor=TERM_COLOURS.get(name, FAINT),
+                    edgecolor="white",
+                    linewidth=0.3,
+                    label=f"{weighted[name].mean():+z.3f}  {name.replace('_', ' ')}",
+                )
+                floor = ceiling
+        (total,) = axis.plot(
+            track.times,
+            _over_a_cycle(track, track.rewards),
+            color="black",
+            linewidth=1.2,
+            label=f"{track.rewards.mean():+z.3f}  reward",
+        )
+        axis.axhline(0.0, color="white", linewidth=0.8)
+        axis.set_title(f"{label}: return {track.rewards.sum():.0f}")
+        axis.set_ylabel("reward a step")
+        axis.set_xlim(0.0, track.times[-1])
+        axis.legend(
+            handles=[total, *(handles[name] for name in (*reversed(gains), *costs))],
+            title="mean a step",
+            alignment="left",
+            loc="center left",
+            bbox_to_anchor=(1.01, 0.5),
+            fontsize=8.5,
+            labelspacing=0.3,
+            handlelength=1.2,
+        )
+    axes[-1].set_xlabel("time (s)")
+    return figure
+
+
+@_drawn
+def speed(tracks: Mapping[str, Track]) -> Figure:
+    """Forward speed over time against the target: its mean over a gait cycle, and within it the range of the steps."""
+    figure = Figure(figsize=(_WIDTH, 3.5), layout="constrained")
+    axis = figure.subplots()
+    parameters = next(iter(tracks.values())).parameters
+    target, band = parameters.target_velocity, parameters.velocity_band
+    axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0)
+    axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)))
+    beside = {"transform": axis.get_yaxis_transform(), "va": "center", "fontsize": 8.5}
+    axis.text(1.01, target, f"target\n{target:.2f} m/s", **beside)
+    axis.text(1.01, target + band, "reward's\nband", color=FAINT, **beside)
+    for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
+        x = track.positions[:, 0]
+        steps = np.diff(x) / track.time_step if len(x) > 1 else np.array([np.nan])
+        times = track.times[-len(steps) :]
+        low, high = _range_over_a_cycle(track, steps)
+        axis.fill_between(times, low, high, color=colour, alpha=0.2, linewidth=0)
+        name = f"{label}: {metrics.speed(track):.2f} m/s"
+        axis.plot(times, _over_a_cycle(track, steps), color=colour, linewidth=1.8, label=name)
+    axis.set_title("Forward speed: mean over a gait cycle, and range of the steps within")
+    axis.set_ylabel("speed (m/s)")
+    axis.set_xlabel("time (s)")
+    axis.set_xlim(0.0, max(track.times[-1] for track in tracks.values()))
+    figure.legend(loc="outside lower center", ncols=2, handlelength=1.4)
+    return figure
+
+
+@_drawn
+def path(tracks: Mapping[str, Track]) -> Figure:
+    """Path of the torso from above, in equal scales; arrows show where the robot faces."""
+    points = np.concatenate([track.positions[:, :2] for track in tracks.values()])
+    (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
+    width = 1.1 * max(right - left, 1.5 * (high - low), 1.0)
+    height = max(1.3 * (high - low), 0.16 * width)
+    figure = Figure(figsize=(_WIDTH, 0.92 * _WIDTH * height / width + 1.5), layout="constrained")
+    axis = figure.subplots()
+    axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
+    for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
+        x, y = track.positions[:, 0], track.positions[:, 1]
+        axis.plot(x, y, color=colour, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
+        way = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
+        arrows = np.flatnonzero(np.diff(way // (0.08 * width))) + 1
+        axis.quiver(
+            x[arrows],
+            y[arrows],
+            *metrics.forward_axes(track)[arrows, :2].T,
+            color=colour,
+            angles="xy",
+            scale_units="xy",
+            scale=25.0 / width,
+            width=0.003,
+            headwidth=5,
+            headlength=5.5,
+            headaxislength=5,
+        )
+    axis.plot(*points[0], "o", color=INK, markersize=5, zorder=5)
+    axis.set_xlim(0.5 * (left + right - width), 0.5 * (left + right + width))
+    axis.set_ylim(0.5 * (low + high - height), 0.5 * (low + high + height))
+    axis.set_aspect("equal")
+    axis.locator_params(axis="y", nbins=4)
+    axis.set_title("Path of the torso from above")
+    axis.set_xlabel("x (m), the way to go")
+    axis.set_ylabel("y (m)")
+    figure.legend(loc="outside lower center", ncols=2, handlelength=1.4)
+    return figure
+
+
+PICTURES = {function.__name__: function for function in (gait, reward, speed, path)}
+
+
+def _rows(tracks, height, **shared):
+    figure = Figure(figsize=(_WIDTH, height * len(tracks) + 0.55), layout="constrained")
+    return figure, figure.subplots(len(tracks), squeeze=False, **shared)[:, 0]
+
+
+def _runs(mask):
+    """First and one past the last index of every run of true values."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int))).reshape(-1, 2)
+
+
+def _steps_in_a_cycle(track) -> float:
+    """Of the gait clock; the whole track if the clock stands."""
+    return 1.0 / (max(track.parameters.gait_frequency, 1.0 / track.times[-1]) * track.time_step)
+
+
+def _over_a_cycle(track, values):
+    """Moving average over a cycle, which need not be whole steps; at the ends over what there is of it."""
+    width = _steps_in_a_cycle(track)
+    reach = int(np.ceil(width / 2))
+    window = (0.5 * width + 0.5 - abs(np.arange(-reach, reach + 1))).clip(0.0, 1.0)
+    sums, weights = (np.convolve(x, window)[reach:-reach] for x in (values, np.ones(len(values))))
+    return sums / weights
+
+
+def _range_over_a_cycle(track, values):
+    """Least and greatest of the values in the cycle about each."""
+    reach = round(_steps_in_a_cycle(track) / 2)
+    padded = np.pad(values, reach, mode="reflect" if len(values) > reach else "edge")
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
+    return windows.min(axis=-1), windows.max(axis=-1)

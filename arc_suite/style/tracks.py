@@ -1,0 +1,162 @@
+"""Recorded rollouts as plain arrays: all that a report of style needs."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from arc_suite import evaluation
+from arc_suite.spec import Body
+from arc_suite.tasks import readings, rewards
+
+
+class Track(NamedTuple):
+    """A rollout: one row for the end of every control step, SI units, angles in rad.
+
+    Attributes:
+        time_step: s between rows.
+        positions: (steps, 3) of the torso.
+        quaternions: (steps, 4) of the torso, w first.
+        linear_velocities: (steps, 3) of the torso, world frame.
+        angular_velocities: (steps, 3) of the torso, its own frame.
+        joint_angles: (steps, joints)
+        joint_velocities: (steps, joints)
+        actions: (steps, joints), as applied.
+        torques: (steps, joints) of the motors, N m.
+        foot_positions: (steps, feet, 3) of the feet's centres.
+        foot_velocities: (steps, feet, 3) of the lowest points of the feet, world frame.
+        contacts: (steps, feet) whether the floor pushes on the foot.
+        phases: (steps,) of the gait clock.
+        terms: the reward's unweighted terms by name, each (steps,).
+        weights: signed weight of every term.
+        parameters: of the task: target speed, prescribed schedule, standing pose.
+        mass: kg, of the whole body.
+        gravity: m/s^2, downwards.
+        legs: (feet,) names.
+        joint_legs: (joints,) index of the leg that a joint belongs to.
+        mirrors: (feet,) index of the leg across the x-z plane, -1 if there is none.
+        foot_radii: (feet,)
+    """
+
+    time_step: float
+    positions: np.ndarray
+    quaternions: np.ndarray
+    linear_velocities: np.ndarray
+    angular_velocities: np.ndarray
+    joint_angles: np.ndarray
+    joint_velocities: np.ndarray
+    actions: np.ndarray
+    torques: np.ndarray
+    foot_positions: np.ndarray
+    foot_velocities: np.ndarray
+    contacts: np.ndarray
+    phases: np.ndarray
+    terms: Mapping[str, np.ndarray]
+    weights: Mapping[str, float]
+    parameters: rewards.Parameters
+    mass: float
+    gravity: float
+    legs: tuple[str, ...]
+    joint_legs: np.ndarray
+    mirrors: np.ndarray
+    foot_radii: np.ndarray
+
+    @property
+    def times(self) -> np.ndarray:
+        """(steps,) s since the start of the episode."""
+        return self.time_step * np.arange(1, len(self.positions) + 1)
+
+    @property
+    def stance(self) -> np.ndarray:
+        """(steps, feet) which feet are in stance: below the threshold of the paper's Section 4."""
+        return self.foot_positions[..., 2] < self.parameters.stance_threshold
+
+    @property
+    def schedule(self) -> np.ndarray:
+        """(steps, feet) which feet the gait wants in stance (the paper's Section 4)."""
+        return rewards.stance_targets(self.phases, self.parameters)
+
+    @property
+    def rewards(self) -> np.ndarray:
+        """(steps,)"""
+        return rewards.total(self.terms, self.weights)
+
+
+def record(environment, policy, seed: int, max_steps: int | None = None) -> Track:
+    """Plays one episode of the evaluation protocol and records it.
+
+    Foot positions, velocities and contacts stand one substep behind the torso, as in the reward.
+
+    Args:
+        environment: of `arc_suite.load`.
+        policy: maps a `TimeStep` to an action.
+        seed: of the episode's initial state.
+        max_steps: to stop early.
+
+    Returns:
+        The track.
+    """
+    task, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
+    body = task.body
+    layout = readings.layout(model, body.joint_names, body.part_names, body.foot_names)
+    feet = [model.body(name).id for name in body.foot_names]
+    radii = np.array([leg.foot.radius for leg in body.legs])
+    rows, terms = [], []
+    for timestep in evaluation.rollout(environment, policy, seed, max_steps):
+        if timestep.first():
+            continue
+        row = {
+            "positions": data.qpos[:3],
+            "quaternions": data.qpos[3:7],
+            "linear_velocities": data.qvel[:3],
+            "angular_velocities": data.qvel[3:6],
+            "joint_angles": data.qpos[layout.joint_positions],
+            "joint_velocities": data.qvel[layout.joint_velocities],
+            "actions": data.ctrl,
+            "torques": data.qfrc_actuator[layout.joint_velocities],
+            "foot_positions": data.xpos[feet],
+            "foot_velocities": lowest_point_velocities(model, data, feet, radii),
+            "contacts": data.cfrc_ext[feet].any(axis=-1),
+            "phases": task.phase,
+        }
+        rows.append({name: np.array(value) for name, value in row.items()})
+        terms.append(task.terms)
+    return Track(
+        time_step=environment.control_timestep(),
+        **{name: np.stack([row[name] for row in rows]) for name in rows[0]},
+        terms={name: np.array([row[name] for row in terms]) for name in terms[0]},
+        weights=dict(task.settings.weights),
+        parameters=task.settings.parameters,
+        mass=float(model.body_mass.sum()),
+        gravity=float(-model.opt.gravity[2]),
+        legs=tuple(leg.name for leg in body.legs),
+        joint_legs=np.array([index for index, leg in enumerate(body.legs) for _ in leg.joints]),
+        mirrors=mirrors(body),
+        foot_radii=radii,
+    )
+
+
+def mirrors(body: Body) -> np.ndarray:
+    """For each leg the index of the leg that stands across the x-z plane, -1 if there is none."""
+    stands = np.array([leg.foot_position for leg in body.legs])
+    distances = np.linalg.norm(stands[:, None] - stands * (1, -1, 1), axis=-1)
+    nearest = distances.argmin(axis=1)
+    apart = nearest != np.arange(len(stands))
+    return np.where(apart & (distances.min(axis=1) < 1e-6), nearest, -1)
+
+
+def lowest_point_velocities(model, data, feet, radii) -> np.ndarray:
+    """Velocities of the feet where they would touch the floor: (feet, 3) m/s in the world frame.
+
+    Args:
+        model: `mujoco.MjModel`
+        data: `mujoco.MjData`
+        feet: ids of the feet's bodies, spheres about their origins.
+        radii: (feet,) m.
+    """
+    velocities = np.empty((len(feet), 6))
+    for foot, velocity in zip(feet, velocities, strict=True):
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, foot, velocity, 0)
+    turning, moving = velocities[:, :3], velocities[:, 3:]
+    return moving + np.cross(turning, radii[:, None] * (0.0, 0.0, -1.0))

@@ -1,0 +1,149 @@
+"""When the physics diverges: an error or an end of the episode, never a silent restart."""
+
+import gymnasium
+import numpy as np
+import pytest
+from dm_control.rl.control import PhysicsError
+from gymnasium.utils.env_checker import data_equivalence
+from numpy.testing import assert_array_equal
+
+import arc_suite
+
+# What spoils a simulation, and how MuJoCo names it.
+ACCIDENTS = {
+    "speed": ("qvel", 5, np.nan, "Nan, Inf or huge value in QVEL at DOF 5"),
+    "place": ("qpos", 9, np.inf, "Nan, Inf or huge value in QPOS at DOF 9"),
+    "spin": ("qvel", 4, 9e9, "Nan, Inf or huge value in QACC at DOF "),
+}
+every_accident = pytest.mark.parametrize("accident", ACCIDENTS)
+
+
+def spoil(data, accident, row=()):
+    field, index, value, _ = ACCIDENTS[accident]
+    getattr(data, field)[(*row, index)] = value
+
+
+def load(robot="queen", random=0, **task_kwargs):
+    return arc_suite.load(robot, "walk", {"random": random, **task_kwargs}, {"flat_observation": True})
+
+
+def make(robot="queen", num_envs=64, **kwargs):
+    return gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs=num_envs, num_threads=2, **kwargs)
+
+
+def random_actions(shape, count, seed=0):
+    return np.random.RandomState(seed).uniform(-0.5, 0.5, (count, *shape)).astype(np.float32)
+
+
+@every_accident
+def test_single_environment_raises_one_line_with_robot_time_and_cause(accident):
+    environment, twin = load(), load()
+    environment.reset(), twin.reset()
+    actions = random_actions((18,), 5)
+    for action in actions[:3]:
+        environment.step(action), twin.step(action)
+    spoil(environment.physics.data.ptr, accident)
+    with pytest.raises(PhysicsError) as error:
+        environment.step(actions[3])
+    cause = ACCIDENTS[accident][-1]
+    assert str(error.value).startswith(f"queen: physics diverged in the step from 0.150 s: {cause}")
+    assert "\n" not in str(error.value)
+    # A reset makes good.
+    assert_array_equal(environment.reset().observation["observations"], twin.reset().observation["observations"])
+    one, two = environment.step(actions[4]), twin.step(actions[4])
+    assert one.reward == two.reward
+    assert_array_equal(one.observation["observations"], two.observation["observations"])
+
+
+@every_accident
+def test_single_environment_may_end_the_episode_instead(accident):
+    environment, twin = load("tick", on_divergence="terminate"), load("tick")
+    environment.reset(), twin.reset()
+    actions = random_actions((18,), 4)
+    environment.step(actions[0])
+    spoil(environment.physics.data.ptr, accident)
+    last = environment.step(actions[1])
+    assert last.last() and last.discount == 0.0 and last.reward == 0.0
+    assert np.isfinite(last.observation["observations"]).all()
+    assert set(environment.task.terms.values()) == {0.0}
+    first = environment.step(actions[2])
+    assert first.first()
+    assert_array_equal(first.observation["observations"], twin.reset().observation["observations"])
+    assert environment.step(actions[3]).reward == twin.step(actions[3]).reward
+
+
+def test_every_divergence_is_noticed_without_a_reset_between():
+    environment = load()
+    environment.reset()
+    for _ in range(3):
+        spoil(environment.physics.data.ptr, "speed")
+        with pytest.raises(PhysicsError):
+            environment.step(np.zeros(18))
+        environment.task.before_step(np.zeros(18), environment.physics)
+    environment.step(np.zeros(18))
+
+
+def test_unknown_answer_to_divergence():
+    with pytest.raises(ValueError, match=r"^unknown on_divergence 'stop'; .* \(there are: raise, terminate\)$"):
+        load(on_divergence="stop")
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@every_accident
+def test_one_row_of_64_diverges_and_the_others_notice_nothing(accident, mode):
+    batch, calm = (make(autoreset_mode=mode) for _ in range(2))
+    row, others = 17, np.arange(64) != 17
+    first = batch.reset(seed=0)[0]
+    assert_array_equal(calm.reset(seed=0)[0], first)
+    begun = load(random=row)
+    begun.reset()
+    restarted = begun.reset().observation["observations"].astype(np.float32)
+    for count, actions in enumerate(random_actions(batch.action_space.shape, 6)):
+        if count == 2:
+            spoil(batch.batch.data, accident, (row,))
+        observation, reward, terminated, truncated, info = batch.step(actions)
+        expected = calm.step(actions)
+        for value, wanted in zip((observation, reward, terminated, truncated), expected, strict=False):
+            assert_array_equal(value[others], wanted[others])
+        for name, term in expected[4]["reward_terms"].items():
+            assert_array_equal(info["reward_terms"][name][others], term[others])
+        assert np.isfinite(observation).all()
+        assert not truncated.any()
+        assert_array_equal(np.flatnonzero(terminated), [row] if count == 2 else [])
+        if count == 2:
+            assert reward[row] == 0.0
+            told = info["final_info"] if mode == "SameStep" else info
+            assert_array_equal(np.flatnonzero(told["diverged"]), [row])
+            assert_array_equal(np.flatnonzero(told["_diverged"]), [row])
+            assert {float(term[row]) for term in told["reward_terms"].values()} <= {0.0, 1.0}
+            assert all(told["reward_terms"][name][row] == 0.0 for name in expected[4]["reward_terms"] if name[0] != "_")
+            if mode == "SameStep":
+                assert np.isfinite(info["final_obs"][row]).all()
+        else:
+            assert "diverged" not in info and "final_info" not in info
+        if count == (2 if mode == "SameStep" else 3):
+            assert_array_equal(observation[row], restarted)
+            assert ("_reward_terms" in info) and not info["_reward_terms"][row]
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_rows_diverge_as_single_environments_that_terminate_do(mode):
+    batch = make("leaper", 3, autoreset_mode=mode)
+    singles = gymnasium.make_vec(
+        "arc_suite/leaper-walk-v0",
+        num_envs=3,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": mode},
+        task_kwargs={"on_divergence": "terminate"},
+    )
+    assert data_equivalence(batch.reset(seed=2), singles.reset(seed=2), exact=True)
+    ends = 0
+    for count, actions in enumerate(random_actions(batch.action_space.shape, 40)):
+        if count % 3 == 0:
+            accident, row = list(ACCIDENTS)[count // 3 % 3], count // 3 % 2
+            spoil(batch.batch.data, accident, (row,))
+            spoil(singles.envs[row].unwrapped.physics.data.ptr, accident)
+        result, expected = batch.step(actions), singles.step(actions)
+        assert data_equivalence(result[:4], expected[:4], exact=True)
+        ends += result[2].sum()
+    assert ends >= 10

@@ -1,0 +1,66 @@
+"""Measures how fast control steps are, beside plain MuJoCo and beside Gymnasium's ordinary environments.
+
+Prints tables and writes all measurements and a plot. Takes minutes; on a busy machine the figures
+are worth nothing.
+
+Example:
+  python tools/bench.py --plot docs/performance.png --document docs/performance.md
+"""
+
+import functools
+import json
+import os
+import pathlib
+
+from absl import flags
+from tqdm import tqdm
+
+from arc_suite import commands, names
+from arc_suite.benchmark import contestants, measurement, report
+from arc_suite.robots import ROBOTS
+
+FLAGS = flags.FLAGS
+flags.DEFINE_list("robots", list(ROBOTS), "Whose walks.")
+flags.DEFINE_list("rows", ["1", "16", "64", "256", "1024"], "Numbers of rows of the vector environment.")
+flags.DEFINE_list("workers", None, "Numbers of processes of AsyncVectorEnv; 1, 2 and 4 for each thread by default.")
+flags.DEFINE_integer("rounds", 9, "How often everything is measured in turn.", lower_bound=1)
+flags.DEFINE_integer("steps", 60, "Control steps of one turn; a third of it where there are many rows.", lower_bound=1)
+flags.DEFINE_string("json", "out/bench.json", "Where to write all measurements.")
+flags.DEFINE_string("plot", "out/bench.png", "Where to write the plot.")
+flags.DEFINE_string("document", None, "A Markdown file between whose <!-- benchmark --> marks to put the tables.")
+
+
+def numbers(flag: str) -> list[int]:
+    """A flag's list of positive integers."""
+    try:
+        values = [int(value) for value in FLAGS[flag].value]
+    except ValueError:
+        values = []
+    if not values or min(values) < 1:
+        raise ValueError(
+            f"--{flag}: expected positive integers with commas between, got {','.join(FLAGS[flag].value)!r}"
+        )
+    return values
+
+
+def main():
+    """Measures, prints and writes."""
+    robots = [names.check(robot, ROBOTS, "robot") for robot in FLAGS.robots]
+    threads = contestants.all_threads()
+    workers = numbers("workers") if FLAGS.workers else [factor * max(threads) for factor in (1, 2, 4)]
+    rows = numbers("rows")
+    for path in (FLAGS.json, FLAGS.plot):
+        os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
+    with commands.writing(FLAGS.json) as json_path, commands.writing(FLAGS.plot) as plot_path:
+        progress = functools.partial(tqdm, unit="round")
+        results = measurement.measure(robots, rows, threads, workers, FLAGS.rounds, FLAGS.steps, progress)
+        json_path.write_text(json.dumps(results, indent=1))
+        report.plot(results, plot_path)
+    tables = report.tables(results)
+    print(tables)
+    if FLAGS.document:
+        report.into_document(pathlib.Path(FLAGS.document), tables)
+
+
+if __name__ == "__main__":
+    commands.run(main)
