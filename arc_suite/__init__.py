@@ -7,13 +7,14 @@ import gymnasium
 env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
-from arc_suite import rendering
+from arc_suite import rendering, versions
 
-rendering.select_backend()  # before anything imports dm_control
+with versions.explained():
+    rendering.select_backend()  # before anything imports dm_control
 
-from arc_suite import registration  # noqa: E402
-from arc_suite.suite import ALL_TASKS, TASKS_BY_DOMAIN, load  # noqa: E402
+    from arc_suite import registration
+    from arc_suite.suite import ALL_TASKS, TASKS_BY_DOMAIN, load
 
-registration.register()
+    registration.register()
 
 __all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load"]

@@ -2,6 +2,7 @@
 
 import functools
 import operator
+import os
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -71,7 +72,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             domain_name: a robot; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
             num_envs: number of rows.
-            num_threads: on which to simulate; None for as many as there are CPUs.
+            num_threads: on which to simulate; None for as many as this process has cores.
             autoreset_mode: NextStep or SameStep: whether a row whose episode has ended starts the
                 next one in the step after or at once.
             max_episode_steps: truncates episodes, as `gymnasium.make` does, beside the task's time limit.
@@ -94,7 +95,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if render_mode is not None:
             names.check(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = _count("num_envs", num_envs)
-        threads = 0 if num_threads is None else _count("num_threads", num_threads)
+        threads = usable_cores() if num_threads is None else _count("num_threads", num_threads)
 
         # One ordinary environment lends the rows its settings, its model and its decorated body.
         self._environment = environment = suite.load(domain_name, task_name, task_kwargs)
@@ -276,6 +277,11 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
             raise ValueError(f"reset_mask: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
         return mask.copy()
+
+
+def usable_cores() -> int:
+    """How many cores this process may use, where the system tells; else how many there are."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 def _count(name: str, value: Any) -> int:
