@@ -77,7 +77,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         threads = 0 if num_threads is None else _count("num_threads", num_threads)
 
         # One ordinary environment lends the rows its settings, its model and its decorated body.
-        self._environment = environment = suite.load(domain_name, task_name, task_kwargs)
+        environment = suite.load(domain_name, task_name, task_kwargs)
         self._physics, self._task = environment.physics, environment.task
         self._physics.check_camera(camera_id)
         self._substeps = round(environment.control_timestep() / self._physics.timestep())
