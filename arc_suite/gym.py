@@ -1,6 +1,6 @@
 """The suite as Gymnasium environments: shimmy's adapter, with what Gymnasium's users rely on."""
 
-import time
+import weakref
 from collections.abc import Mapping
 from typing import Any
 
@@ -171,12 +171,11 @@ class Env(DmControlCompatibilityV0):
             return
         decorated = self._env.physics.decorated()
         if self._window is None:
-            with rendering.errors():
-                self._window = _open_window(decorated, self.render_kwargs["camera_id"])
-            self._due = time.monotonic()
-        self._window.sync()
-        time.sleep(max(0.0, self._due - time.monotonic()))
-        self._due = time.monotonic() + self.dt
+            from arc_suite.window import Window  # GLFW, which only a window needs
+
+            self._window = Window(decorated, **self.render_kwargs)
+            weakref.finalize(self, self._window.close)  # before the interpreter takes GLFW apart
+        self._window.show(self.dt)
 
     def __getstate__(self):
         return self.__dict__ | {"_window": None}
@@ -187,13 +186,3 @@ class Env(DmControlCompatibilityV0):
 
 def _flat(observation) -> np.ndarray:
     return observation["observations"].astype(np.float32)
-
-
-def _open_window(physics, camera_id):
-    import mujoco.viewer  # needs a display
-
-    window = mujoco.viewer.launch_passive(physics.model.ptr, physics.data.ptr, show_left_ui=False, show_right_ui=False)
-    index = physics.model.name2id(camera_id, "camera") if isinstance(camera_id, str) else camera_id
-    if index >= 0:
-        window.cam.type, window.cam.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
-    return window

@@ -45,17 +45,16 @@ def select_backend() -> None:
 
 
 def _import_mujoco() -> None:
-    with _strict_glfw():
+    # GLFW is slow to import; leave it alone where nobody will try it.
+    glfw_tried = os.environ.get("MUJOCO_GL") not in ("egl", *_OFF)
+    with _strict_glfw() if glfw_tried else contextlib.nullcontext():
         import dm_control._render  # noqa: F401
         import mujoco  # noqa: F401
 
 
 @contextlib.contextmanager
 def _strict_glfw():
-    """Lets GLFW raise what it warns of by default; dm_control then goes on to the next backend."""
-    if os.environ.get("MUJOCO_GL") in ("egl", *_OFF):
-        yield  # and GLFW, slow to import, is not needed
-        return
+    """Lets GLFW raise what it warns of by default, which makes dm_control go on to the next backend."""
     import glfw
 
     before, glfw.ERROR_REPORTING = glfw.ERROR_REPORTING, "raise"
@@ -68,6 +67,21 @@ def _strict_glfw():
 def has_display() -> bool:
     """Whether windows can be expected to open: always on macOS and Windows, elsewhere with X11 or Wayland."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def require_window() -> None:
+    """Makes sure that a window can be opened, where MuJoCo's viewer would end the process.
+
+    Raises:
+        RenderingUnavailable: it cannot; why, and the remedy.
+    """
+    import glfw
+
+    try:
+        with _strict_glfw():
+            glfw.init()
+    except glfw.GLFWError as error:
+        raise RenderingUnavailable(f"cannot open a window: {error}; use render_mode 'rgb_array'") from None
 
 
 def _loads(library: str) -> bool:
