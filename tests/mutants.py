@@ -121,7 +121,17 @@ def plant(mutant: Mutant, folder: pathlib.Path) -> None:
 
 def caught_by(folder: pathlib.Path) -> str | None:
     """The first test of a project that fails, or None."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "--no-header",
+        "-p",
+        "no:cacheprovider",
+        "--ignore=tests/test_mutants.py",
+    ]
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     failed = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
