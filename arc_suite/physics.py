@@ -201,6 +201,10 @@ class Batch:
         fields = ("qpos", "qvel", "ctrl", "cfrc_ext", "xpos")
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
 
+    def part(self, rows: np.ndarray) -> types.SimpleNamespace:
+        """A copy of `data` for some rows alone, (rows,) booleans."""
+        return types.SimpleNamespace(**{name: array[rows] for name, array in vars(self.data).items()})
+
     def step(self, nstep: int, rows: np.ndarray) -> np.ndarray:
         """Advances some rows by `nstep` substeps, as `Physics.step` does.
 

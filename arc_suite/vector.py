@@ -98,7 +98,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         threads = usable_cores() if num_threads is None else _count("num_threads", num_threads)
 
         # One ordinary environment lends the rows its settings, its model and its decorated body.
-        self._environment = environment = suite.load(domain_name, task_name, task_kwargs)
+        environment = suite.load(domain_name, task_name, task_kwargs)
         self._physics, self._task = environment.physics, environment.task
         self._physics.check_camera(camera_id)
         self._substeps = round(environment.control_timestep() / self._physics.timestep())
@@ -127,7 +127,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             "camera_id": camera_id,
             "depth": render_mode == "depth_array",
         }
-        size = self._observe().shape[-1]
+        self._observation = self._walker.observation_vector(self.batch.data, dtype=np.float32)  # the latest
+        size = self._observation.shape[-1]
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, environment.action_spec().shape, np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -156,8 +157,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if seed is not None:
             self._seed(self._seeds(seed), rows)
         self._begun = True
-        self._begin(rows)
-        return self._observe(), {}
+        self._begin(rows, self._observation)
+        return self._observation.copy(), {}
 
     @_one_at_a_time
     def step(self, actions):
@@ -186,9 +187,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._steps += 1
 
         reward = np.where(stepping, self._walker.reward(data, diverged if diverged.any() else None), 0.0)
-        observation = self._observe()
+        observation = self._walker.observation_vector(data, dtype=np.float32)
         time_is_up = self._steps >= self._time_limit
-        terminated = stepping & self._walker.failed() & ~time_is_up
+        terminated = stepping & (diverged | self._walker.fallen(data)) & ~time_is_up
         truncated = stepping & (time_is_up | (self._steps >= self._step_limit))
         self._ended = terminated | truncated
 
@@ -199,8 +200,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             info |= _marked(final, restarting)
         info |= self._info(stepping, diverged)
         if restarting.any():
-            self._begin(restarting)
-            observation[restarting] = self._observe()[restarting]
+            self._begin(restarting, observation)
+        self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
     @_one_at_a_time
@@ -232,16 +233,14 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         data.qpos[:], data.qvel[:] = self.batch.data.qpos[row], self.batch.data.qvel[row]
         return self._physics.render(**self._picture)
 
-    def _begin(self, rows: np.ndarray) -> None:
-        """Starts episodes in some rows, (num_envs,) booleans."""
+    def _begin(self, rows: np.ndarray, observation: np.ndarray) -> None:
+        """Starts episodes in some rows, (num_envs,) booleans, and puts their observations among the others."""
         states = [self._task.initial_state(self._physics, self._randoms[row]) for row in np.flatnonzero(rows)]
         self.batch.reset(rows, *map(np.stack, zip(*states, strict=True)))
         self._walker.restart(rows)
         self._steps[rows] = 0
         self._ended = self._ended & ~rows
-
-    def _observe(self) -> np.ndarray:
-        return self._walker.observation_vector(self.batch.data).astype(np.float32)
+        observation[rows] = self._walker.observation_vector(self.batch.part(rows), rows)
 
     def _info(self, rows: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
         """What the latest step tells of some rows."""

@@ -27,28 +27,33 @@ class Mutant(NamedTuple):
 
 MUTANTS = (
     Mutant("swapped leg", "robots/queen.py", "leg.mirrored(leg.name.replace", "leg.replace(name=leg.name.replace"),
-    Mutant("mirrored axis keeps its sign", "spec.py", "axis=(-a, b, -c)", "axis=(a, b, -c)"),
+    Mutant("mirrored axis keeps its sign", "spec.py", "axis=(0.0 - a, b", "axis=(a, b"),
     Mutant(
         "leg order",
         "robots/leaper.py",
         '(left, left.mirrored(left.name[0] + "r"))',
         '(left.mirrored(left.name[0] + "r"), left)',
     ),
-    Mutant("dropped clip of the action", "tasks/walk.py", "return array.clip(-1.0, 1.0)", "return array"),
+    Mutant("dropped clip of the action", "tasks/walker.py", "return array.clip(-1.0, 1.0)", "return array"),
     Mutant("dropped clip of the contact forces", "tasks/readings.py", ".clip(-1.0, 1.0)", ""),
     Mutant("sign of a weight", "tasks/walk.py", '"smoothness": -0.02', '"smoothness": 0.02'),
     Mutant("sign of the sweep", "cpg/demonstrator.py", "(-1.0 if leg.side", "(1.0 if leg.side"),
-    Mutant("ignored seed", "tasks/walk.py", "np.random.RandomState(random)\n", "np.random.RandomState()\n"),
+    Mutant(
+        "ignored seed",
+        "tasks/walk.py",
+        "RandomState(None if random is None else seeding.check(random))",
+        "RandomState()",
+    ),
     Mutant("wrong number of substeps", "tasks/walk.py", "SUBSTEPS = 25", "SUBSTEPS = 24"),
     Mutant(
         "gait clock advances too late",
-        "tasks/walk.py",
-        "self._phase = (self._phase + clock)",
-        "self._phase = (self._phase + 0.5 * clock)",
+        "tasks/walker.py",
+        "(self.phase + self._clock)",
+        "(self.phase + 0.5 * self._clock)",
     ),
     Mutant(
         "previous action forgotten",
-        "tasks/walk.py",
+        "tasks/walker.py",
         "self._previous_action, self._action = self._action, action",
         "self._previous_action, self._action = action, action",
     ),
@@ -58,7 +63,12 @@ MUTANTS = (
         "angular_velocity=qvel[..., 3:6]",
         "angular_velocity=qvel[..., 0:3]",
     ),
-    Mutant("yaw rate penalised", "tasks/rewards.py", "angular_velocity[..., :2]", "angular_velocity[..., :3]"),
+    Mutant(
+        "yaw rate penalised in place of pitch rate",
+        "tasks/rewards.py",
+        "component(readings.angular_velocity, 1)",
+        "component(readings.angular_velocity, 2)",
+    ),
     Mutant("stance and swing exchanged", "tasks/rewards.py", "% TWO_PI < TWO_PI", "% TWO_PI > TWO_PI"),
     Mutant("quaternion not normalised", "tasks/walk.py", "    qpos[3:7] /= np.linalg.norm(qpos[3:7])\n", ""),
     Mutant(
@@ -67,23 +77,40 @@ MUTANTS = (
         "random.uniform(-joint, joint, joints)",
         "random.uniform(0.0, joint, joints)",
     ),
-    Mutant("fall reported as a time limit", "tasks/walk.py", "<= high else 0.0", "<= high else 1.0"),
-    Mutant("no sensors, so no contact forces", "physics.py", "self._option.disableflags &= ~_SENSOR", "pass"),
-    Mutant("one substep too few", "physics.py", "nstep - 1)", "nstep - 2)"),
+    Mutant("fall reported as a time limit", "tasks/walk.py", "return 0.0 if failed", "return 1.0 if failed"),
+    Mutant("no sensors, so no contact forces", "physics.py", "option.disableflags = flags\n", "pass\n"),
+    Mutant("one substep too few", "physics.py", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
     Mutant("contact margin doubled", "robots/builder.py", '"margin": 0.005', '"margin": 0.01'),
     Mutant("armature of the hip", "robots/tick.py", "armature=1.0", "armature=2.0"),
     Mutant("ballast touches the floor", "robots/builder.py", '{"contype": 0,', '{"contype": 1,'),
-    Mutant("NaN let through", "tasks/walk.py", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
+    Mutant("NaN let through", "tasks/walker.py", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
     Mutant("feet in the air slip", "style/metrics.py", " * track.contacts", ""),
     Mutant("early taken for late", "style/metrics.py", "actual * wanted.conj()", "wanted * actual.conj()"),
     Mutant("mirror image of a foot's path forgotten", "style/metrics.py", " * (1.0, -1.0, 1.0)", ""),
     Mutant("motors win back what they brake", "style/metrics.py", ".clip(0.0).sum()", ".sum()"),
+    Mutant("rows share a seed", "vector.py", "seeding.check(first + row)", "seeding.check(first)"),
+    Mutant(
+        "observations of a batch handed out live",
+        "vector.py",
+        "self._observation = observation.copy()",
+        "self._observation = observation",
+    ),
+    Mutant(
+        "divergence unseen",
+        "physics.py",
+        "return simulations.warning[..., 1].any(axis=-1)",
+        "return simulations.warning[..., 1].any(axis=-1) & False",
+    ),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
 )
 
 
 def plant(mutant: Mutant, folder: pathlib.Path) -> None:
-    """Copies the project to a folder and plants the mistake there."""
+    """Copies the project to a folder and plants the mistake there.
+
+    Raises:
+        ValueError: the text to replace does not occur once.
+    """
     shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", ".venv", "out", "__pycache__", "*.egg-info"))
     path = folder / "arc_suite" / mutant.file
     text = path.read_text()
@@ -94,7 +121,17 @@ def plant(mutant: Mutant, folder: pathlib.Path) -> None:
 
 def caught_by(folder: pathlib.Path) -> str | None:
     """The first test of a project that fails, or None."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-x",
+        "-q",
+        "--no-header",
+        "-p",
+        "no:cacheprovider",
+        "--ignore=tests/test_mutants.py",
+    ]
     environment = {**os.environ, "PYTHONPATH": str(folder)}
     result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     failed = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]

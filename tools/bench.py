@@ -10,7 +10,6 @@ Example:
 import functools
 import json
 import os
-import pathlib
 
 from absl import flags
 from tqdm import tqdm
@@ -49,6 +48,7 @@ def main():
     threads = contestants.all_threads()
     workers = numbers("workers") if FLAGS.workers else [factor * max(threads) for factor in (1, 2, 4)]
     rows = numbers("rows")
+    document = FLAGS.document and report.document(FLAGS.document)
     for path in (FLAGS.json, FLAGS.plot):
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
     with commands.writing(FLAGS.json) as json_path, commands.writing(FLAGS.plot) as plot_path:
@@ -58,8 +58,8 @@ def main():
         report.plot(results, plot_path)
     tables = report.tables(results)
     print(tables)
-    if FLAGS.document:
-        report.into_document(pathlib.Path(FLAGS.document), tables)
+    if document:
+        report.into_document(document, tables)
 
 
 if __name__ == "__main__":

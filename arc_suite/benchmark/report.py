@@ -2,6 +2,7 @@
 
 import pathlib
 import re
+import textwrap
 from collections.abc import Iterator
 
 import numpy as np
@@ -19,7 +20,7 @@ TARGETS = {
     "vector env, most rows / reference rows": 0.95,
 }
 _COLORS = {"queen": "#b8860b", "bastion": "#2a7f8e", "tick": "#7a5195", "leaper": "#c8443c"}
-_MARK = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re.DOTALL)
+_MARKED = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re.DOTALL)
 
 
 def tables(results: dict) -> str:
@@ -59,16 +60,22 @@ def ratios(contestants: list[dict]) -> dict[str, float]:
     return {name: float(np.median(slow / fast)) for name, (slow, fast) in pairs.items()}
 
 
-def into_document(path: pathlib.Path, text: str) -> None:
-    """Puts the tables between the marks of a Markdown file.
+def document(path: str) -> pathlib.Path:
+    """Checks that a Markdown file can take the tables.
 
     Raises:
-        ValueError: it has no marks.
+        ValueError: it is not there or has no marks; one line.
     """
-    document = path.read_text()
-    if not _MARK.search(document):
+    if not pathlib.Path(path).is_file():
+        raise ValueError(f"--document: no file {path}")
+    if not _MARKED.search(pathlib.Path(path).read_text()):
         raise ValueError(f"{path} has no <!-- benchmark --> and <!-- end of benchmark -->")
-    path.write_text(_MARK.sub(lambda match: f"{match[1]}{text}{match[2]}", document))
+    return pathlib.Path(path)
+
+
+def into_document(path: pathlib.Path, text: str) -> None:
+    """Puts the tables between the marks of a Markdown file."""
+    path.write_text(_MARKED.sub(lambda match: f"{match[1]}{text}{match[2]}", path.read_text()))
 
 
 def plot(results: dict, path: pathlib.Path) -> None:
@@ -161,8 +168,11 @@ def _plot_singles(panel, results: dict) -> None:
         speeds = [_speed(results["robots"][robot]["contestants"][index]) for index in singles]
         places = np.arange(len(singles)) + (column - (len(robots) - 1) / 2) * width
         panel.bar(places, speeds, width, color=_COLORS[robot], label=robot)
-    panel.set_xticks(range(len(singles)), [first[index]["name"].replace(", ", ",\n") for index in singles], fontsize=7)
-    panel.set(title="One environment", ylabel="control steps / s")
+    labels = [textwrap.fill(first[index]["name"], 11) for index in singles]
+    panel.set_xticks(range(len(singles)), labels, fontsize=8)
+    panel.tick_params(axis="x", length=0)
+    panel.set_title("One environment")
+    panel.set_ylabel("control steps / s")
     panel.legend(fontsize=8)
 
 
@@ -176,9 +186,10 @@ def _plot_rows(panel, results: dict) -> None:
         best = max(_speed(c) for c in contestants if c["name"] == names.ASYNC)
         panel.axhline(best, color=color, linestyle=":", linewidth=1)
     panel.set_xscale("log", base=2)
-    panel.set(title="Vector env over rows (dotted: best AsyncVectorEnv of ordinary ones)", xlabel="rows")
+    panel.set_xticks([rows for rows, _ in points], [str(rows) for rows, _ in points])
+    panel.set_title("Vector env over rows\n(dotted: best AsyncVectorEnv of ordinary ones)")
+    panel.set_xlabel("rows")
     panel.set_ylabel("control steps / s")
-    panel.title.set_fontsize(10)
 
 
 def _plot_threads(panel, results: dict) -> None:
@@ -191,16 +202,18 @@ def _plot_threads(panel, results: dict) -> None:
         panel.plot([0, points[-1][0]], [0, lean * points[-1][0]], color=color, linestyle=":", linewidth=1)
     panel.set_xticks(sorted({point[0] for point in points}))
     panel.set_xlim(left=0)
-    panel.set(title=f"Vector env of {rows} rows over threads (dotted: threads x lean mj_step)", xlabel="threads")
+    panel.set_title(f"Vector env of {rows} rows over threads\n(dotted: threads x lean mj_step)")
+    panel.set_xlabel("threads")
     panel.set_ylabel("control steps / s")
-    panel.title.set_fontsize(10)
 
 
 def _plot_growth(panel, growth: list[dict]) -> None:
     for links in sorted({size["links"] for size in growth}):
         points = [(size["legs"], np.median(size["microseconds"])) for size in growth if size["links"] == links]
         panel.plot(*zip(*points, strict=True), "o-", color=str(0.75 - 0.18 * links), label=_count(links, "link"))
-    panel.set(title="25 x mj_step over legs and links of a leg", xlabel="legs", ylabel="us / control step")
+    panel.set_title("25 x mj_step over legs, by links of a leg")
+    panel.set_xlabel("legs")
+    panel.set_ylabel("us / control step")
     panel.legend(fontsize=8)
 
 

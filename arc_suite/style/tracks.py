@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import evaluation
 from arc_suite.spec import Body
-from arc_suite.tasks import readings, rewards
+from arc_suite.tasks import rewards
 
 
 class Track(NamedTuple):
@@ -98,8 +98,7 @@ def record(environment, policy, seed: int, max_steps: int | None = None) -> Trac
         The track.
     """
     task, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
-    body = task.body
-    layout = readings.layout(model, body.joint_names, body.part_names, body.foot_names)
+    body, layout = task.body, task.layout
     feet = [model.body(name).id for name in body.foot_names]
     radii = np.array([leg.foot.radius for leg in body.legs])
     rows, terms = [], []
@@ -111,7 +110,7 @@ def record(environment, policy, seed: int, max_steps: int | None = None) -> Trac
             "quaternions": data.qpos[3:7],
             "linear_velocities": data.qvel[:3],
             "angular_velocities": data.qvel[3:6],
-            "joint_angles": data.qpos[layout.joint_positions],
+            "joint_angles": data.qpos[layout.joint_angles],
             "joint_velocities": data.qvel[layout.joint_velocities],
             "actions": data.ctrl,
             "torques": data.qfrc_actuator[layout.joint_velocities],

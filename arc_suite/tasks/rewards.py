@@ -65,10 +65,10 @@ def stance_errors(readings: Readings, step: Step, parameters: Parameters):
     return stance != stance_targets(step.phase, parameters)
 
 
-def healthy(readings: Readings, parameters: Parameters):
-    """Whether the torso's height lies in its healthy range: (...) booleans."""
+def healthy(torso_height, parameters: Parameters):
+    """Whether a torso's height (...) m lies in its healthy range: (...) booleans."""
     low, high = parameters.healthy_range
-    return (low <= readings.torso_height) & (readings.torso_height <= high)
+    return (low <= torso_height) & (torso_height <= high)
 
 
 def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
@@ -90,7 +90,7 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
     vertical = component(readings.linear_velocity, 2)  # numpy's `vertical**2` rounds otherwise for scalars
     return {
         "forward": _positive(1.0 - abs(step.forward_velocity - p.target_velocity) / p.velocity_band),
-        "healthy": healthy(readings, p).astype(float),
+        "healthy": healthy(readings.torso_height, p).astype(float),
         "gait_bonus": 1.0 - wrong_feet / errors.shape[-1],
         "gait_cost": wrong_feet,
         "control": (step.action**2).sum(axis=-1),

@@ -284,7 +284,8 @@ class Walk(control.Task):
 
     def get_termination(self, physics):
         """0 when the torso's height has left its healthy range or the physics has diverged, else None."""
-        return 0.0 if self._walker.failed() else None
+        failed = physics.divergence is not None or self._walker.fallen(physics.data.ptr)
+        return 0.0 if failed else None
 
 
 def walk(

@@ -110,27 +110,32 @@ class Walker:
         self.terms = terms
         return rewards.total(terms, self._weights)
 
-    def observation_vector(self, data) -> np.ndarray:
+    def observation_vector(self, data, rows=None, dtype=None) -> np.ndarray:
         """The paper's observation (Section 3), in new memory.
 
         Args:
             data: `MjData`, or anything with its fields under the walker's leading axes.
+            rows: mask or indices of the walks of a batch whose data this is; None for all.
+            dtype: of the vector; None for that of the data.
 
         Returns:
             (..., 13 + 2 * joints + 6 * parts): torso height, torso quaternion, joint angles; torso
             linear (world) and angular (body) velocity, joint velocities; torque and force on each
             part, clipped to [-1, 1]; sine and cosine of the phase.
         """
-        # The readings that after_step took serve the observation of that step, but no later one.
-        readings, self._readings = self._readings, None
+        if rows is None:
+            # The readings that after_step took serve the observation of that step, but no later one.
+            phase, readings, self._readings = self.phase, self._readings, None
+        else:
+            phase, readings = self.phase[rows], None
         blocks = (
             data.qpos[..., self._layout.pose],
             data.qvel[..., self._layout.velocities],
             (readings or read(data, self._layout)).contact_forces,
-            np.sin(self.phase)[..., None],
-            np.cos(self.phase)[..., None],
+            np.sin(phase)[..., None],
+            np.cos(phase)[..., None],
         )
-        return np.concatenate(blocks, axis=-1)
+        return np.concatenate(blocks, axis=-1, dtype=dtype)
 
     def observation(self, data) -> collections.OrderedDict:
         """The observation vector as named blocks, views of it in its order.
@@ -149,6 +154,6 @@ class Walker:
             gait_clock=vector[..., -2:],
         )
 
-    def failed(self):
-        """Whose latest reward found the torso out of its healthy range or the physics diverged: (...) booleans."""
-        return self.terms["healthy"] == 0.0
+    def fallen(self, data):
+        """Whose torso has left its healthy range: (...) booleans."""
+        return ~rewards.healthy(component(data.qpos, 2), self._parameters)
