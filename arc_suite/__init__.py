@@ -12,9 +12,18 @@ from arc_suite import rendering, versions
 with versions.explained():
     rendering.select_backend()  # before anything imports dm_control
 
-    from arc_suite import registration
-    from arc_suite.suite import ALL_TASKS, TASKS_BY_DOMAIN, load
+    from arc_suite import registration, suite
+    from arc_suite.registration import register
+    from arc_suite.suite import load
 
-    registration.register()
+    registration.register_ids()
 
-__all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load"]
+__all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load", "register"]
+
+
+def __getattr__(name):
+    if name == "ALL_TASKS":
+        return suite.all_tasks()
+    if name == "TASKS_BY_DOMAIN":
+        return suite.tasks_by_domain()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

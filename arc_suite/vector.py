@@ -89,7 +89,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """
         task_kwargs = dict(task_kwargs or {})
         seed = task_kwargs.pop("random", None)
-        names.check(task_kwargs.setdefault("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
+        names.check(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
         self._same_step = names.check(mode, _AUTORESET_MODES, "autoreset_mode") == AutoresetMode.SAME_STEP.value
         if render_mode is not None:
@@ -100,6 +100,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         # One ordinary environment lends the rows its settings, its model and its decorated body.
         environment = suite.load(domain_name, task_name, task_kwargs)
         self._physics, self._task = environment.physics, environment.task
+        if not hasattr(self._task, "walker"):
+            raise ValueError(f"task {task_name!r} has no batched form; use vectorization_mode 'sync' or 'async'")
         self._physics.check_camera(camera_id)
         self._substeps = round(environment.control_timestep() / self._physics.timestep())
         self._time_limit = environment._step_limit  # control steps; dm_control has no public name for it

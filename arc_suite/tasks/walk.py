@@ -33,7 +33,7 @@ WEIGHTS = {
 }
 
 # What a robot does not set itself.
-COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1}
+COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1, "weights": {}}
 
 _TRIPOD = (math.pi, 0.0, math.pi, 0.0, math.pi, 0.0)  # of l1 l2 l3 r1 r2 r3
 _TROT = (0.0, math.pi, math.pi, 0.0)  # of fl fr rl rr
