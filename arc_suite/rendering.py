@@ -23,6 +23,8 @@ _REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJ
 _OFF = ("off", "disable", "disabled", "false", "0")  # values of MUJOCO_GL that both libraries take for no backend
 _BACKEND = "dm_control._render"  # dm_control's choice of a backend, made when this module is executed
 
+_MAX_DRAWINGS = 4  # MuJoCo contexts, of some 30 MB each
+
 _renderer = None
 _lock = threading.Lock()
 
@@ -170,12 +172,13 @@ def driver() -> str:
 
 
 class _Renderer:
-    """One OpenGL context, one MuJoCo context in it, and the thread in which both are used."""
+    """One OpenGL context, in it a MuJoCo context for each body drawn lately, and the thread in which they are used."""
 
     def __init__(self):
         backend = _backend()
         self._open = backend.Renderer
-        self._gl = self._drawing = self._model = None
+        self._gl = None
+        self._drawings = {}  # dm_control's model -> MuJoCo's context for it; the latest used comes last
         self._forks = forks.count
         forks.keep(self)
         self._busy = threading.RLock()
@@ -220,14 +223,13 @@ class _Renderer:
             self._gl = self._open(width, height)
             self._gl.increment_refcount()  # dm_control frees it with the last MuJoCo context
             atexit.register(self.close)  # after dm_control has registered its own handlers: before them
-        if self._model is not model:
-            if self._drawing is not None:
-                self._drawing.free()
-            self._drawing, self._model = wrapper.MjrContext(model, self._gl), model
-        drawing = self._drawing.ptr
-        if drawing.offWidth < width or drawing.offHeight < height:
-            mujoco.mjr_resizeOffscreen(width, height, drawing)
-        return engine.Contexts(gl=self._gl, mujoco=self._drawing)
+        drawing = self._drawings.pop(model, None) or wrapper.MjrContext(model, self._gl)
+        self._drawings[model] = drawing
+        if len(self._drawings) > _MAX_DRAWINGS:
+            self._drawings.pop(next(iter(self._drawings))).free()
+        if drawing.ptr.offWidth < width or drawing.ptr.offHeight < height:
+            mujoco.mjr_resizeOffscreen(width, height, drawing.ptr)
+        return engine.Contexts(gl=self._gl, mujoco=drawing)
 
     def close(self):
         """Frees the contexts in their thread, before the interpreter takes apart what that needs."""
@@ -242,7 +244,9 @@ class _Renderer:
         gl._render_executor._terminated = True  # dm_control's own handler has nothing left to do
 
     def _free(self):
-        gl, self._gl, self._drawing, self._model = self._gl, None, None, None
+        gl, self._gl = self._gl, None
+        while self._drawings:
+            self._drawings.popitem()[1].free()
         gl.decrement_refcount()
         gl.free()
 
