@@ -9,14 +9,16 @@ import numpy as np
 from dm_control import mujoco
 from dm_control.rl import control
 
-from arc_suite import names
+from arc_suite import gaits, names
 from arc_suite.physics import Physics
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.sizing import SUBSTEPS, control_timestep
 from arc_suite.spec import Body
 from arc_suite.tasks import rewards
+from arc_suite.tasks.fitting import fitted_settings
 from arc_suite.tasks.readings import Readings, layout, read
 
-SUBSTEPS = 25
-TIME_LIMIT = 50.0  # s: 1000 control steps
+HORIZON = 1000  # control steps
 
 # Signed weights of the ten terms (Section 4), the same for all robots but for "control".
 WEIGHTS = {
@@ -101,12 +103,13 @@ class Settings(NamedTuple):
 
 
 def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
-    """The settings of a robot, some of them overridden.
+    """The settings of a body, some of them overridden.
 
     Args:
-        body: a robot of the table.
-        overrides: fields of `rewards.Parameters`, "base_noise", "joint_noise", and "weights", a
-            mapping of the terms to change.
+        body: a robot of the table, or any other body, whose numbers are fitted to it.
+        overrides: fields of `rewards.Parameters`, "base_noise", "joint_noise", "weights", a
+            mapping of the terms to change, and "gait", a name of `gaits.NAMES`, which sets the
+            duty factor and the phase offsets that are not set themselves.
 
     Returns:
         The settings, checked.
@@ -114,9 +117,14 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
     Raises:
         ValueError: an unknown name, or a value that does not fit; one line that names it.
     """
-    table = COMMON | SETTINGS[names.check(body.name, SETTINGS, "walker")]
+    published = ROBOTS.get(body.name) == body
+    table = COMMON | (SETTINGS[body.name] if published else fitted_settings(body))
     for name in overrides:
-        names.check(name, table, "setting of walk")
+        names.check(name, [*table, "gait"], "setting of walk")
+    if overrides.get("gait") is not None:
+        gait = gaits.gait(body, overrides["gait"])
+        offsets = tuple(2.0 * math.pi * offset for offset in gait.offsets)
+        table |= {"duty_factor": gait.duty_factor, "phase_offsets": offsets}
     weights = WEIGHTS | table["weights"]
     for name, weight in dict(overrides.get("weights") or {}).items():
         weights[names.check(name, WEIGHTS, "weight")] = _number(f"weights[{name!r}]", weight)
@@ -314,12 +322,12 @@ class Walk(control.Task):
         return None if low <= physics.data.ptr.qpos[2] <= high else 0.0
 
 
-def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kwargs=None, **overrides):
+def walk(body: Body, time_limit: float | None = None, random=None, environment_kwargs=None, **overrides):
     """An environment in which the body walks.
 
     Args:
-        body: a robot of `SETTINGS`.
-        time_limit: s.
+        body: any body.
+        time_limit: s; None for 1000 control steps.
         random: a `RandomState`, or what one is seeded with.
         environment_kwargs: `flat_observation`, to get one vector in place of the blocks.
         **overrides: of `settings`.
@@ -331,7 +339,10 @@ def walk(body: Body, time_limit: float = TIME_LIMIT, random=None, environment_kw
         ValueError: an unknown name, or a value that does not fit; one line that names it.
     """
     chosen = settings(body, overrides)
-    time_limit = _number("time_limit", time_limit, 1e-9)
+    # Half a step short, so that rounding cannot add a step.
+    time_limit = (
+        (HORIZON - 0.5) * control_timestep(body) if time_limit is None else _number("time_limit", time_limit, 1e-9)
+    )
     for name in environment_kwargs or {}:
         names.check(name, ["flat_observation"], "environment setting")
     physics = Physics.from_body(body)
