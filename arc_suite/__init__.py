@@ -7,13 +7,23 @@ import gymnasium
 env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
-from arc_suite import rendering
+from arc_suite import rendering, versions
 
-rendering.select_backend()  # before anything imports dm_control
+with versions.explained():
+    rendering.select_backend()  # before anything imports dm_control
 
-from arc_suite import registration  # noqa: E402
-from arc_suite.suite import ALL_TASKS, TASKS_BY_DOMAIN, load  # noqa: E402
+    from arc_suite import registration, suite
+    from arc_suite.registration import register
+    from arc_suite.suite import load
 
-registration.register()
+    registration.register_ids()
 
-__all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load"]
+__all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load", "register"]
+
+
+def __getattr__(name):
+    if name == "ALL_TASKS":
+        return suite.all_tasks()
+    if name == "TASKS_BY_DOMAIN":
+        return suite.tasks_by_domain()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

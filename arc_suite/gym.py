@@ -137,7 +137,7 @@ class Env(DmControlCompatibilityV0):
         observation, reward, terminated, truncated, _ = dm_env_step2gym_step(timestep)
         self._stepping = not timestep.last()
         self._show()
-        terms = {name: float(term) for name, term in self._env.task.terms.items()}
+        terms = {name: float(term) for name, term in getattr(self._env.task, "terms", {}).items()}
         return _flat(observation), float(reward), terminated, truncated, {"reward_terms": terms}
 
     def render(self):

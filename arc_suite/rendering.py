@@ -158,6 +158,17 @@ def contexts(model):
         return _renderer.contexts(model)
 
 
+def driver() -> str:
+    """Who draws, and which OpenGL that is; after the first picture."""
+
+    def ask():
+        from OpenGL import GL
+
+        return " / ".join(GL.glGetString(name).decode() for name in (GL.GL_RENDERER, GL.GL_VERSION))
+
+    return call(ask)
+
+
 class _Renderer:
     """One OpenGL context, one MuJoCo context in it, and the thread in which both are used."""
 

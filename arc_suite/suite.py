@@ -1,5 +1,6 @@
 """The registry: every task x every robot, or any other body."""
 
+import importlib
 import os
 
 from arc_suite import names
@@ -8,8 +9,15 @@ from arc_suite.spec import Body
 from arc_suite.spec_files import load_body
 from arc_suite.tasks import TASKS
 
-TASKS_BY_DOMAIN = {domain: tuple(TASKS) for domain in ROBOTS}
-ALL_TASKS = tuple((domain, task) for domain, tasks in TASKS_BY_DOMAIN.items() for task in tasks)
+
+def tasks_by_domain() -> dict[str, tuple[str, ...]]:
+    """Names of the tasks by name of the robot, as they are now."""
+    return {domain: tuple(TASKS) for domain in ROBOTS}
+
+
+def all_tasks() -> tuple[tuple[str, str], ...]:
+    """Names of a robot and a task, of all there are now."""
+    return tuple((domain, task) for domain in ROBOTS for task in TASKS)
 
 
 def body_of(domain) -> Body:
@@ -27,15 +35,16 @@ def body_of(domain) -> Body:
         return domain
     if isinstance(domain, os.PathLike) or (isinstance(domain, str) and domain.endswith(".json")):
         return load_body(domain)
-    return ROBOTS[names.check(domain, ROBOTS, "domain")]
+    return _find(domain, ROBOTS, "domain")
 
 
 def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
     """Opens an environment, as `dm_control.suite.load` does.
 
     Args:
-        domain_name: a robot: queen, bastion, tick or leaper; or any body; see `body_of`.
-        task_name: walk.
+        domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
+            where that has not been imported yet; or any body; see `body_of`.
+        task_name: walk, or a task of another package likewise.
         task_kwargs: settings of the task: `time_limit` (s), `random` (a seed or `RandomState`),
             `gait`, `weights`, and every target and threshold; see `arc_suite.tasks.walk.settings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks.
@@ -49,8 +58,17 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
             nearest valid name.
         OSError: a file that cannot be read.
     """
-    body = body_of(domain_name)
-    task = TASKS[names.check(task_name, TASKS, "task")]
+    body, task = body_of(domain_name), _find(task_name, TASKS, "task")
     environment = task(body, environment_kwargs=environment_kwargs, **(task_kwargs or {}))
     environment.task.visualize_reward = visualize_reward
     return environment
+
+
+def _find(name, table, kind: str):
+    if isinstance(name, str) and ":" in name:
+        module, _, name = name.rpartition(":")
+        try:
+            importlib.import_module(module)
+        except ImportError as error:
+            raise ValueError(f"{kind} {name!r}: cannot import {module}: {error}") from None
+    return table[names.check(name, table, kind)]

@@ -2,6 +2,7 @@
 
 import functools
 import operator
+import os
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -71,7 +72,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             domain_name: a robot; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
             num_envs: number of rows.
-            num_threads: on which to simulate; None for as many as there are CPUs.
+            num_threads: on which to simulate; None for as many as this process has cores.
             autoreset_mode: NextStep or SameStep: whether a row whose episode has ended starts the
                 next one in the step after or at once.
             max_episode_steps: truncates episodes, as `gymnasium.make` does, beside the task's time limit.
@@ -88,17 +89,19 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """
         task_kwargs = dict(task_kwargs or {})
         seed = task_kwargs.pop("random", None)
-        names.check(task_kwargs.setdefault("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
+        names.check(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
         self._same_step = names.check(mode, _AUTORESET_MODES, "autoreset_mode") == AutoresetMode.SAME_STEP.value
         if render_mode is not None:
             names.check(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = _count("num_envs", num_envs)
-        threads = 0 if num_threads is None else _count("num_threads", num_threads)
+        threads = usable_cores() if num_threads is None else _count("num_threads", num_threads)
 
         # One ordinary environment lends the rows its settings, its model and its decorated body.
         environment = suite.load(domain_name, task_name, task_kwargs)
         self._physics, self._task = environment.physics, environment.task
+        if not hasattr(self._task, "walker"):
+            raise ValueError(f"task {task_name!r} has no batched form; use vectorization_mode 'sync' or 'async'")
         self._physics.check_camera(camera_id)
         self._substeps = round(environment.control_timestep() / self._physics.timestep())
         self._time_limit = environment._step_limit  # control steps; dm_control has no public name for it
@@ -275,6 +278,11 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
             raise ValueError(f"reset_mask: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
         return mask.copy()
+
+
+def usable_cores() -> int:
+    """How many cores this process may use, where the system tells; else how many there are."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 def _count(name: str, value: Any) -> int:

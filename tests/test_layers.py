@@ -11,7 +11,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 
 # From the bottom up; a module may import from its own layer's row only what stands before it.
 LAYERS = (
-    ("forks", "names", "rendering", "seeding"),
+    ("forks", "names", "rendering", "seeding", "versions"),
     ("spec", "spec_files", "gaits"),
     ("robots", "arenas", "models"),
     ("physics",),
@@ -24,6 +24,7 @@ LAYERS = (
     ("window", "gym", "vector"),
     ("commands",),
     ("benchmark",),
+    ("doctor",),
 )
 ORDER = [name for layer in LAYERS for name in layer]
 

@@ -46,7 +46,7 @@ class Demonstrator:
         names.check(preset, PRESETS, "preset")
         if isinstance(gait, str):
             gait = gaits.gait(body, gait)
-        if ROBOTS.get(body.name) == body:
+        if ROBOTS.get(body.name) == body and body.name in TUNINGS:
             if froude is not None:
                 raise ValueError(f"froude: {body.name} has presets alone: {', '.join(PRESETS)}")
             self._control = Tuned.fit(body, preset, gait)

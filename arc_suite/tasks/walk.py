@@ -35,7 +35,7 @@ WEIGHTS = {
 }
 
 # What a robot does not set itself.
-COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1}
+COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1, "weights": {}}
 
 _TRIPOD = (math.pi, 0.0, math.pi, 0.0, math.pi, 0.0)  # of l1 l2 l3 r1 r2 r3
 _TROT = (0.0, math.pi, math.pi, 0.0)  # of fl fr rl rr
@@ -117,8 +117,8 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
     Raises:
         ValueError: an unknown name, or a value that does not fit; one line that names it.
     """
-    published = ROBOTS.get(body.name) == body
-    table = COMMON | (SETTINGS[body.name] if published else fitted_settings(body))
+    row = SETTINGS.get(body.name) if ROBOTS.get(body.name) == body else None
+    table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
     for name in overrides:
         names.check(name, [*table, "gait"], "setting of walk")
     if overrides.get("gait") is not None:

@@ -1,0 +1,43 @@
+"""The packages on which results depend, and the line that says how to get them."""
+
+import contextlib
+import importlib.metadata
+
+from packaging.specifiers import SpecifierSet
+
+# As in setup.cfg. MuJoCo and dm_control move together.
+NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.4,<1.5", "shimmy": "==2.0.1"}
+
+
+def installed(package: str) -> str | None:
+    """The version of a package that is installed, or None."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def problems() -> list[str]:
+    """One line with the remedy for every package that is missing or has a version for which the suite was not made."""
+    lines = []
+    for package, needed in NEEDS.items():
+        version = installed(package)
+        if version is None or not SpecifierSet(needed).contains(version, prereleases=True):
+            wrong = f"{package} is {version or 'not installed'} and should be {needed}"
+            lines.append(f"{wrong}: pip install '{package}{needed}'")
+    return lines
+
+
+@contextlib.contextmanager
+def explained():
+    """Says which package is to blame, in one line, where an import fails and one is.
+
+    Raises:
+        ImportError: instead of what was raised, if a package is missing or has another version.
+    """
+    try:
+        yield
+    except Exception as error:
+        if wrong := problems():
+            raise ImportError(f"cannot import arc_suite: {'; '.join(wrong)}") from error
+        raise
