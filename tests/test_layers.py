@@ -12,13 +12,13 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 # From the bottom up; a module may import from its own layer's row only what stands before it.
 LAYERS = (
     ("names", "rendering", "seeding"),
-    ("spec",),
+    ("spec", "spec_files", "gaits"),
     ("robots", "arenas", "models"),
     ("physics",),
     ("tasks",),
     ("suite",),
     ("cpg",),
-    ("evaluation", "policies", "pictures"),
+    ("evaluation", "policies", "pictures", "summary", "census"),
     ("style",),
     ("registration",),
     ("window", "gym", "vector"),
