@@ -19,7 +19,8 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
 
     Args:
         name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1]; or
-            `module:attribute`, a function on Python's path that makes a policy from a robot's name.
+            `module:attribute`, a function on Python's path that makes a policy from what is
+            given as robot.
         robot: queen, bastion, tick or leaper, or any body.
         preset: of the demonstrator: slow, medium or fast.
         seed: of the random policy.
