@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import types
 
 import mujoco
@@ -10,8 +11,9 @@ import mujoco.batch
 import numpy as np
 from dm_control import mujoco as dm_mujoco
 
-from arc_suite import models, names, rendering
+from arc_suite import forks, models, names, rendering
 from arc_suite.robots import looks
+from arc_suite.robots.looks.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.spec import Body
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -43,7 +45,13 @@ class Physics(dm_mujoco.Physics):
         super()._reload_from_data(data)
         self._decorated = None
         self.shown_reward = None
+        self._forks = forks.count
         self._option = self.model.ptr.opt
+
+    def reset(self, keyframe_id=None) -> None:
+        """As in dm_control."""
+        self._check_process()
+        super().reset(keyframe_id)
 
     def step(self, nstep: int = 1) -> None:
         """Advances by `nstep` substeps.
@@ -51,6 +59,7 @@ class Physics(dm_mujoco.Physics):
         Where these diverge, MuJoCo goes on from the model's default state; `divergence` then says
         what happened, and nothing is raised.
         """
+        self._check_process()
         model, data, option = self.model.ptr, self.data.ptr, self._option
         time = data.time
         self._warnings.fill(0)
@@ -67,36 +76,36 @@ class Physics(dm_mujoco.Physics):
         cause = mujoco.mju_warningText(kind, int(self.data.warning.lastinfo[kind])).split(". ")[0]
         return f"physics diverged in the step from {time:.3f} s: {cause}"
 
+    def _check_process(self) -> None:
+        if self._forks != forks.count:
+            forks.refuse("environment")
+
     def render(self, height=480, width=640, camera_id="tracking", **kwargs):
         """A picture of the decorated body, (height, width, 3) uint8; other arguments as in dm_control.
 
         Raises:
-            ValueError: no such camera, or a size beyond the model's offscreen buffer; one line.
+            ValueError: no such camera, or an impossible size; one line.
             RenderingUnavailable: no OpenGL here.
+            ForkError: made before a fork.
         """
+        self._check_process()
         self.check_camera(camera_id)
-        decorated = self.decorated()
-        most = decorated.model.vis.global_
-        for name, size, limit in (("height", height, most.offheight), ("width", width, most.offwidth)):
+        for name, size, limit in (("height", height, MAX_HEIGHT), ("width", width, MAX_WIDTH)):
             if size not in range(1, limit + 1):
                 raise ValueError(f"{name}: expected an integer from 1 to {limit}, got {size!r}")
-        with rendering.errors():
-            decorated.contexts  # noqa: B018 (opens OpenGL)
-        return decorated.render(height, width, camera_id, **kwargs)
+        return rendering.call(functools.partial(self._draw, height, width, camera_id, **kwargs))
 
-    def decorated(self) -> dm_mujoco.Physics:
-        """The decorated body in the present pose, to look at; the same object at every call."""
+    def _draw(self, height, width, camera_id, **kwargs):
+        shared = _shared(self.body)
+        shared.pose(self)
+        return shared.render(height, width, camera_id, **kwargs)
+
+    def decorated(self) -> Decorated:
+        """The decorated body in the present pose, to look at in a window; the same object at every call."""
         if self._decorated is None:
-            xml = models.assemble(self.body, decorated=True).to_xml_string()
-            self._decorated = dm_mujoco.Physics.from_xml_string(xml)
-            self._glow = self._decorated.model.ptr.material("glow").rgba.copy()
-        decorated = self._decorated
-        decorated.set_state(self.get_state())
-        for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
-            update(decorated.model.ptr, decorated.data.ptr)
-        share = self.shown_reward
-        decorated.model.ptr.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
-        return decorated
+            self._decorated = Decorated.from_body(self.body)
+        self._decorated.pose(self)
+        return self._decorated
 
     def check_camera(self, camera_id) -> None:
         """Raises ValueError, one line, if there is no such camera (a name, an index, or -1 for the free one)."""
@@ -107,7 +116,7 @@ class Physics(dm_mujoco.Physics):
             raise ValueError(f"no camera {camera_id}: expected -1 (free) to {len(cameras) - 1}, or one of {cameras}")
 
     def free(self) -> None:
-        """Frees the simulation and whatever it rendered with."""
+        """Frees the simulation, and what a window showed of it."""
         if self._decorated is not None:
             self._decorated.free()
             self._decorated = None
@@ -131,6 +140,42 @@ class Physics(dm_mujoco.Physics):
         mujoco.mj_copyData(data.ptr, data.model.ptr, as_it_stands)
 
 
+class Decorated(dm_mujoco.Physics):
+    """A body with its looks, which takes the pose of a simulation to be looked at."""
+
+    @classmethod
+    def from_body(cls, body: Body) -> Decorated:
+        """Compiles the decorated body on its floor."""
+        decorated = cls.from_xml_string(models.assemble(body, decorated=True).to_xml_string())
+        decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
+        buffer = decorated.model.vis.global_
+        buffer.offwidth = buffer.offheight = 1  # it grows with the pictures that are asked for
+        return decorated
+
+    def pose(self, simulation: Physics) -> None:
+        """Takes the state of a simulation of the same body, and shows its reward."""
+        self.set_state(simulation.get_state())
+        for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
+            update(self.model.ptr, self.data.ptr)
+        share = simulation.shown_reward
+        self.model.ptr.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
+
+    def render(self, height, width, camera_id, **kwargs):
+        """As in dm_control."""
+        buffer = self.model.vis.global_
+        buffer.offheight, buffer.offwidth = max(height, buffer.offheight), max(width, buffer.offwidth)
+        return super().render(height, width, camera_id, **kwargs)
+
+    @property
+    def contexts(self):
+        """Those that all pictures of this process are drawn with."""
+        return rendering.contexts(self.model)
+
+
+# The decorated bodies that pictures are drawn of, whatever simulation asks for them.
+_shared = functools.lru_cache(maxsize=8)(Decorated.from_body)
+
+
 class Batch:
     """Many simulations of one model, bit-equal to as many `Physics`, on a thread pool.
 
@@ -147,7 +192,9 @@ class Batch:
             rows: how many.
             threads: to step on; 0 for as many as there are CPUs.
         """
+        self._forks = forks.count
         self._simulations = mujoco.batch.Batch(model, rows, threads)
+        forks.keep(self._simulations)
         self._silent = copy.copy(model)
         self._silent.opt.disableflags |= _SENSOR
         # What is bound is filled by every call, so it must be bound before the first.
@@ -170,7 +217,11 @@ class Batch:
 
         Returns:
             Mask (rows,) of those that diverged.
+
+        Raises:
+            ForkError: made before a fork.
         """
+        self._check_process()
         simulations = self._simulations
         simulations.warning[...] = 0
         simulations.set_models(self._silent)
@@ -186,7 +237,15 @@ class Batch:
             rows: mask (rows,) of whom to restart.
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
+
+        Raises:
+            ForkError: made before a fork.
         """
+        self._check_process()
         self._simulations.reset(rows)  # runs mj_forward, from whose result the solver starts next
         self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
         self._simulations.forward(rows)
+
+    def _check_process(self) -> None:
+        if self._forks != forks.count:
+            forks.refuse("vector environment")

@@ -1,19 +1,30 @@
-"""Which OpenGL there is to render with, and one line when there is none.
+"""The OpenGL there is to render with: chosen on import, opened at the first picture, shared by all.
 
-MuJoCo and dm_control open their backend when they are imported, and refuse to be imported where
-that fails. `select_backend` imports them so that everything but rendering works all the same.
+A context is large and slow to make, so that all pictures of a process come out of one, drawn one
+after the other: in a thread of its own, where it disturbs nobody else's context and whose end
+nobody waits for. Where there is no OpenGL, everything but rendering works.
 """
 
+import atexit
+import concurrent.futures
 import contextlib
 import ctypes
 import importlib
 import os
+import pathlib
+import queue
 import sys
+import threading
+import types
+
+from arc_suite import forks
 
 _REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
 _OFF = ("off", "disable", "disabled", "false", "0")  # values of MUJOCO_GL that both libraries take for no backend
+_BACKEND = "dm_control._render"  # dm_control's choice of a backend, made when this module is executed
 
-_failure = None  # what kept the backend from being imported
+_renderer = None
+_lock = threading.Lock()
 
 
 class RenderingUnavailable(RuntimeError):
@@ -21,40 +32,53 @@ class RenderingUnavailable(RuntimeError):
 
 
 def select_backend() -> None:
-    """Imports MuJoCo and dm_control with the best OpenGL there is, or else with none.
+    """Chooses the best OpenGL there is and imports MuJoCo, without opening anything.
 
     `MUJOCO_GL` is set to egl if the user has not set it, there is no display and libEGL loads; a
-    user's own value stays. Where the backend does not work, dm_control is imported without one and
-    rendering raises `RenderingUnavailable`.
+    user's own value stays. dm_control, which would open OpenGL when it is imported and refuse to be
+    imported where that fails, does so at the first picture instead, whoever asks for it.
     """
-    global _failure
     if "MUJOCO_GL" not in os.environ and not has_display() and _loads("libEGL.so.1"):
         os.environ["MUJOCO_GL"] = "egl"
+    with _environment():
+        try:
+            import mujoco
+        except Exception:  # ImportError, AttributeError, RuntimeError, ...: as many as there are causes
+            os.environ["MUJOCO_GL"] = _OFF[0]
+            import mujoco  # noqa: F401
+    if _BACKEND not in sys.modules:
+        _postpone_backend()
+
+
+def _postpone_backend() -> None:
+    """Puts an empty module in the place of dm_control's backend, which becomes the real one when it is asked."""
+    import dm_control
+
+    module = types.ModuleType(_BACKEND)
+    module.__path__ = [str(pathlib.Path(dm_control.__file__).with_name("_render"))]
+
+    def load(name):
+        if name not in ("BACKEND", "Renderer", "USING_GPU"):
+            raise AttributeError(f"module {_BACKEND!r} has no attribute {name!r}")
+        _reload(module)
+        return vars(module)[name]
+
+    module.__getattr__ = load
+    sys.modules[_BACKEND] = dm_control._render = module
+
+
+@contextlib.contextmanager
+def _environment():
+    """Undoes what libraries do to the environment's variables, and keeps Mesa from warning on standard error."""
     before = {name: os.environ.get(name) for name in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL")}
-    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")  # Mesa without a driver warns on standard error
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
-        _import_mujoco()
-    except Exception as error:  # ImportError, AttributeError, RuntimeError, ...: as many as there are causes
-        _failure = error
-        os.environ["MUJOCO_GL"] = _OFF[0]
-        _import_mujoco()
+        yield
     finally:
         for name, value in before.items():
             os.environ.pop(name, None)
             if value is not None:
                 os.environ[name] = value
-
-
-def _import_mujoco() -> None:
-    # GLFW is slow to import; leave it alone where nobody will try it.
-    glfw_tried = os.environ.get("MUJOCO_GL") not in ("egl", *_OFF)
-    with _strict_glfw() if glfw_tried else contextlib.nullcontext():
-        import dm_control._render
-        import mujoco  # noqa: F401
-
-        # Imported before us and without a display, dm_control has settled for a GLFW that cannot open.
-        if dm_control._render.BACKEND == "glfw" and not glfw_tried:
-            importlib.reload(dm_control._render)
 
 
 @contextlib.contextmanager
@@ -97,8 +121,142 @@ def _loads(library: str) -> bool:
     return True
 
 
+def call(function):
+    """Calls a function, which may use `contexts`, where OpenGL is current.
+
+    Args:
+        function: takes nothing. One at a time is called.
+
+    Returns:
+        What it returns.
+
+    Raises:
+        RenderingUnavailable: no OpenGL here. Whatever the function raises.
+    """
+    global _renderer
+    with _lock:
+        if _renderer is None:
+            with _errors():
+                _renderer = _Renderer()
+        renderer = _renderer
+    return renderer.call(function)
+
+
+def contexts(model):
+    """The contexts with which dm_control draws a model; only within a function given to `call`.
+
+    Args:
+        model: dm_control's `MjModel`; its `vis.global_` says how large pictures can be.
+
+    Returns:
+        dm_control's `Contexts`, good until the next call with another model.
+
+    Raises:
+        RenderingUnavailable: no OpenGL here.
+    """
+    with _errors():
+        return _renderer.contexts(model)
+
+
+class _Renderer:
+    """One OpenGL context, one MuJoCo context in it, and the thread in which both are used."""
+
+    def __init__(self):
+        backend = _backend()
+        self._open = backend.Renderer
+        self._gl = self._drawing = self._model = None
+        self._forks = forks.count
+        forks.keep(self)
+        self._busy = threading.RLock()
+        self._calls = queue.SimpleQueue()
+        self._thread = None
+        if backend.BACKEND != "glfw":  # GLFW insists on the main thread, from which pictures are wanted as a rule
+            self._thread = threading.Thread(target=self._serve, name="arc_suite.rendering", daemon=True)
+            self._thread.start()
+
+    def call(self, function):
+        """See the function of that name."""
+        if self._forks != forks.count:
+            raise RenderingUnavailable(
+                "cannot render: OpenGL was opened before this process was forked; "
+                "make no picture before the fork, or start processes with multiprocessing's spawn"
+            )
+        if self._thread in (None, threading.current_thread()):
+            with self._busy:
+                return function()
+        future = concurrent.futures.Future()
+        self._calls.put((future, function))
+        return future.result()
+
+    def _serve(self):
+        while True:
+            future, function = self._calls.get()
+            try:
+                future.set_result(function())
+            except BaseException as error:
+                future.set_exception(error)
+            if function == self._free:
+                return
+            del future, function  # and the picture, while there is nothing to do
+
+    def contexts(self, model):
+        """See the function of that name."""
+        import mujoco
+        from dm_control.mujoco import engine, wrapper
+
+        width, height = model.vis.global_.offwidth, model.vis.global_.offheight
+        if self._gl is None:
+            self._gl = self._open(width, height)
+            self._gl.increment_refcount()  # dm_control frees it with the last MuJoCo context
+            atexit.register(self.close)  # after dm_control has registered its own handlers: before them
+        if self._model is not model:
+            if self._drawing is not None:
+                self._drawing.free()
+            self._drawing, self._model = wrapper.MjrContext(model, self._gl), model
+        drawing = self._drawing.ptr
+        if drawing.offWidth < width or drawing.offHeight < height:
+            mujoco.mjr_resizeOffscreen(width, height, drawing)
+        return engine.Contexts(gl=self._gl, mujoco=self._drawing)
+
+    def close(self):
+        """Frees the contexts in their thread, before the interpreter takes apart what that needs."""
+        gl = self._gl
+        if self._forks == forks.count:
+            with contextlib.suppress(Exception):  # another library may have closed the display already
+                self.call(self._free)
+        else:  # what is the parent's would hang
+            egl = sys.modules.get(f"{_BACKEND}.pyopengl.egl_renderer")
+            if egl is not None:
+                atexit.unregister(egl.EGL.eglTerminate)
+        gl._render_executor._terminated = True  # dm_control's own handler has nothing left to do
+
+    def _free(self):
+        gl, self._gl, self._drawing, self._model = self._gl, None, None, None
+        gl.decrement_refcount()
+        gl.free()
+
+
+def _backend():
+    """dm_control's backend, opened."""
+    module = sys.modules[_BACKEND]
+    # Imported before us and without a display, dm_control has settled for a GLFW that cannot open.
+    if module.BACKEND == "glfw" and not _wants_glfw():
+        _reload(module)
+    return module
+
+
+def _reload(module) -> None:
+    # GLFW is slow to import; leave it alone where nobody will try it.
+    with _environment(), _strict_glfw() if _wants_glfw() else contextlib.nullcontext():
+        importlib.reload(module)
+
+
+def _wants_glfw() -> bool:
+    return os.environ.get("MUJOCO_GL") not in ("egl", "osmesa", *_OFF)
+
+
 @contextlib.contextmanager
-def errors():
+def _errors():
     """Turns whatever goes wrong while OpenGL is opened into one line.
 
     Raises:
@@ -107,7 +265,7 @@ def errors():
     try:
         yield
     except Exception as error:
-        raise RenderingUnavailable(_explain(_failure or error)) from None
+        raise RenderingUnavailable(_explain(error)) from None
 
 
 def _explain(error: Exception) -> str:
@@ -120,3 +278,7 @@ def _explain(error: Exception) -> str:
         reason = " ".join(str(error.__cause__ or error).split()).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
     return f"cannot render{backend}: {reason}; {_REMEDY}"
+
+
+# A fork waits for a renderer that is being made, so that the child finds none or a whole one.
+os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)

@@ -1,6 +1,8 @@
 """Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
 
+import functools
 import operator
+import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -15,6 +17,24 @@ from arc_suite.physics import Batch
 
 _AUTORESET_MODES = (AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value)
 _RENDER_MODES = ("rgb_array", "depth_array")
+
+
+def _one_at_a_time(method):
+    """Refuses a call once the environment is closed, and while another thread's call is at work."""
+
+    @functools.wraps(method)
+    def guarded(self, *args, **kwargs):
+        call = method.__name__
+        if self.closed:
+            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
+        if not self._busy.acquire(blocking=False):
+            raise RuntimeError(f"cannot {call}: another thread is using this environment; make one for each thread")
+        try:
+            return method(self, *args, **kwargs)
+        finally:
+            self._busy.release()
+
+    return guarded
 
 
 class VectorEnv(gymnasium.vector.VectorEnv):
@@ -92,6 +112,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
         self._ended = np.zeros(self.num_envs, bool)  # rows that start an episode in the next step
         self._begun = False
+        self._busy = threading.Lock()
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
@@ -112,6 +133,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
+    @_one_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
         """Starts an episode in every row, or in some.
 
@@ -128,7 +150,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ResetNeeded: a mask before every row has been reset once.
             ClosedEnvironmentError: after `close`.
         """
-        self._check_open("reset")
         rows = self._rows((options or {}).get("reset_mask"))
         if not (self._begun or rows.all()):
             raise ResetNeeded("cannot reset some rows: reset all of them first")
@@ -138,6 +159,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._begin(rows, self._observation)
         return self._observation.copy(), {}
 
+    @_one_at_a_time
     def step(self, actions):
         """Advances every row by one control step of 0.05 s, but for rows that start an episode instead.
 
@@ -155,7 +177,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
-        self._check_open("step")
         if not self._begun:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
         data, stepping, restarting = self.batch.data, ~self._ended, self._ended
@@ -182,6 +203,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
+    @_one_at_a_time
     def render(self, rows: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
         """Pictures of the rows' present states, in the mode and size chosen at the start.
 
@@ -196,7 +218,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             RenderingUnavailable: no OpenGL here.
             ClosedEnvironmentError: after `close`.
         """
-        self._check_open("render")
         if self.render_mode is None:
             return None
         return tuple(self._render_row(row) for row in (range(self.num_envs) if rows is None else rows))
@@ -254,10 +275,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
             raise ValueError(f"reset_mask: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
         return mask.copy()
-
-    def _check_open(self, call: str) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
 
 
 def _count(name: str, value: Any) -> int:

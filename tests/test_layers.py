@@ -11,7 +11,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 
 # From the bottom up; a module may import from its own layer's row only what stands before it.
 LAYERS = (
-    ("names", "rendering", "seeding"),
+    ("forks", "names", "rendering", "seeding"),
     ("spec", "spec_files", "gaits"),
     ("robots", "arenas", "models"),
     ("physics",),

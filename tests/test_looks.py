@@ -91,7 +91,8 @@ def test_near_cameras_frame_the_standing_body(body, camera):
     environment = arc_suite.physics.Physics.from_body(body)
     environment.forward()
     kinds = environment.render(120, 160, camera, segmentation=True)
-    geoms = [environment._decorated.model.geom(i).name for i in range(environment._decorated.model.ngeom)]
+    model = environment.decorated().model
+    geoms = [model.geom(i).name for i in range(model.ngeom)]
     seen = (kinds[..., 1] == mujoco.mjtObj.mjOBJ_GEOM) & (kinds[..., 0] != geoms.index("floor"))
     rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
     assert min(rows[0], columns[0], 119 - rows[-1], 159 - columns[-1]) > 0
@@ -150,8 +151,7 @@ def test_unknown_cameras_are_named(camera, message):
 
 
 def glow_in(physics) -> np.ndarray:
-    physics.render(60, 80)
-    return physics._decorated.model.mat("glow").rgba.copy()
+    return physics.decorated().model.mat("glow").rgba.copy()
 
 
 @every_robot
