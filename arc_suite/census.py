@@ -11,7 +11,7 @@ import numpy as np
 from dm_control.rl import control
 from tqdm import tqdm
 
-from arc_suite import gaits
+from arc_suite import gaits, pictures
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import generator
 from arc_suite.robots.sizing import GRAVITY
@@ -204,16 +204,12 @@ def summary(outcomes: Sequence[Outcome]) -> str:
 
 def picture(outcomes: Sequence[Outcome]) -> np.ndarray:
     """How up to twelve bodies ended, each with its seed and what it failed by: (height, width, 3) uint8."""
-    from PIL import Image, ImageDraw  # an extra, needed by nothing else here
-
-    panels = []
+    views = []
     for outcome in outcomes[:12]:
         environment, _ = follow(outcome.trial)
-        image = Image.fromarray(environment.physics.render(300, 400, "portrait"))
         caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
-        ImageDraw.Draw(image).text((8, 8), caption, fill="white")
-        panels.append(np.asarray(image))
+        views.append(pictures.captioned(environment.physics.render(300, 400, "portrait"), caption))
         environment.close()
-    columns = min(4, len(panels))
-    panels += [np.zeros_like(panels[0])] * (-len(panels) % columns)
-    return np.vstack([np.hstack(panels[i : i + columns]) for i in range(0, len(panels), columns)])
+    columns = min(4, len(views))
+    views += [np.zeros_like(views[0])] * (-len(views) % columns)
+    return pictures.grid(views, columns)

@@ -101,6 +101,19 @@ MUTANTS = (
         "return simulations.warning[..., 1].any(axis=-1)",
         "return simulations.warning[..., 1].any(axis=-1) & False",
     ),
+    Mutant("both sides of a body in step", "gaits.py", "0.5 * (leg.side ==", "0.0 * (leg.side =="),
+    Mutant("steered the wrong way", "cpg/stride.py", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),
+    Mutant("joints of a giant as fast as a mite's", "robots/sizing.py", "_STIFFNESS / control_timestep(body)", "7.0"),
+    Mutant(
+        "contacts of a giant as hard as a mite's",
+        "robots/builder.py",
+        '"solref": (simulation.contact_time,',
+        '"solref": (0.02,',
+    ),
+    Mutant(
+        "feet of a random body above the floor", "robots/generator.py", "(p.height - foot_radius) /", "p.height * 0.9 /"
+    ),
+    Mutant("sign of zero kept", "spec.py", "float(value) + 0.0", "float(value)"),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
 )
 

@@ -22,7 +22,7 @@ LAYERS = (
     ("style",),
     ("registration",),
     ("window", "gym", "vector"),
-    ("commands",),
+    ("commands", "body_flags"),
     ("benchmark",),
     ("doctor",),
 )

@@ -12,19 +12,14 @@ import contextlib
 import imageio.v3 as imageio
 from absl import flags
 
-from arc_suite import commands, models, spec_files
+from arc_suite import body_flags, commands, models, spec_files
 from arc_suite.physics import Physics
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.spec import Body
 from arc_suite.summary import summary
 
 _ROBOT = flags.DEFINE_enum("robot", None, list(ROBOTS), "A robot of the suite.")
-_SPEC = flags.DEFINE_string("spec", None, "A body from this JSON file.")
-_LEGS = flags.DEFINE_integer("legs", None, "A body with so many legs.", *generator.LEGS)
 _SEED = flags.DEFINE_integer("seed", None, "A random body, of so many --legs if given.", lower_bound=0)
-_LINKS = flags.DEFINE_integer(
-    "links", None, "Actuated links of each leg; with --legs or --seed. [default: 3, or random]", *generator.LINKS
-)
 _LAYOUT = flags.DEFINE_enum(
     "layout",
     None,
@@ -42,19 +37,20 @@ _RENDER = flags.DEFINE_string("render", None, "Write a picture of the standing b
 
 
 def _body() -> Body:
-    sources = [flag.name for flag in (_ROBOT, _SPEC, _LEGS, _SEED) if flag.value is not None]
+    sources = [flag.name for flag in (_ROBOT, body_flags.SPEC, body_flags.LEGS, _SEED) if flag.value is not None]
     if sources not in (["robot"], ["spec"], ["legs"], ["seed"], ["legs", "seed"]):
         given = " and ".join(f"--{name}" for name in sources) or "none"
         raise ValueError(f"expected one of --robot, --spec, --legs and --seed (or the last two), got {given}")
     if sources in (["robot"], ["spec"]):
-        for flag in (_LINKS, _LAYOUT):
+        for flag in (body_flags.LINKS, _LAYOUT):
             if flag.value is not None:
                 raise ValueError(f"--{flag.name}={flag.value}: goes with --legs or --seed, not with --{sources[0]}")
-        body = ROBOTS[_ROBOT.value] if _ROBOT.value else spec_files.load_body(_SPEC.value)
+        body = ROBOTS[_ROBOT.value] if _ROBOT.value else body_flags.made()
     elif "seed" in sources:
-        body = generator.random_body(_SEED.value, _LEGS.value, _LINKS.value, _LAYOUT.value)
+        body = generator.random_body(_SEED.value, body_flags.LEGS.value, body_flags.LINKS.value, _LAYOUT.value)
     else:
-        body = generator.generate(_LEGS.value, 3 if _LINKS.value is None else _LINKS.value, _LAYOUT.value)
+        links = 3 if body_flags.LINKS.value is None else body_flags.LINKS.value
+        body = generator.generate(body_flags.LEGS.value, links, _LAYOUT.value)
     return body if _SCALE.value is None else generator.scaled(body, _SCALE.value)
 
 
