@@ -2,9 +2,12 @@
 
 from dm_control import mjcf
 
-from arc_suite.robots.builder import CONTACT
+from arc_suite.robots import builder
+from arc_suite.spec import Simulation
 
 
-def add_floor(root: mjcf.RootElement) -> None:
+def add_floor(root: mjcf.RootElement, simulation: Simulation) -> None:
     """Adds `floor`, an endless flat plane at height 0."""
-    root.worldbody.add("geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **CONTACT)
+    root.worldbody.add(
+        "geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **builder.contact(simulation)
+    )

@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from arc_suite.policies import policy
+from arc_suite.spec import Body
 from arc_suite.suite import load
 
 FRAMES_PER_SECOND = 20  # one for each control step: real time
@@ -23,18 +24,18 @@ class Take:
         ended: whether the episode is over; stepping on changes nothing then.
     """
 
-    def __init__(self, robot: str, policy_name: str, preset: str, seed: int, camera: str, size: tuple[int, int]):
+    def __init__(self, robot: Body, policy_name: str, preset: str, seed: int, camera: str, size: tuple[int, int]):
         """Starts the episode.
 
         Args:
-            robot: queen, bastion, tick or leaper.
+            robot: a robot, or any other body.
             policy_name: cpg, zero or random.
             preset: of the demonstrator: slow, medium or fast.
             seed: of the episode and of the random policy.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.
         """
-        self.robot = robot
+        self.robot = robot.name
         self.earned = 0.0
         self.steps = 0
         self._act = policy(policy_name, robot, preset, seed)

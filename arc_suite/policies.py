@@ -8,18 +8,19 @@ import numpy as np
 from arc_suite import names
 from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.robots import ROBOTS
+from arc_suite.spec import Body
 
 POLICIES = ("cpg", "zero", "random")
 HELP = f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name."
 
 
-def policy(name: str, robot: str, preset: str = "medium", seed: int | None = None) -> Callable:
+def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | None = None) -> Callable:
     """Makes a policy for one environment.
 
     Args:
         name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1]; or
-            `module:attribute`, a function on Python's path that makes a policy from a robot's name.
-        robot: queen, bastion, tick or leaper.
+            `module:attribute`, a function on Python's path that makes a policy from `robot`.
+        robot: queen, bastion, tick or leaper, or any body.
         preset: of the demonstrator: slow, medium or fast.
         seed: of the random policy.
 
@@ -30,20 +31,20 @@ def policy(name: str, robot: str, preset: str = "medium", seed: int | None = Non
         ValueError: an unknown name; one line that names it and the nearest valid one.
     """
     names.check(preset, PRESETS, "preset")
-    names.check(robot, ROBOTS, "robot")
+    body = robot if isinstance(robot, Body) else ROBOTS[names.check(robot, ROBOTS, "robot")]
     if ":" in name:
         return _from_path(name, robot)
     names.check(name, POLICIES, "policy")
     if name == "cpg":
         return Demonstrator(robot, preset)
-    size = len(ROBOTS[robot].joint_names)
+    size = len(body.joint_names)
     if name == "zero":
         return lambda time_step: np.zeros(size)
     random = np.random.default_rng(seed)
     return lambda time_step: random.uniform(-1.0, 1.0, size)
 
 
-def _from_path(path: str, robot: str) -> Callable:
+def _from_path(path: str, robot: str | Body) -> Callable:
     try:
         factory = pkgutil.resolve_name(path)
     except (ImportError, ValueError, AttributeError) as error:

@@ -89,14 +89,7 @@ def _check_row(body: Body, row: Mapping[str, Any]) -> None:
     needed = walk.SETTINGS["queen"].keys() - {"weights"}
     if missing := sorted(needed - row.keys()):
         raise ValueError(f"walk: {body.name} has no {' and no '.join(missing)}")
-    known = walk.SETTINGS.get(body.name)
-    walk.SETTINGS[body.name] = walk.SETTINGS["queen"]
-    try:
-        walk.settings(body, row)
-    finally:
-        del walk.SETTINGS[body.name]
-        if known is not None:
-            walk.SETTINGS[body.name] = known
+    walk.settings(body, row)
 
 
 def _check_tuning(body: Body, tuning: Tuning) -> None:

@@ -15,17 +15,29 @@ import dataclasses
 import math
 import re
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NoReturn
 
 Vector = tuple[float, float, float]
 
 MAX_LENGTH = 100.0  # metres; far above any creature, far below what upsets MuJoCo
+_LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
 _NAME = re.compile(r"[a-z0-9_]{1,32}")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
 
 class SpecError(ValueError):
-    """A spec that no body can be built from; the message is one line that names the field."""
+    """A spec that no body can be built from; the message is one line that names the field.
+
+    Attributes:
+        reason: what is wrong, without the field.
+        field: name of the field; None where the reason stands alone.
+    """
+
+    def __init__(self, reason: str, field: str | None = None, owner: str | None = None):
+        """Words the error; `owner` tells whose field it is."""
+        super().__init__(": ".join(part for part in (".".join(filter(None, (owner, field))), reason) if part))
+        self.reason = reason
+        self.field = field
 
 
 def _check_name(value: Any) -> str:
@@ -39,7 +51,7 @@ def _check_number(value: Any, low: float, high: float) -> float:
         raise SpecError(f"expected a number, got {_shown(value)}")
     if not low <= value <= high:  # also false for NaN
         raise SpecError(f"expected a number from {low:g} to {high:g}, got {_shown(value)}")
-    return float(value)
+    return float(value) + 0.0  # -0.0 becomes 0.0: equal specs are to give equal texts
 
 
 def _check_vector(value: Any, size: int, low: float, high: float) -> tuple[float, ...]:
@@ -86,7 +98,11 @@ def _field(check, *args, default=dataclasses.MISSING, optional=False):
     def checked(value):
         return None if optional and value is None else check(value, *args)
 
-    return dataclasses.field(default=default, metadata={"check": checked})
+    metadata = {"check": checked}
+    if check in (_check_instance, _check_items):
+        metadata["kind"] = args[0]
+        metadata["many"] = check is _check_items
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 def _name(**kwargs):
@@ -117,15 +133,15 @@ class _Spec:
             try:
                 value = field.metadata["check"](getattr(self, field.name))
             except SpecError as error:
-                raise SpecError(f"{self._label()}.{field.name}: {error}") from None
+                raise SpecError(error.reason, field.name, self._label()) from None
             object.__setattr__(self, field.name, value)
         self._check_whole()
 
     def _check_whole(self) -> None:
         """Checks between fields; a subclass with any overrides this."""
 
-    def _fail(self, field: str, message: str):
-        raise SpecError(f"{self._label()}.{field}: {message}")
+    def _fail(self, field: str, message: str) -> NoReturn:
+        raise SpecError(message, field, self._label())
 
     def _label(self) -> str:
         name = getattr(self, "name", None)
@@ -152,17 +168,17 @@ class Joint(_Spec):
         name: `<leg>_<name>` is the joint's and its motor's name in the model.
         axis: direction in the link's frame, any length but zero.
         range_deg: lower and upper limit; zero, the standing pose, lies within.
-        armature: rotor inertia seen at the joint, kg m^2.
-        damping: viscous torque, N m s/rad.
-        motor: what drives it.
+        armature: rotor inertia seen at the joint, kg m^2; None: sized to the body.
+        damping: viscous torque, N m s/rad; None: sized to the body.
+        motor: what drives it; None: sized to the body.
     """
 
     name: str = _name()
     axis: Vector = _field(_check_vector, 3, -1e3, 1e3)
     range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
-    armature: float = _number(0.0, 1e9)
-    damping: float = _number(0.0, 1e9)
-    motor: Motor = _field(_check_instance, Motor)
+    armature: float | None = _number(0.0, 1e9, default=None, optional=True)
+    damping: float | None = _number(0.0, 1e9, default=None, optional=True)
+    motor: Motor | None = _field(_check_instance, Motor, default=None, optional=True)
 
     def _check_whole(self):
         if math.hypot(*self.axis) < 1e-6:
@@ -181,7 +197,7 @@ class Joint(_Spec):
         if a == b == 0.0:
             low, high = self.range_deg
             return self.replace(range_deg=(-high, -low))
-        return self.replace(axis=(0.0 - a, b, 0.0 - c))  # 0.0 - 0.0 is no negative zero
+        return self.replace(axis=(-a, b, -c))
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -242,7 +258,7 @@ class Leg(_Spec):
     @property
     def side(self) -> str:
         """'left' or 'right', by where the foot stands; 'left' on the midline."""
-        return "right" if self.foot_position[1] < 0.0 else "left"
+        return "right" if self.foot_position[1] < -1e-9 else "left"  # rounding must not tell sides
 
     @property
     def foot_position(self) -> Vector:
@@ -289,6 +305,11 @@ class Solid(_Spec):
         if self.name == "floor":
             self._fail("name", "'floor' is what the body stands on")
 
+    def mirrored(self):
+        """The shape across the x-z plane."""
+        x, y, z = self.euler_deg
+        return self.replace(position=_reflected(self.position), euler_deg=(-x, y, -z))
+
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ballast(Solid):
@@ -317,34 +338,76 @@ class TrackingCamera(_Spec):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Simulation(_Spec):
+    """The constants of the simulation that have a dimension.
+
+    The defaults, MuJoCo's but for the margin, are those of the published robots and suit bodies of
+    about half a metre. Since MuJoCo 3.5 the margin of a contact is the sum of its geoms' margins:
+    floor and robot each carry half of the published one.
+
+    Attributes:
+        timestep: of one substep, s.
+        contact_time: time constant of contacts and joint limits, s.
+        contact_width: depth over which a contact hardens, m.
+        contact_margin: of every geom that touches, m.
+    """
+
+    timestep: float = _number(1e-6, 0.1, default=0.002)
+    contact_time: float = _number(2e-6, 1.0, default=0.02)
+    contact_width: float = _number(1e-9, 1.0, default=0.001)
+    contact_margin: float = _number(0.0, 1.0, default=0.005)
+
+    def _check_whole(self):
+        if self.contact_time < 2.0 * self.timestep:
+            self._fail("contact_time", f"expected at least two timesteps, got {self.contact_time:g}")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Body(_Spec):
     """A whole creature.
 
     The legs' order is that of bodies, actions, joint angles, joint velocities and contact forces.
+    What is None is sized to the body before it is built; see `arc_suite.robots.sizing`.
 
     Attributes:
         name: the model's name.
         torso: the root.
         legs: every leg, right ones included.
-        camera: the side view that follows the body.
+        camera: the side view that follows the body; None: placed to suit the body.
         ballast: further weight on the torso.
         density: of solids, links and feet, kg/m^3.
+        simulation: its constants; None: scaled to the body.
     """
 
     name: str = _name()
     torso: Torso = _field(_check_instance, Torso)
     legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, 64)
-    camera: TrackingCamera = _field(_check_instance, TrackingCamera)
-    density: float = _number(1e-9, 1e9)
+    camera: TrackingCamera | None = _field(_check_instance, TrackingCamera, default=None, optional=True)
+    density: float = _number(1e-9, 1e9, default=10.0)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
+    simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
 
     def _check_whole(self):
         _check_unique(self, "legs", [leg.name for leg in self.legs])
         shapes = [part.name for part in (*self.torso.solids, *self.ballast)]
         _check_unique(self, "ballast", shapes)
+        self._check_inertia()
         # Names in the model: leg a's part b_c would meet leg a_b's part c.
         _check_unique(self, "legs", [*shapes, *self.part_names[1:]])
         _check_unique(self, "legs", self.joint_names)
+
+    def _check_inertia(self):
+        """MuJoCo refuses moving parts of no inertia to speak of; that of a ball is 8/15 pi density radius^5."""
+        least = (_LEAST_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2
+        for leg in self.legs:
+            for part in (*leg.links, leg.foot):
+                if part.radius < least:
+                    self._fail(
+                        "legs", f"{leg.full_name(part)}: expected a radius from {least:.2g}, got {part.radius:g}"
+                    )
+        for solid in self.torso.solids:
+            if min(solid.size) < least:
+                self._fail("torso", f"{solid.name}: expected sizes from {least:.2g}, got {min(solid.size):g}")
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -369,9 +432,18 @@ class Body(_Spec):
             for leg in self.legs
         )
 
+    def mirrored(self) -> Body:
+        """The body across the x-z plane; every part keeps its name and place in the order."""
+        solids = tuple(solid.mirrored() for solid in self.torso.solids)
+        return self.replace(
+            torso=self.torso.replace(solids=solids),
+            ballast=tuple(ballast.mirrored() for ballast in self.ballast),
+            legs=tuple(leg.mirrored(leg.name) for leg in self.legs),
+        )
+
 
 def _reflected(point: Vector) -> Vector:
-    return (point[0], 0.0 - point[1], point[2])
+    return (point[0], -point[1], point[2])
 
 
 def _check_unique(spec: _Spec, field: str, names: Iterable[str]) -> None:

@@ -1,9 +1,12 @@
-"""The registry: every task x every robot."""
+"""The registry: every task x every robot, or any other body."""
 
 import importlib
+import os
 
 from arc_suite import names
 from arc_suite.robots import ROBOTS
+from arc_suite.spec import Body
+from arc_suite.spec_files import load_body
 from arc_suite.tasks import TASKS
 
 
@@ -17,15 +20,33 @@ def all_tasks() -> tuple[tuple[str, str], ...]:
     return tuple((domain, task) for domain in ROBOTS for task in TASKS)
 
 
+def body_of(domain) -> Body:
+    """The body that a domain stands for.
+
+    Args:
+        domain: name of a robot, path of a file that holds a body (a `Path`, or a string that ends
+            in .json), or the body itself.
+
+    Raises:
+        ValueError: an unknown name, or a file that holds no body; one line.
+        OSError: the file cannot be read; one line.
+    """
+    if isinstance(domain, Body):
+        return domain
+    if isinstance(domain, os.PathLike) or (isinstance(domain, str) and domain.endswith(".json")):
+        return load_body(domain)
+    return _find(domain, ROBOTS, "domain")
+
+
 def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
     """Opens an environment, as `dm_control.suite.load` does.
 
     Args:
-        domain_name: a robot: queen, bastion, tick or leaper; or one of another package, as
-            `module:name` where that has not been imported yet.
-        task_name: walk, or likewise one of another package.
+        domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
+            where that has not been imported yet; or any body; see `body_of`.
+        task_name: walk, or a task of another package likewise.
         task_kwargs: settings of the task: `time_limit` (s), `random` (a seed or `RandomState`),
-            `weights`, and every target and threshold; see `arc_suite.tasks.walk.settings`.
+            `gait`, `weights`, and every target and threshold; see `arc_suite.tasks.walk.settings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks.
         visualize_reward: let rendered pictures show the reward as a colour.
 
@@ -35,8 +56,9 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
     Raises:
         ValueError: an unknown name, or a value that does not fit; one line that names it and the
             nearest valid name.
+        OSError: a file that cannot be read.
     """
-    body, task = _find(domain_name, ROBOTS, "domain"), _find(task_name, TASKS, "task")
+    body, task = body_of(domain_name), _find(task_name, TASKS, "task")
     environment = task(body, environment_kwargs=environment_kwargs, **(task_kwargs or {}))
     environment.task.visualize_reward = visualize_reward
     return environment

@@ -27,7 +27,7 @@ class Mutant(NamedTuple):
 
 MUTANTS = (
     Mutant("swapped leg", "robots/queen.py", "leg.mirrored(leg.name.replace", "leg.replace(name=leg.name.replace"),
-    Mutant("mirrored axis keeps its sign", "spec.py", "axis=(0.0 - a, b", "axis=(a, b"),
+    Mutant("mirrored axis keeps its sign", "spec.py", "axis=(-a, b, -c)", "axis=(a, b, -c)"),
     Mutant(
         "leg order",
         "robots/leaper.py",
@@ -44,7 +44,7 @@ MUTANTS = (
         "RandomState(None if random is None else seeding.check(random))",
         "RandomState()",
     ),
-    Mutant("wrong number of substeps", "tasks/walk.py", "SUBSTEPS = 25", "SUBSTEPS = 24"),
+    Mutant("wrong number of substeps", "robots/sizing.py", "SUBSTEPS = 25", "SUBSTEPS = 24"),
     Mutant(
         "gait clock advances too late",
         "tasks/walker.py",
@@ -80,7 +80,7 @@ MUTANTS = (
     Mutant("fall reported as a time limit", "tasks/walk.py", "return 0.0 if failed", "return 1.0 if failed"),
     Mutant("no sensors, so no contact forces", "physics.py", "option.disableflags = flags\n", "pass\n"),
     Mutant("one substep too few", "physics.py", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
-    Mutant("contact margin doubled", "robots/builder.py", '"margin": 0.005', '"margin": 0.01'),
+    Mutant("contact margin doubled", "spec.py", "default=0.005", "default=0.01"),
     Mutant("armature of the hip", "robots/tick.py", "armature=1.0", "armature=2.0"),
     Mutant("ballast touches the floor", "robots/builder.py", '{"contype": 0,', '{"contype": 1,'),
     Mutant("NaN let through", "tasks/walker.py", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
@@ -101,6 +101,19 @@ MUTANTS = (
         "return simulations.warning[..., 1].any(axis=-1)",
         "return simulations.warning[..., 1].any(axis=-1) & False",
     ),
+    Mutant("both sides of a body in step", "gaits.py", "0.5 * (leg.side ==", "0.0 * (leg.side =="),
+    Mutant("steered the wrong way", "cpg/stride.py", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),
+    Mutant("joints of a giant as fast as a mite's", "robots/sizing.py", "_STIFFNESS / control_timestep(body)", "7.0"),
+    Mutant(
+        "contacts of a giant as hard as a mite's",
+        "robots/builder.py",
+        '"solref": (simulation.contact_time,',
+        '"solref": (0.02,',
+    ),
+    Mutant(
+        "feet of a random body above the floor", "robots/generator.py", "(p.height - foot_radius) /", "p.height * 0.9 /"
+    ),
+    Mutant("sign of zero kept", "spec.py", "float(value) + 0.0", "float(value)"),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
 )
 

@@ -1,6 +1,5 @@
 """tools/build_model.py and the bodies it makes to order."""
 
-import math
 import subprocess
 import sys
 from pathlib import Path
@@ -13,9 +12,12 @@ from dm_control import mjcf
 from arc_suite import models
 from arc_suite.physics import Physics
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.spec import SpecError
+from arc_suite.spec_files import load_body
 
-TOOL = Path(__file__).parent.parent / "tools" / "build_model.py"
+ROOT = Path(__file__).parent.parent
+TOOL = ROOT / "tools" / "build_model.py"
+EXAMPLES = ROOT / "examples"
+SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
 
 
 def build_model(*arguments):
@@ -60,12 +62,47 @@ def test_bit_equality_would_notice_one_bit():
 
 
 @pytest.mark.parametrize(
-    ("legs", "links", "arguments"), [(6, 3, ["--legs=6", "--links=3"]), (5, 2, ["--legs=5", "--links=2"])]
+    ("arguments", "body"),
+    [
+        (["--legs=6", "--links=3"], generator.generate(6, 3)),
+        (["--legs=5", "--links=2"], generator.generate(5, 2)),
+        (["--legs=6", "--layout=radial", "--scale=2.5"], generator.scaled(generator.generate(6, 3, "radial"), 2.5)),
+        (["--seed=11"], generator.random_body(11)),
+        (["--seed=11", "--legs=4", "--links=1"], generator.random_body(11, 4, 1)),
+        (["--spec", EXAMPLES / "spider.json"], load_body(EXAMPLES / "spider.json")),
+    ],
 )
-def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(legs, links, arguments):
+def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):
     done = build_model(*arguments)
     assert (done.returncode, done.stderr) == (0, "")
-    assert saved(mujoco.MjModel.from_xml_string(done.stdout)) == saved(compiled(generator.generate(legs, links)))
+    assert saved(mujoco.MjModel.from_xml_string(done.stdout)) == saved(compiled(body))
+
+
+def test_json_is_the_spec_and_builds_the_same_model(tmp_path):
+    path = tmp_path / "body.json"
+    done = build_model("--seed=5", "--json", "--output", path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert load_body(path) == generator.random_body(5)
+    assert build_model("--spec", path).stdout == build_model("--seed=5").stdout
+    assert build_model("--spec", path, "--json").stdout == path.read_text()
+
+
+def test_summary_prints_the_figures_alone():
+    lines = build_model("--robot=queen", "--summary").stdout.splitlines()
+    figures = dict(line.split("  ", 1) for line in lines)
+    assert {name: value.strip() for name, value in figures.items()} == {
+        "name": "queen",
+        "legs": "6",
+        "links": "3 actuated a leg",
+        "degrees of freedom": "18 + 6",
+        "mass": "12.09 kg",
+        "standing height": "0.75 m",
+        "observation": "199 numbers",
+        "stability margin": "0.67 m (0.89 of the height)",
+        "control step": "0.05 s",
+        "target velocity": "0.5 m/s",
+        "gait": "1.5 Hz, duty factor 0.60",
+    }
 
 
 def test_three_links_are_the_default():
@@ -81,13 +118,17 @@ def test_three_links_are_the_default():
         (["--legs=6", "--links=0"], "flag --links=0: 0 is not an integer in the range [1, 4]"),
         (["--legs=6", "--links=5"], "flag --links=5: 5 is not an integer in the range [1, 4]"),
         (["--robot=quen"], "flag --robot=quen: value should be one of <queen|bastion|tick|leaper>"),
-        (["--robot=queen", "--links=2"], "--links=2: goes with --legs, not with --robot"),
-        ([], "flags robot=None, legs=None: Exactly one of (robot, legs) must have a value other than None."),
-        (
-            ["--robot=queen", "--legs=6"],
-            "flags robot=queen, legs=6: Exactly one of (robot, legs) must have a value other than None.",
-        ),
-        (["queen"], "flags robot=None, legs=None: Exactly one of (robot, legs) must have a value other than None."),
+        (["--robot=queen", "--links=2"], "--links=2: goes with --legs or --seed, not with --robot"),
+        ([], f"{SOURCES}, got none"),
+        (["--robot=queen", "--legs=6"], f"{SOURCES}, got --robot and --legs"),
+        (["--robot=queen", "--spec=a.json"], f"{SOURCES}, got --robot and --spec"),
+        (["queen"], "unexpected argument 'queen'; see --help"),
+        (["--legs=6", "--scale=0"], "flag --scale=0: 0.0 is not a number in the range [0.01, 100.0]"),
+        (["--legs=6", "--scale=nan"], "scale: expected a number from 0.01 to 100, got nan"),
+        (["--seed=-1"], "flag --seed=-1: -1 is not a non-negative integer"),
+        (["--legs=5", "--layout=pairs"], "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
+        (["--legs=5", "--layout=row"], "flag --layout=row: value should be one of <pairs|radial>"),
+        (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),
     ],
 )
 def test_bad_arguments_are_one_line(arguments, message):
@@ -107,61 +148,3 @@ def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
         assert done.stderr == f"build_model.py: cannot write {path}: {reason}\n"
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_text() == "kept"
-
-
-@pytest.mark.parametrize("legs", range(4, 13))
-@pytest.mark.parametrize("links", range(1, 5))
-def test_bodies_made_to_order_stand_on_all_feet(legs, links):
-    body = generator.generate(legs, links)
-    model = compiled(body)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    assert body.name == f"walker_{legs}x{links}"
-    assert len(body.legs) == legs
-    assert model.nu == legs * links
-    assert model.nbody - 2 == legs * (links + 1)
-    feet = {name: data.body(name).xpos for name in body.foot_names}
-    bottoms = [feet[name][2] - model.geom(name).size[0] for name in body.foot_names]
-    assert bottoms == pytest.approx([0.0] * legs, abs=1e-12)
-    for leg, name in zip(body.legs, body.foot_names, strict=True):
-        assert feet[name] - data.body("torso").xpos == pytest.approx(leg.foot_position, abs=1e-12)
-    # every foot has its mirror image, and no two feet stand on one spot
-    points = np.array(list(feet.values()))
-    for mirrored in points * (1.0, -1.0, 1.0):
-        assert np.linalg.norm(points - mirrored, axis=1).min() < 1e-12
-    apart = np.linalg.norm(points[:, None] - points[None], axis=-1) + np.eye(legs)
-    assert apart.min() > 0.1
-    # nothing but the feet reaches the floor
-    data.qpos[2] -= 1e-6
-    mujoco.mj_forward(model, data)
-    pairs = [{model.geom(i).name for i in contact.geom} for contact in data.contact if contact.dist < 0.0]
-    assert sorted(map(sorted, pairs)) == sorted(sorted(("floor", name)) for name in body.foot_names)
-
-
-def test_even_counts_stand_in_mirrored_pairs_and_odd_ones_around():
-    pairs = generator.generate(8, 3)
-    assert [leg.name for leg in pairs.legs] == ["l1", "l2", "l3", "l4", "r1", "r2", "r3", "r4"]
-    assert pairs.ranks == (0, 1, 2, 3) * 2
-    for left, right in zip(pairs.legs[:4], pairs.legs[4:], strict=True):
-        assert left.mirrored(right.name) == right
-        assert left.side == "left"
-    ring = generator.generate(5, 2)
-    assert [leg.name for leg in ring.legs] == ["leg1", "leg2", "leg3", "leg4", "leg5"]
-    headings = [math.degrees(math.atan2(leg.foot_position[1], leg.foot_position[0])) for leg in ring.legs]
-    assert headings == pytest.approx([0.0, 72.0, 144.0, -144.0, -72.0], abs=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("legs", "links", "message"),
-    [
-        (3, 3, "legs: expected a whole number from 4 to 12, got 3"),
-        (6.0, 3, "legs: expected a whole number from 4 to 12, got 6.0"),
-        (True, 3, "legs: expected a whole number from 4 to 12, got True"),
-        (6, 0, "links: expected a whole number from 1 to 4, got 0"),
-        (6, None, "links: expected a whole number from 1 to 4, got None"),
-    ],
-)
-def test_a_count_out_of_range_is_named(legs, links, message):
-    with pytest.raises(SpecError) as error:
-        generator.generate(legs, links)
-    assert str(error.value) == message

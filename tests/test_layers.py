@@ -12,17 +12,17 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 # From the bottom up; a module may import from its own layer's row only what stands before it.
 LAYERS = (
     ("forks", "names", "rendering", "seeding", "versions"),
-    ("spec",),
+    ("spec", "spec_files", "gaits"),
     ("robots", "arenas", "models"),
     ("physics",),
     ("tasks",),
     ("suite",),
     ("cpg",),
-    ("evaluation", "policies", "pictures"),
+    ("evaluation", "policies", "pictures", "summary", "census"),
     ("style",),
     ("registration",),
     ("window", "gym", "vector"),
-    ("commands",),
+    ("commands", "body_flags"),
     ("benchmark",),
     ("doctor",),
 )

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 from arc_suite import pictures
+from arc_suite.robots import ROBOTS
 
 TOOL = Path(__file__).parents[1] / "tools" / "render.py"
 
@@ -91,7 +92,7 @@ def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
 
 
 def test_a_take_stays_at_its_end():
-    take = pictures.Take("leaper", "random", "medium", 0, "profile", (64, 48))
+    take = pictures.Take(ROBOTS["leaper"], "random", "medium", 0, "profile", (64, 48))
     for _ in range(200):
         if take.ended:
             break

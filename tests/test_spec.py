@@ -7,7 +7,20 @@ import sys
 
 import pytest
 
-from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Solid, SpecError, Torso, TrackingCamera
+from arc_suite.spec import (
+    Ballast,
+    Body,
+    Foot,
+    Joint,
+    Leg,
+    Link,
+    Motor,
+    Simulation,
+    Solid,
+    SpecError,
+    Torso,
+    TrackingCamera,
+)
 
 MOTOR = Motor(gear=100.0)
 HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-20.0, 30.0), armature=0.1, damping=0.5, motor=MOTOR)
@@ -101,7 +114,15 @@ LENGTH = "expected a number from 1e-06 to 100, got "
         (CHASSIS, "size", (0.2, -0.1, 0.1), f"Solid(chassis).size: {LENGTH}-0.1"),
         # parts
         (UPPER, "joint", HIP.motor, "Link(upper).joint: expected a Joint, got a Motor"),
-        (HIP, "motor", None, "Joint(hip).motor: expected a Motor, got None"),
+        (HIP, "motor", 120.0, "Joint(hip).motor: expected a Motor, got 120.0"),
+        (
+            BODY,
+            "simulation",
+            {"timestep": 0.002},
+            "Body(beast).simulation: expected a Simulation, got a dict",
+        ),
+        (Simulation(), "timestep", 0.0, "Simulation.timestep: expected a number from 1e-06 to 0.1, got 0.0"),
+        (Simulation(), "timestep", 0.02, "Simulation.contact_time: expected at least two timesteps, got 0.02"),
         (LEG, "foot", 0.05, "Leg(l1).foot: expected a Foot, got 0.05"),
         (LEG, "links", (), "Leg(l1).links: expected 1 to 16 Links, got 0"),
         (LEG, "links", (LOWER,) * 17, "Leg(l1).links: expected 1 to 16 Links, got 17"),
@@ -130,7 +151,7 @@ LENGTH = "expected a number from 1e-06 to 100, got "
             "Body(beast).ballast: the name 'chassis' occurs twice",
         ),
         (BODY, "torso", LEG, "Body(beast).torso: expected a Torso, got a Leg"),
-        (BODY, "camera", None, "Body(beast).camera: expected a TrackingCamera, got None"),
+        (BODY, "camera", LEG, "Body(beast).camera: expected a TrackingCamera, got a Leg"),
     ],
 )
 def test_a_malformed_field_is_named_in_one_line(spec, field, value, message):

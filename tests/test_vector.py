@@ -202,7 +202,7 @@ def test_nan_is_refused_before_anything_moves():
         wrappers.RecordEpisodeStatistics,
         wrappers.DictInfoToList,
         wrappers.FlattenObservation,
-        lambda envs: wrappers.RescaleAction(envs, 0.0, 2.0),
+        lambda envs: wrappers.RescaleAction(envs, np.float32(0.0), np.float32(2.0)),
         wrappers.ClipAction,
         lambda envs: wrappers.ClipReward(envs, 0.0, 1.0),
         lambda envs: wrappers.DtypeObservation(envs, np.float64),

@@ -4,6 +4,7 @@ IQM is the interquartile mean of the return, with a stratified bootstrap interva
 
 Example:
   python tools/evaluate.py --robot all --policy cpg --preset medium --episodes 10
+  python tools/evaluate.py --spec examples/spider.json
 """
 
 import numpy as np
@@ -11,24 +12,24 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import commands, evaluation, names, policies
-from arc_suite.robots import ROBOTS
+from arc_suite import body_flags, commands, evaluation, policies
+from arc_suite.spec import Body
 
 FLAGS = flags.FLAGS
-flags.DEFINE_string("robot", "all", "queen, bastion, tick, leaper or all.")
+_ROBOT = flags.DEFINE_string("robot", "all", "queen, bastion, tick, leaper or all.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string("preset", "medium", "Of the cpg: slow, medium or fast.")
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")
 
-COLUMNS = "{:<8} {:>16} {:>26} {:>12} {:>14} {:>12} {:>13}"
+COLUMNS = "{:<12} {:>16} {:>26} {:>12} {:>14} {:>12} {:>13}"
 
 
-def evaluate(robot: str, policy) -> list[evaluation.Episode]:
-    """Runs the episodes of one robot behind a progress bar."""
-    environment = arc_suite.load(robot, "walk")
-    with tqdm(range(FLAGS.seed, FLAGS.seed + FLAGS.episodes), desc=robot, unit="episode", leave=False) as seeds:
+def evaluate(body: Body, policy) -> list[evaluation.Episode]:
+    """Runs the episodes of one body behind a progress bar."""
+    environment = arc_suite.load(body, "walk")
+    with tqdm(range(FLAGS.seed, FLAGS.seed + FLAGS.episodes), desc=body.name, unit="episode", leave=False) as seeds:
         return evaluation.episodes(environment, policy, seeds)
 
 
@@ -36,7 +37,7 @@ def report(robot: str, episodes: list[evaluation.Episode]) -> dict:
     """The figures of one robot, as they go into the JSON."""
     total, length, speed, compliance = (evaluation.summary(values) for values in np.transpose(episodes))
     return {
-        "expert_return": evaluation.EXPERT_RETURNS[robot],
+        "expert_return": evaluation.EXPERT_RETURNS.get(robot),
         "return": total,
         "length": length,
         "speed": speed,
@@ -52,7 +53,7 @@ def row(robot: str, figures: dict) -> str:
         robot,
         f"{total.mean:.1f} +- {total.deviation:.1f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
-        f"{figures['expert_return']:.0f}",
+        "-" if figures["expert_return"] is None else f"{figures['expert_return']:.0f}",
         f"{figures['length'].mean:.1f} steps",
         f"{figures['speed'].mean:.3f} m/s",
         f"{100 * figures['compliance'].mean:.1f} %",
@@ -68,8 +69,8 @@ def over_all(reports: dict) -> dict:
 
 def main():
     """Prints the table and writes the JSON."""
-    robots = list(ROBOTS) if FLAGS.robot == "all" else [names.check(FLAGS.robot, [*ROBOTS, "all"], "robot")]
-    walkers = {robot: policies.policy(FLAGS.policy, robot, FLAGS.preset, FLAGS.seed) for robot in robots}
+    bodies = body_flags.bodies(_ROBOT)
+    walkers = {name: policies.policy(FLAGS.policy, body, FLAGS.preset, FLAGS.seed) for name, body in bodies.items()}
     with commands.writing_json(FLAGS.json) as file:
         header = COLUMNS.format(
             "robot", "return", "IQM [95 % interval]", "paper's cpg", "length", "speed", "compliance"
@@ -77,7 +78,7 @@ def main():
         print(header, "-" * len(header), sep="\n")
         reports = {}
         for robot, policy in walkers.items():
-            reports[robot] = report(robot, evaluate(robot, policy))
+            reports[robot] = report(robot, evaluate(bodies[robot], policy))
             print(row(robot, reports[robot]), flush=True)
         file.update(
             policy=FLAGS.policy,
@@ -89,7 +90,9 @@ def main():
         if len(reports) > 1:
             file["return_over_expert"] = total = over_all(reports)
             print(
-                "all      IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]".format(total["iqm"], *total["interval"])
+                "all          IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]".format(
+                    total["iqm"], *total["interval"]
+                )
             )
 
 

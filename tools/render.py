@@ -2,6 +2,7 @@
 
   python tools/render.py --robot queen --policy cpg --output queen.png
   python tools/render.py --robot all --output robots.mp4
+  python tools/render.py --legs 8 --links 4 --output walker.gif
 
 A PNG of one robot under the demonstrator shows one cycle of its gait; any other PNG shows one
 moment. It prints each robot's return up to then, and the file it wrote. No display is needed.
@@ -15,7 +16,7 @@ import numpy as np
 from absl import flags
 from tqdm import tqdm
 
-from arc_suite import commands, names, pictures
+from arc_suite import body_flags, commands, names, pictures
 from arc_suite.cpg import PRESETS
 from arc_suite.policies import POLICIES
 from arc_suite.robots import ROBOTS
@@ -50,7 +51,7 @@ OUTPUT = flags.DEFINE_string("output", None, "The file to write: .png, .mp4 or .
 
 
 def main():
-    robots = list(ROBOTS) if names.check(ROBOT.value, [*ROBOTS, "all"], "robot") == "all" else [ROBOT.value]
+    robots = list(body_flags.bodies(ROBOT).values())
     camera = CAMERA.value or ("profile" if len(robots) == 1 else "portrait")
     for value, valid, kind in (
         (POLICY.value, POLICIES, "policy"),

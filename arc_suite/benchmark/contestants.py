@@ -21,6 +21,7 @@ ORDINARY = "ordinary MujocoEnv"
 SYNC = "SyncVectorEnv of ordinary ones"
 ASYNC = "AsyncVectorEnv of ordinary ones"
 VECTOR = "vector env"
+ORDER = (FULL, LEAN, SILENT, DM_ENV, GYM, ORDINARY, SYNC, ASYNC, VECTOR)
 
 # No episode ends while it is measured.
 _TASK_KWARGS = {"healthy_range": (-1e3, 1e3), "time_limit": 1e9}

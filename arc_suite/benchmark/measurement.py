@@ -89,6 +89,7 @@ class _Field:
             for contestant in group:
                 stack.callback(contestant.close)
                 self._contestants.append(contestant)
+        self._contestants.sort(key=lambda contestant: contestants.ORDER.index(contestant.name))
         self._policies = [Demonstrator(robot) for _ in self._contestants]
         self._observations = [contestant.reset() for contestant in self._contestants]
         self._times = [[] for _ in self._contestants]

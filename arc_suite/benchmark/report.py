@@ -173,7 +173,8 @@ def _plot_singles(panel, results: dict) -> None:
     panel.tick_params(axis="x", length=0)
     panel.set_title("One environment")
     panel.set_ylabel("control steps / s")
-    panel.legend(fontsize=8)
+    panel.set_ylim(top=1.15 * panel.get_ylim()[1])
+    panel.legend(fontsize=8, loc="upper center", ncols=len(robots))
 
 
 def _plot_rows(panel, results: dict) -> None:

@@ -1,39 +1,58 @@
 """Demonstrators: policies that walk by rote, from nothing but their clock and the joints they feel."""
 
 import math
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import names
+from arc_suite import gaits, names
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.cpg.presets import PRESETS, TUNINGS, ByRank, Preset, Tuning
+from arc_suite.cpg.stride import Stride
 from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
+from arc_suite.tasks.fitting import fitted_gait
 
-CONTROL_TIMESTEP = 0.05  # s
+CONTROL_TIMESTEP = 0.05  # s, of the four robots
+
+# Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
+FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
 
 class Demonstrator:
-    """Walks one robot at one preset, in one environment or in a batch of them.
+    """Walks one body at one speed, in one environment or in a batch of them.
 
     The policy keeps its own clock, one for each environment, and asks the observation for joint
-    angles and velocities alone. A dm_env `TimeStep` that is the first of an episode restarts the
-    clock; with flat observations, call `reset`.
+    angles and velocities and the torso's orientation alone. A dm_env `TimeStep` that is the first
+    of an episode restarts the clock; with flat observations, call `reset`.
     """
 
-    def __init__(self, robot: str, preset: str = "medium"):
+    def __init__(self, robot: str | Body, preset: str = "medium", froude: float | None = None, gait=None):
         """Prepares a demonstrator.
 
         Args:
-            robot: queen, bastion, tick or leaper.
+            robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast.
+            froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
+                a preset; negative ones walk backwards. Not for the four robots, whose presets are
+                published.
+            gait: a name of `gaits.NAMES` or a `Gait`; None for that of the robot or body.
 
         Raises:
-            ValueError: an unknown name; one line that names it and the nearest valid one.
+            ValueError: an unknown name, or a value out of range; one line that names it and the
+                nearest valid one.
         """
-        body = ROBOTS[names.check(robot, ROBOTS, "robot")]
-        self._tuning = TUNINGS[robot]
-        self._pattern = pattern(body, self._tuning, self._tuning.presets[names.check(preset, PRESETS, "preset")])
+        body = robot if isinstance(robot, Body) else ROBOTS[names.check(robot, ROBOTS, "robot")]
+        names.check(preset, PRESETS, "preset")
+        if isinstance(gait, str):
+            gait = gaits.gait(body, gait)
+        if ROBOTS.get(body.name) == body and body.name in TUNINGS:
+            if froude is not None:
+                raise ValueError(f"froude: {body.name} has presets alone: {', '.join(PRESETS)}")
+            self._control = Tuned.fit(body, preset, gait)
+        else:
+            froude = FROUDES[preset] if froude is None else froude
+            self._control = Stride.fit(body, froude, gait or fitted_gait(body))
         self._joints = len(body.joint_names)
         self._size = 5 + self._joints + 6 + self._joints + 6 * len(body.part_names) + 2
         self.reset()
@@ -66,29 +85,49 @@ class Demonstrator:
             if observation.first():
                 self.reset()
             observation = observation.observation
-        angles, velocities = self._joints_of(observation)
+        quaternion, angles, velocities = self._felt(observation)
         if self._clock.shape != angles.shape[:-1]:
             self._clock = np.broadcast_to(self._clock, angles.shape[:-1]).copy()
-        action = self._act(angles, velocities)
+        action = self._control(self._clock, quaternion, angles, velocities)
         self._clock = self._clock + 1
         return action
 
-    def _joints_of(self, observation):
+    def _felt(self, observation):
+        """The torso's quaternion, joint angles and joint velocities."""
         n = self._joints
         if hasattr(observation, "keys"):
             if "posture" in observation:
-                return np.asarray(observation["posture"])[..., 5:], np.asarray(observation["velocities"])[..., 6:]
+                posture, velocities = np.asarray(observation["posture"]), np.asarray(observation["velocities"])
+                return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
             observation = observation["observations"]
         vector = np.asarray(observation, dtype=float)
         if vector.shape[-1:] != (self._size,):
             raise ValueError(f"observation: expected {self._size} numbers, got shape {vector.shape}")
-        return vector[..., 5 : 5 + n], vector[..., 11 + n : 11 + 2 * n]
+        return vector[..., 1:5], vector[..., 5 : 5 + n], vector[..., 11 + n : 11 + 2 * n]
 
-    def _act(self, angles, velocities):
-        tuning = self._tuning
-        steps = self._clock[..., None]
-        walking = joint_targets(self._pattern, CONTROL_TIMESTEP * self._clock)
-        targets = np.where(steps < tuning.settle, self._pattern.centre, walking)
+
+class Tuned(NamedTuple):
+    """The published control of one of the four robots."""
+
+    tuning: Tuning
+    pattern: Pattern
+
+    @classmethod
+    def fit(cls, body: Body, preset: str, gait: gaits.Gait | None = None) -> Self:
+        """A preset, laid out over the robot's joints, in its own gait or another."""
+        tuning = TUNINGS[body.name]
+        preset = tuning.presets[preset]
+        if gait is not None:
+            tuning = tuning._replace(phase_offsets=gait.offsets)
+            preset = preset._replace(duty_factor=gait.duty_factor)
+        return cls(tuning, pattern(body, tuning, preset))
+
+    def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
+        """Actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
+        tuning = self.tuning
+        steps = clock[..., None]
+        walking = joint_targets(self.pattern, CONTROL_TIMESTEP * clock)
+        targets = np.where(steps < tuning.settle, self.pattern.centre, walking)
         ramp = (tuning.ramp_start + (1.0 - tuning.ramp_start) * steps / tuning.ramp).clip(max=1.0)
         return torques(targets, angles, velocities, ramp * tuning.stiffness, tuning.damping)
 

@@ -1,6 +1,6 @@
 """Bastion: a low, armoured hexapod with two-link legs, 0.5 m at the torso."""
 
-from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Solid, Torso, TrackingCamera
+from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",
@@ -61,5 +61,6 @@ BODY = Body(
         ),
     ),
     legs=(*LEFT_LEGS, *(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),
+    simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -5.0, 2.0)),
 )

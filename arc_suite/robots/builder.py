@@ -6,17 +6,10 @@ import numpy as np
 from dm_control import mjcf
 
 from arc_suite.robots.outline import outline
-from arc_suite.spec import Body, Leg, Solid
+from arc_suite.spec import Body, Joint, Leg, Simulation, Solid
 
-TIMESTEP = 0.002  # s, of one substep
 SOLVER_ITERATIONS = 200
 
-# Floor and robot each carry half of the published contact margin: since MuJoCo 3.5 a contact's
-# margin is the sum of the two geoms' margins, where it used to be the larger one.
-CONTACT = {"condim": 3, "friction": (1.0, 0.5, 0.5), "margin": 0.005}
-
-# Robot geoms meet only the floor (conaffinity 1), never one another.
-_TOUCHES_FLOOR = {"contype": 1, "conaffinity": 0, **CONTACT}
 _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
 # Cameras that ride along: azimuth from straight ahead and elevation, rad.
@@ -34,14 +27,16 @@ def build(body: Body) -> mjcf.RootElement:
     body for each and so change the observation.
 
     Args:
-        body: the spec.
+        body: the spec, with nothing left to be sized.
 
     Returns:
         The model, in radians, with the torso as a free body at its standing height.
     """
+    # Robot geoms meet only the floor (conaffinity 1), never one another.
+    touches_floor = {"contype": 1, "conaffinity": 0, "density": body.density, **contact(body.simulation)}
     root = mjcf.RootElement(model=body.name)
     root.compiler.angle = "radian"
-    root.option.timestep = TIMESTEP
+    root.option.timestep = body.simulation.timestep
     root.option.integrator = "implicitfast"
     root.option.solver = "Newton"
     root.option.iterations = SOLVER_ITERATIONS
@@ -51,11 +46,11 @@ def build(body: Body) -> mjcf.RootElement:
     torso = root.worldbody.add("body", name="torso", pos=(0.0, 0.0, body.torso.standing_height))
     torso.add("freejoint", name="root")
     for solid in body.torso.solids:
-        _add_solid(torso, solid, density=body.density, **_TOUCHES_FLOOR)
+        _add_solid(torso, solid, **touches_floor)
     for ballast in body.ballast:
         _add_solid(torso, ballast, mass=ballast.mass, **_TOUCHES_NOTHING)
     for leg in body.legs:
-        _add_leg(root, torso, leg, body.density)
+        _add_leg(root, torso, leg, touches_floor, body.simulation)
     _add_cameras(torso, body)
 
     # The accelerometer is what makes every mj_step fill cfrc_ext, which the task observes: MuJoCo
@@ -63,6 +58,17 @@ def build(body: Body) -> mjcf.RootElement:
     site = torso.add("site", name="torso", size=(0.01,), group=4)
     root.sensor.add("accelerometer", name="torso_acceleration", site=site)
     return root
+
+
+def contact(simulation: Simulation) -> dict:
+    """How floor and robot touch, as attributes of a geom; what has no dimension is the same for all."""
+    return {
+        "condim": 3,
+        "friction": (1.0, 0.5, 0.5),
+        "margin": simulation.contact_margin,
+        "solref": (simulation.contact_time, 1.0),
+        "solimp": (0.9, 0.95, simulation.contact_width, 0.5, 2.0),
+    }
 
 
 def _add_solid(torso, solid: Solid, **attributes) -> None:
@@ -77,14 +83,13 @@ def _add_solid(torso, solid: Solid, **attributes) -> None:
     )
 
 
-def _add_leg(root, torso, leg: Leg, density: float) -> None:
-    geom = {"density": density, **_TOUCHES_FLOOR}
+def _add_leg(root, torso, leg: Leg, geom, simulation: Simulation) -> None:
     parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
     for link in leg.links:
         name = leg.full_name(link)
         parent = parent.add("body", name=name, pos=pos, euler=(0.0, 0.0, yaw))
         if link.joint:
-            _add_joint(root, parent, leg, link.joint)
+            _add_joint(root, parent, leg, link.joint, simulation)
         parent.add("geom", name=name, type="capsule", fromto=(0.0, 0.0, 0.0, *link.end), size=(link.radius,), **geom)
         pos, yaw = link.end, 0.0
     name = leg.full_name(leg.foot)
@@ -93,7 +98,7 @@ def _add_leg(root, torso, leg: Leg, density: float) -> None:
     foot.add("site", name=name, size=(leg.foot.radius,), group=4)
 
 
-def _add_joint(root, link, leg: Leg, joint) -> None:
+def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> None:
     element = link.add(
         "joint",
         name=leg.full_name(joint),
@@ -103,6 +108,7 @@ def _add_joint(root, link, leg: Leg, joint) -> None:
         range=[math.radians(angle) for angle in joint.range_deg],
         armature=joint.armature,
         damping=joint.damping,
+        solreflimit=(simulation.contact_time, 1.0),
     )
     root.actuator.add(
         "motor",

@@ -1,17 +1,28 @@
-"""Bodies made to order: a number of legs, a number of links, and sensible defaults for everything else."""
+"""Bodies made to order: a number of legs and links with sensible defaults, or random ones of all proportions.
+
+What they are made of is geometry alone; motors and constants are sized to it (see `sizing`). With
+all joints at zero they stand with every foot on the floor.
+"""
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
-from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Solid, SpecError, Torso, TrackingCamera, Vector
+import numpy as np
+
+from arc_suite import names
+from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, SpecError, Torso, Vector
 
 LEGS = (4, 12)  # fewest and most
 LINKS = (1, 4)
+SCALE = (0.01, 100.0)
+LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
 # elevation above the horizontal in degrees. The first link sweeps, the others bend.
 _PROFILES = {
     1: ((1.0, -50.0),),
-    2: ((0.4, -10.0), (0.6, -75.0)),
+    2: ((0.3, 5.0), (0.7, -55.0)),
     3: ((0.25, 10.0), (0.35, -30.0), (0.4, -80.0)),
     4: ((0.2, 10.0), (0.25, 15.0), (0.25, -35.0), (0.3, -80.0)),
 }
@@ -23,54 +34,198 @@ _LINK_NAMES = {
 }
 _JOINT_NAMES = ("hip", "knee", "ankle", "toe")
 
-_DENSITY = 10.0  # kg/m^3, Queen's; so are the joints and motors
-_HIP = Joint(
-    name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-40.0, 40.0), armature=1.0, damping=1.0, motor=Motor(gear=120.0)
-)
-_BEND = _HIP.replace(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0), armature=2.0, damping=10.0)
+_HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-45.0, 45.0))
+_BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
 
-_DROP = 0.4  # m, from the mounts to the floor
-_SPACING = 0.2  # m, between neighbouring legs of a side
-_FAN = 35.0  # degrees, by which the first pair of legs points forward and the last one backward
+_HEIGHT = 0.4  # m
+_SPACING = 0.5  # of the height, between neighbouring legs of a side
+_REACH = 0.9  # of the height, from mount to foot
 
 
-def generate(legs: int, links: int) -> Body:
+class _Proportions(NamedTuple):
+    """Everything that makes a body beside its counts; lengths of the torso are half-extents.
+
+    Attributes:
+        height: from the floor to the mounts, m.
+        half_length, half_width: of the torso, m.
+        thickness: half of it, of the height.
+        fan: degrees by which the first pair of legs points forward and the last one backward.
+        profile: of every leg; see `_PROFILES`.
+        reaches: of each pair, or of each leg around a torso: from mount to foot, seen from above, of
+            the height.
+    """
+
+    height: float
+    half_length: float
+    half_width: float
+    thickness: float
+    fan: float
+    profile: Sequence[tuple[float, float]]
+    reaches: Sequence[float]
+
+
+def generate(legs: int, links: int, layout: str | None = None) -> Body:
     """A body with so many legs of so many links.
 
-    An even number of legs stands in mirrored pairs, l1 r1 being the first, along a long torso; an
-    odd number stands around a round torso, leg1 pointing forward and the others counting counter-clockwise.
-    All feet touch the floor with all joints at zero.
+    Pairs stand mirrored along a long torso, l1 and r1 in front. Radial legs stand around a round
+    torso, counting counter-clockwise; of an odd number, leg1 points forward.
 
     Args:
         legs: 4 to 12.
         links: actuated links of each leg, 1 to 4.
+        layout: pairs, for an even number of legs, or radial; None for pairs where there can be.
 
     Returns:
-        The body, `walker_<legs>x<links>`.
+        The body, `walker_<legs>x<links>`, 0.4 m high.
 
     Raises:
-        SpecError: a number out of range; one line that names it.
+        SpecError: a value out of range; one line that names it.
     """
     _check_count("legs", legs, LEGS)
     _check_count("links", links, LINKS)
-    if legs % 2:
-        half_length = half_width = _SPACING * legs / (2.0 * math.pi)
-        all_legs = _around(legs, links, half_length)
+    layout = _check_layout(layout, legs)
+    if layout == "radial":
+        half_length = half_width = _SPACING * _HEIGHT * legs / (2.0 * math.pi)
     else:
-        half_length, half_width = _SPACING * legs / 4.0, 0.15
-        left = _left_side(legs // 2, links, half_length, half_width)
-        all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
-    reach = max(math.hypot(*leg.foot_position[:2]) for leg in all_legs)
-    return Body(
-        name=f"walker_{legs}x{links}",
-        density=_DENSITY,
-        torso=Torso(
-            standing_height=_DROP,
-            solids=(Solid(name="chassis", shape="ellipsoid", size=(half_length, half_width, 0.25 * _DROP)),),
-        ),
-        legs=all_legs,
-        camera=TrackingCamera(position=(0.0, -4.0 * reach, 1.6 * reach)),
+        half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
+    proportions = _Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, _PROFILES[links], (_REACH,) * legs)
+    return _body(f"walker_{legs}x{links}", legs, layout, proportions)
+
+
+def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
+    """A random body, the same for the same arguments.
+
+    Drawn are, where not given, 4 to 12 legs, 2 to 4 links and, for an even number of legs, the
+    layout, radial for three in ten; and always:
+
+    - half of the torso's length, log-uniform from 0.08 to 1.2 m;
+    - the height at which it stands, 0.6 to 1.4 times that;
+    - its half-width, 0.35 to 0.7 times its half-length (radial: all of it), and its
+      half-thickness, 0.15 to 0.3 times the height;
+    - by how much legs fan out, 15 to 45 degrees;
+    - the legs' profile, each link's share of the length within 20 % and its elevation within 8
+      degrees of `generate`'s;
+    - how far legs reach out, 0.7 to 1.2 times the height; for four bodies in ten legs are unequal,
+      each pair (radial: each leg) reaching 0.75 to 1.3 times that.
+
+    Args:
+        seed: 0 or more.
+        legs: 4 to 12.
+        links: 1 to 4.
+        layout: pairs or radial.
+
+    Returns:
+        The body, `random_<seed>`.
+
+    Raises:
+        SpecError: a value out of range; one line that names it.
+    """
+    _check_count("seed", seed, (0, 2**32 - 1))
+    random = np.random.default_rng(seed)
+    drawn_legs, drawn_links = (int(random.integers(low, high + 1)) for low, high in (LEGS, (2, LINKS[1])))
+    legs, links = drawn_legs if legs is None else legs, drawn_links if links is None else links
+    _check_count("legs", legs, LEGS)
+    _check_count("links", links, LINKS)
+    drawn_layout = "radial" if random.uniform() < 0.3 or legs % 2 else "pairs"
+    layout = _check_layout(layout or drawn_layout, legs)
+    half_length = math.exp(random.uniform(math.log(0.08), math.log(1.2)))
+    height = half_length * random.uniform(0.6, 1.4)
+    width = random.uniform(0.35, 0.7)
+    unequal = random.uniform() < 0.4
+    reaches = random.uniform(0.7, 1.2) * (random.uniform(0.75, 1.3, legs) if unequal else np.ones(legs))
+    proportions = _Proportions(
+        height=height,
+        half_length=half_length,
+        half_width=half_length * (1.0 if layout == "radial" else width),
+        thickness=random.uniform(0.15, 0.3),
+        fan=random.uniform(15.0, 45.0),
+        profile=[
+            (share * random.uniform(0.8, 1.2), elevation + random.uniform(-8.0, 8.0))
+            for share, elevation in _PROFILES[links]
+        ],
+        reaches=tuple(map(float, reaches)),
     )
+    return _body(f"random_{seed}", legs, layout, proportions)
+
+
+def scaled(body: Body, factor: float) -> Body:
+    """The body with all lengths multiplied, to be sized anew.
+
+    Args:
+        body: to scale.
+        factor: 0.01 to 100.
+
+    Raises:
+        SpecError: the factor, or a length of the scaled body, is out of range; one line that names it.
+    """
+    low, high = SCALE
+    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not low <= factor <= high:
+        raise SpecError(f"scale: expected a number from {low:g} to {high:g}, got {factor!r}")
+
+    def times(lengths: Sequence[float]) -> tuple[float, ...]:
+        return tuple(factor * length for length in lengths)
+
+    def solid(shape: Solid) -> Solid:
+        mass = {"mass": factor**3 * shape.mass} if isinstance(shape, Ballast) else {}
+        return shape.replace(size=times(shape.size), position=times(shape.position), **mass)
+
+    def leg(leg: Leg) -> Leg:
+        links = tuple(link.replace(end=times(link.end), radius=factor * link.radius) for link in leg.links)
+        foot = leg.foot.replace(radius=factor * leg.foot.radius)
+        return leg.replace(mount=times(leg.mount), links=links, foot=foot)
+
+    torso = Torso(standing_height=factor * body.torso.standing_height, solids=tuple(map(solid, body.torso.solids)))
+    ballast = tuple(map(solid, body.ballast))
+    return _opened(body.replace(torso=torso, ballast=ballast, legs=tuple(map(leg, body.legs))))
+
+
+def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
+    """A body a little different, the same for the same arguments; mirrored legs stay mirrored and feet at their height.
+
+    Args:
+        body: to change.
+        seed: 0 or more.
+        amount: standard deviation of the logarithm of lengths, and of leg's headings in rad; 0 to 0.5.
+
+    Returns:
+        The body, to be sized anew.
+
+    Raises:
+        SpecError: a value out of range, or a length grown out of range; one line that names it.
+    """
+    _check_count("seed", seed, (0, 2**32 - 1))
+    if isinstance(amount, bool) or not isinstance(amount, (int, float)) or not 0.0 <= amount <= 0.5:
+        raise SpecError(f"amount: expected a number from 0 to 0.5, got {amount!r}")
+    random = np.random.default_rng(seed)
+    legs: dict[str, Leg] = {}
+    for leg in body.legs:
+        if leg.name in legs:
+            continue
+        legs[leg.name] = changed = _mutated_leg(leg, random, amount)
+        for other in body.legs:
+            if other.name not in legs and leg.mirrored(other.name) == other:
+                legs[other.name] = changed.mirrored(other.name)
+    return _opened(body.replace(legs=tuple(legs[leg.name] for leg in body.legs)))
+
+
+def _mutated_leg(leg: Leg, random: np.random.Generator, amount: float) -> Leg:
+    ends = np.array([link.end for link in leg.links])
+    drop = ends[:, 2].sum()
+    ends *= np.exp(amount * random.standard_normal((len(ends), 1)))
+    if ends[:, 2].sum() * drop > 0.0:
+        ends[:, 2] *= drop / ends[:, 2].sum()
+    links = tuple(link.replace(end=tuple(map(float, end))) for link, end in zip(leg.links, ends, strict=True))
+    return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(amount * random.standard_normal()))
+
+
+def _opened(body: Body) -> Body:
+    """The body with all that can be sized left open."""
+
+    def opened(link: Link) -> Link:
+        return link.replace(joint=link.joint and link.joint.replace(armature=None, damping=None, motor=None))
+
+    legs = tuple(leg.replace(links=tuple(map(opened, leg.links))) for leg in body.legs)
+    return body.replace(legs=legs, simulation=None, camera=None)
 
 
 def _check_count(name: str, value, bounds: tuple[int, int]) -> None:
@@ -79,32 +234,56 @@ def _check_count(name: str, value, bounds: tuple[int, int]) -> None:
         raise SpecError(f"{name}: expected a whole number from {low} to {high}, got {value!r}")
 
 
-def _left_side(pairs: int, links: int, half_length: float, half_width: float) -> tuple[Leg, ...]:
+def _check_layout(layout: str | None, legs: int) -> str:
+    if layout is None:
+        return "radial" if legs % 2 else "pairs"
+    if layout == "pairs" and legs % 2:
+        raise SpecError(f"layout: expected radial for an odd number of legs, got 'pairs' for {legs}")
+    return names.check(layout, LAYOUTS, "layout")
+
+
+def _body(name: str, legs: int, layout: str, proportions: _Proportions) -> Body:
+    p = proportions
+    if layout == "radial":
+        all_legs = _around(legs, p)
+    else:
+        left = _left_side(legs // 2, p)
+        all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
+    size = (p.half_length, p.half_width, p.thickness * p.height)
+    chassis = Solid(name="chassis", shape="ellipsoid", size=size)
+    return Body(name=name, torso=Torso(standing_height=p.height, solids=(chassis,)), legs=all_legs)
+
+
+def _left_side(pairs: int, p: _Proportions) -> tuple[Leg, ...]:
     legs = []
     for i in range(pairs):
         along = 1.0 - 2.0 * i / (pairs - 1)  # 1 for the first leg, -1 for the last one
-        mount = (0.8 * half_length * along, 0.6 * half_width, 0.0)
-        legs.append(_leg(f"l{i + 1}", mount, 90.0 - _FAN * along, links))
+        mount = (0.8 * p.half_length * along, 0.6 * p.half_width, 0.0)
+        legs.append(_leg(f"l{i + 1}", mount, 90.0 - p.fan * along, p.reaches[i], p))
     return tuple(legs)
 
 
-def _around(legs: int, links: int, radius: float) -> tuple[Leg, ...]:
-    headings = [(360.0 * i / legs + 180.0) % 360.0 - 180.0 for i in range(legs)]
-    return tuple(
-        _leg(f"leg{i + 1}", (0.8 * radius * _cos(heading), 0.8 * radius * _sin(heading), 0.0), heading, links)
-        for i, heading in enumerate(headings)
-    )
+def _around(legs: int, p: _Proportions) -> tuple[Leg, ...]:
+    # An even number leaves the front free, so that both sides have as many.
+    start = 0.0 if legs % 2 else 180.0 / legs
+    all_legs = []
+    for i in range(legs):
+        heading = (start + 360.0 * i / legs + 180.0) % 360.0 - 180.0
+        mount = (0.8 * p.half_length * _cos(heading), 0.8 * p.half_width * _sin(heading), 0.0)
+        all_legs.append(_leg(f"leg{i + 1}", mount, heading, p.reaches[i], p))
+    return tuple(all_legs)
 
 
-def _leg(name: str, mount: Vector, heading: float, links: int) -> Leg:
-    """A leg that points to a heading (degrees, counter-clockwise from forward) and reaches the floor."""
-    profile = _PROFILES[links]
-    foot_radius = 0.06 * _DROP
-    length = (_DROP - foot_radius) / -sum(share * _sin(elevation) for share, elevation in profile)
+def _leg(name: str, mount: Vector, heading: float, reach: float, p: _Proportions) -> Leg:
+    """A leg that points to a heading (degrees, counter-clockwise from forward) and ends on the floor."""
+    links = len(p.profile)
+    foot_radius = 0.06 * p.height
+    out = reach * p.height / sum(share * _cos(elevation) for share, elevation in p.profile)
+    down = (p.height - foot_radius) / -sum(share * _sin(elevation) for share, elevation in p.profile)
     chain = []
-    for i, (share, elevation) in enumerate(profile):
+    for i, (share, elevation) in enumerate(p.profile):
         # Links lie in the y-z plane of the first link's frame, which the leg's yaw turns outwards.
-        end = (0.0, share * length * _cos(elevation), share * length * _sin(elevation))
+        end = (0.0, out * share * _cos(elevation), down * share * _sin(elevation))
         joint = (_HIP if i == 0 else _BEND).replace(name=_JOINT_NAMES[i])
         radius = 0.8 * foot_radius * (1.0 + 0.35 * (links - 1 - i))  # thinner than the foot, so that the foot touches
         chain.append(Link(name=_LINK_NAMES[links][i], end=end, radius=radius, joint=joint))

@@ -1,6 +1,6 @@
 """Leaper: a small, ball-bodied quadruped with three-link legs on rigid shoulders, 0.5 m."""
 
-from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Solid, Torso, TrackingCamera
+from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",
@@ -51,5 +51,6 @@ BODY = Body(
         solids=(Solid(name="torso_geom", shape="sphere", size=(0.15,), position=(0.0, 0.0, 0.0)),),
     ),
     legs=tuple(leg for left in LEFT_LEGS for leg in (left, left.mirrored(left.name[0] + "r"))),
+    simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -4.0, 1.5)),
 )

@@ -1,6 +1,6 @@
 """Queen: a tall hexapod with three-link legs under a wide shell, 0.75 m at the torso."""
 
-from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Solid, Torso, TrackingCamera
+from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",
@@ -72,5 +72,6 @@ BODY = Body(
         Ballast(name="carapace_main", shape="ellipsoid", size=(0.55, 0.65, 0.15), position=(0.0, 0.0, 0.25), mass=10.0),
     ),
     legs=(*LEFT_LEGS, *(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),
+    simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -7.0, 3.0)),
 )

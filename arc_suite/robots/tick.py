@@ -1,6 +1,6 @@
 """Tick: a small insect with high knees, Queen's kinematics at a quarter of her height, 0.18 m."""
 
-from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Solid, Torso, TrackingCamera
+from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",
@@ -37,5 +37,6 @@ BODY = Body(
         solids=(Solid(name="chassis", shape="ellipsoid", size=(0.18, 0.115, 0.055), position=(0.0, 0.0, -0.005)),),
     ),
     legs=(*LEFT_LEGS, *(leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),
+    simulation=Simulation(),
     camera=TrackingCamera(position=(0.0, -3.0, 1.2)),
 )

@@ -8,15 +8,17 @@ import numpy as np
 from dm_control import mujoco
 from dm_control.rl import control
 
-from arc_suite import names, seeding
+from arc_suite import gaits, names, seeding
 from arc_suite.physics import Physics
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.sizing import SUBSTEPS, control_timestep
 from arc_suite.spec import Body
 from arc_suite.tasks import rewards
+from arc_suite.tasks.fitting import fitted_settings
 from arc_suite.tasks.readings import layout
 from arc_suite.tasks.walker import Walker
 
-SUBSTEPS = 25
-TIME_LIMIT = 50.0  # s: 1000 control steps
+HORIZON = 1000  # control steps
 
 # Signed weights of the ten terms (Section 4), the same for all robots but for "control".
 WEIGHTS = {
@@ -101,12 +103,13 @@ class Settings(NamedTuple):
 
 
 def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
-    """The settings of a robot, some of them overridden.
+    """The settings of a body, some of them overridden.
 
     Args:
-        body: a robot of the table.
-        overrides: fields of `rewards.Parameters`, "base_noise", "joint_noise", and "weights", a
-            mapping of the terms to change.
+        body: a robot of the table, or any other body, whose numbers are fitted to it.
+        overrides: fields of `rewards.Parameters`, "base_noise", "joint_noise", "weights", a
+            mapping of the terms to change, and "gait", a name of `gaits.NAMES`, which sets the
+            duty factor and the phase offsets that are not set themselves.
 
     Returns:
         The settings, checked.
@@ -114,9 +117,14 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
     Raises:
         ValueError: an unknown name, or a value that does not fit; one line that names it.
     """
-    table = COMMON | SETTINGS[names.check(body.name, SETTINGS, "walker")]
+    row = SETTINGS.get(body.name) if ROBOTS.get(body.name) == body else None
+    table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
     for name in overrides:
-        names.check(name, table, "setting of walk")
+        names.check(name, [*table, "gait"], "setting of walk")
+    if overrides.get("gait") is not None:
+        gait = gaits.gait(body, overrides["gait"])
+        offsets = tuple(2.0 * math.pi * offset for offset in gait.offsets)
+        table |= {"duty_factor": gait.duty_factor, "phase_offsets": offsets}
     weights, changed = WEIGHTS | table["weights"], overrides.get("weights") or {}
     if not isinstance(changed, Mapping):
         raise ValueError(f"weights: expected a mapping of names to numbers, got {changed!r}")
@@ -290,7 +298,7 @@ class Walk(control.Task):
 
 def walk(
     body: Body,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     random=None,
     on_divergence: str = "raise",
     environment_kwargs=None,
@@ -299,8 +307,8 @@ def walk(
     """An environment in which the body walks.
 
     Args:
-        body: a robot of `SETTINGS`.
-        time_limit: s; may be infinite.
+        body: any body.
+        time_limit: s, may be infinite; None for 1000 control steps.
         random: a `RandomState`, or what one is seeded with.
         on_divergence: "raise" or "terminate"; see `Walk`.
         environment_kwargs: `flat_observation`, to get one vector in place of the blocks.
@@ -313,7 +321,9 @@ def walk(
         ValueError: an unknown name, or a value that does not fit; one line that names it.
     """
     chosen = settings(body, overrides)
-    if time_limit != math.inf:
+    if time_limit is None:
+        time_limit = (HORIZON - 0.5) * control_timestep(body)  # half a step short, so that rounding adds no step
+    elif time_limit != math.inf:
         time_limit = _number("time_limit", time_limit, 1e-9)
     for name in environment_kwargs or {}:
         names.check(name, ["flat_observation"], "environment setting")

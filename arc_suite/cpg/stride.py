@@ -1,0 +1,160 @@
+"""A demonstrator's pattern for any body, from the Jacobians of its feet in the standing pose.
+
+In stance every foot is to move straight back as fast as the body is to move forward; in swing it
+returns and is lifted. Both are directions in a leg's joint space, found by damped least squares,
+so that neither search nor inverse kinematics is needed.
+"""
+
+import math
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from arc_suite.cpg.law import Pattern, joint_targets, torques
+from arc_suite.gaits import Gait
+from arc_suite.robots.sizing import GRAVITY, control_timestep, natural_frequency, sized
+from arc_suite.robots.stance import stance
+from arc_suite.spec import Body, Leg
+from arc_suite.tasks.fitting import GAIT_FREQUENCY
+
+LIFT = 0.2  # of the standing height: how far a foot is lifted in mid-swing
+
+# A leg that cannot sweep, such as a radial one in front, would brake: it is held this share of the
+# standing height off the ground in stance too, and carries only when the others sink or tilt.
+UNLOAD = 0.1
+
+LARGEST_SWEEP = 0.5  # rad, of a joint to either side
+LARGEST_LIFT = 0.9  # rad
+_USED = 0.9  # share of a joint's range that targets may use
+
+# How much it matters that a foot moves as wanted along x, y and z. In stance it must not rise or
+# sink; if it slips sideways all of its friction points there and none of it brakes the body.
+_SWEEP_WEIGHTS = (1.0, 0.1, 4.0)
+_LIFT_WEIGHTS = (0.2, 0.2, 1.0)
+_DAMPING = 0.1  # of the leg's largest Jacobian entry
+
+ONSET = 1.0  # cycles over which the gait grows to its full size
+STEERING = 1.5  # share of the sweep per rad of yaw, for the outermost feet
+LARGEST_YAW = 0.5  # rad, that is answered to
+
+
+class Stride(NamedTuple):
+    """Control of a body by position: each joint follows its target and the target's velocity.
+
+    Attributes:
+        pattern: of the joints.
+        control_timestep: s.
+        stiffness: (joints,) action per rad.
+        damping: (joints,) action per rad/s.
+        steering: (joints,) by which share the sweep of the joint's leg answers to a yaw of 1 rad.
+    """
+
+    pattern: Pattern
+    control_timestep: float
+    stiffness: np.ndarray
+    damping: np.ndarray
+    steering: np.ndarray
+
+    @classmethod
+    def fit(cls, body: Body, froude: float, gait: Gait) -> Self:
+        """Fits the stride to a body.
+
+        Args:
+            body: the spec.
+            froude: wanted speed as a share of sqrt(g h), from -1 to 1 and not 0; where legs are too
+                short for it, they sweep as far as they reach. A negative one walks backwards.
+            gait: when each leg stands.
+
+        Raises:
+            ValueError: such a speed cannot be.
+        """
+        if not (isinstance(froude, (int, float)) and 1e-3 <= abs(froude) <= 1.0):
+            raise ValueError(f"froude: expected a number from 0.001 to 1, or negative, got {froude!r}")
+        body = sized(body)
+        standing = stance(body)
+        cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / standing.height)
+        speed = froude * math.sqrt(GRAVITY * standing.height)
+        # A foot on the ground covers from +reach to -reach while its stance lasts.
+        reach = 0.5 * speed * gait.duty_factor / cycle
+        joints = [joint for leg in body.legs for joint in leg.joints]
+        counts = [len(leg.joints) for leg in body.legs]
+        sweeps, lifts, raised = [], [], []
+        for leg, jacobian in zip(body.legs, standing.jacobians, strict=True):
+            sweep = _sweep(leg, jacobian, reach)
+            lift = _lift(leg, jacobian, LIFT * standing.height)
+            able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
+            sweeps.append(sweep)
+            lifts.append(lift)
+            raised.append((1.0 - able) * UNLOAD / LIFT * lift)
+        inertia = standing.inertias + [joint.armature for joint in joints]
+        gear = np.array([joint.motor.gear for joint in joints])
+        friction = np.array([joint.damping for joint in joints])
+        frequency = natural_frequency(body)
+        lateral = standing.soles[:, 1] / max(abs(standing.soles[:, 1]).max(), 1e-9)
+        return cls(
+            pattern=Pattern(
+                frequency=cycle,
+                duty_factor=gait.duty_factor,
+                offset=np.repeat(gait.offsets, counts),
+                sweep=np.concatenate(sweeps),
+                centre=np.concatenate(raised),
+                stance=np.zeros(len(joints)),
+                swing=np.concatenate(lifts),
+            ),
+            control_timestep=control_timestep(body),
+            stiffness=inertia * frequency**2 / gear,
+            damping=(2.0 * inertia * frequency - friction).clip(0.0) / gear,
+            steering=math.copysign(STEERING, froude) * np.repeat(lateral, counts),
+        )
+
+    def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
+        """Actions (..., joints) after `clock` (...) control steps."""
+        w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))[..., None]
+        # Turned to the left, legs on the left take longer strides.
+        pattern = self.pattern._replace(
+            sweep=self.pattern.sweep * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))
+        )
+        time = self.control_timestep * clock
+        onset = (pattern.frequency * time[..., None] / ONSET).clip(max=1.0)
+        targets = onset * joint_targets(pattern, time)
+        ahead = onset * joint_targets(pattern, time + self.control_timestep)
+        target_velocities = (ahead - targets) / self.control_timestep
+        return torques(targets, angles, velocities - target_velocities, self.stiffness, self.damping)
+
+
+def _sweep(leg: Leg, jacobian, reach: float) -> np.ndarray:
+    """The joint angles (joints of the leg,) that bring a leg's foot forward by `reach`, and back if negated."""
+    low, high = _ranges(leg)
+    room = np.minimum(np.minimum(-low, high), LARGEST_SWEEP)
+    return _towards(jacobian, (reach, 0.0, 0.0), _SWEEP_WEIGHTS, room, room)
+
+
+def _lift(leg: Leg, jacobian, height: float) -> np.ndarray:
+    """The joint angles (joints of the leg,) that lift a leg's foot by a height."""
+    low, high = _ranges(leg)
+    return _towards(
+        jacobian, (0.0, 0.0, height), _LIFT_WEIGHTS, np.minimum(-low, LARGEST_LIFT), np.minimum(high, LARGEST_LIFT)
+    )
+
+
+def _ranges(leg: Leg) -> np.ndarray:
+    """Lower and upper bounds (2, joints of the leg) of targets, rad."""
+    return _USED * np.radians([joint.range_deg for joint in leg.joints]).T
+
+
+def _towards(jacobian, displacement, weights, below, above) -> np.ndarray:
+    """Joint angles (joints,) that move a foot by a displacement, to first order and within bounds.
+
+    Damped least squares give the direction; along it, plain least squares give the length, which
+    the room `below` and `above` zero bounds.
+    """
+    wanted = np.array(weights) * displacement
+    weighted = np.diag(weights) @ jacobian
+    damping = _DAMPING * abs(jacobian).max()
+    square = weighted.T @ weighted + damping**2 * np.eye(jacobian.shape[1])
+    angles = np.linalg.solve(square, weighted.T @ wanted)
+    moved = weighted @ angles
+    angles *= moved @ wanted / max(moved @ moved, 1e-12 * (wanted @ wanted))
+    room = np.where(angles > 0.0, above, below)
+    return angles * min(1.0, np.min(room / np.maximum(abs(angles), 1e-12)))

@@ -1,0 +1,76 @@
+"""Walk's numbers for a body that has none of its own, from its standing pose.
+
+Speeds are multiples of sqrt(g h) (a Froude number of speed / sqrt(g h)), frequencies of
+sqrt(g / h) and lengths of h, the height at which the torso stands, so that bodies of one shape and
+different size get the same task. The multiples lie among those of the published robots.
+"""
+
+import functools
+import math
+
+import numpy as np
+
+from arc_suite import gaits
+from arc_suite.robots.sizing import GRAVITY
+from arc_suite.robots.stance import stability_margin, stance
+from arc_suite.spec import Body
+
+TARGET_FROUDE = 0.2  # published robots: 0.18 to 0.27
+BAND = 0.75  # of the target velocity; published: 0.6 to 1
+GAIT_FREQUENCY = 0.18  # of sqrt(g / h); published: 0.2 to 0.41, with feet that slip
+STANCE_HEIGHT = 0.04  # of h, by which a foot in stance may be off the ground
+HEALTHY_RANGE = (0.4, 1.8)  # of h; published: 0.3 to 0.44, and 1.6 to 2
+BASE_NOISE = 0.05  # of h; published: 0.03 to 0.2
+
+# Duty factors to choose from: the smallest is the published one, and the fastest.
+_DUTY_FACTORS = (0.6, 0.65, 0.7, 0.75, 0.8)
+_STABLE = 0.05  # of h: static stability margin that is enough throughout a cycle
+
+
+def fitted_settings(body: Body) -> dict:
+    """A row of walk's table for any body: the same keys, units as in `rewards.Parameters`."""
+    height = body.torso.standing_height
+    speed = TARGET_FROUDE * math.sqrt(GRAVITY * height)
+    gait = fitted_gait(body)
+    return {
+        "target_velocity": speed,
+        "velocity_band": BAND * speed,
+        "gait_frequency": GAIT_FREQUENCY * math.sqrt(GRAVITY / height),
+        "duty_factor": gait.duty_factor,
+        "phase_offsets": tuple(2.0 * math.pi * offset for offset in gait.offsets),
+        "stance_threshold": max(leg.foot.radius for leg in body.legs) + STANCE_HEIGHT * height,
+        "healthy_range": tuple(share * height for share in HEALTHY_RANGE),
+        "base_noise": BASE_NOISE * height,
+        "weights": {},
+    }
+
+
+@functools.lru_cache(maxsize=256)
+def fitted_gait(body: Body) -> gaits.Gait:
+    """The metachronal gait of least duty factor that is statically stable all through its cycle.
+
+    If none is, the one whose worst moment is the most stable.
+    """
+    choices = [gaits.metachronal(body, duty_factor) for duty_factor in _DUTY_FACTORS]
+    margins = [least_margin(body, gait) for gait in choices]
+    enough = _STABLE * body.torso.standing_height
+    best = next((i for i, margin in enumerate(margins) if margin >= enough), int(np.argmax(margins)))
+    return choices[best]
+
+
+def least_margin(body: Body, gait: gaits.Gait) -> float:
+    """Static stability margin (m) at the worst moment of a gait at the target velocity.
+
+    Feet on the ground pass from ahead of where they stand at rest to as far behind while the
+    torso moves over them; the centre of mass is taken to rest in the torso.
+    """
+    standing = stance(body)
+    ahead = 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * standing.height
+    margins = []
+    for time in np.arange(40) / 40.0:
+        cycle = (time + np.array(gait.offsets)) % 1.0
+        feet = cycle < gait.duty_factor
+        soles = standing.soles[feet, :2]
+        soles[:, 0] += ahead * (1.0 - 2.0 * cycle[feet] / gait.duty_factor)
+        margins.append(stability_margin(standing.centre, soles))
+    return min(margins)
