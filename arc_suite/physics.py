@@ -68,6 +68,8 @@ class Physics(dm_mujoco.Physics):
             option.disableflags = flags | _SENSOR
             mujoco.mj_step(model, data, nstep - 1)
             option.disableflags = flags
+        elif nstep != 1:
+            raise ValueError(f"nstep: expected an integer from 1, got {nstep!r}")
         mujoco.mj_step(model, data)
         self.divergence = self._describe_divergence(time) if np.count_nonzero(self._warnings) else None
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from arc_suite import names
+from arc_suite import names, seeding
 from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
@@ -32,7 +32,7 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
     """
     names.check(preset, PRESETS, "preset")
     body = robot if isinstance(robot, Body) else ROBOTS[names.check(robot, ROBOTS, "robot")]
-    if ":" in name:
+    if isinstance(name, str) and ":" in name:
         return _from_path(name, robot)
     names.check(name, POLICIES, "policy")
     if name == "cpg":
@@ -40,7 +40,7 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
     size = len(body.joint_names)
     if name == "zero":
         return lambda time_step: np.zeros(size)
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(None if seed is None else seeding.check(seed))
     return lambda time_step: random.uniform(-1.0, 1.0, size)
 
 

@@ -36,8 +36,8 @@ def register(
     Args:
         body: of the robot; its name becomes a domain.
         walk: the robot's row of numbers in the task walk: keys and units as in `tasks.walk.SETTINGS`,
-            and any of `tasks.walk.COMMON`.
-        tuning: for a demonstrator of the robot.
+            and any of `tasks.walk.COMMON`; None to have them fitted to the body.
+        tuning: for a demonstrator of the robot; None to have one fitted likewise.
         look: what the robot wears; None for what every body wears.
         tasks: factories by name, called as `tasks.walk.walk` is: with a body, `environment_kwargs` and
             the caller's `task_kwargs`, `random` among them. The environment's physics is a

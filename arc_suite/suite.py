@@ -2,6 +2,7 @@
 
 import importlib
 import os
+from collections.abc import Mapping
 
 from arc_suite import names
 from arc_suite.robots import ROBOTS
@@ -59,6 +60,9 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
         OSError: a file that cannot be read.
     """
     body, task = body_of(domain_name), _find(task_name, TASKS, "task")
+    for name, kwargs in (("task_kwargs", task_kwargs), ("environment_kwargs", environment_kwargs)):
+        if not isinstance(kwargs, Mapping | None):
+            raise ValueError(f"{name}: expected a mapping of names to values, got {kwargs!r}")
     environment = task(body, environment_kwargs=environment_kwargs, **(task_kwargs or {}))
     environment.task.visualize_reward = visualize_reward
     return environment

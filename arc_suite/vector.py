@@ -218,12 +218,18 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             float32, m. None without a render mode.
 
         Raises:
+            ValueError: no such row.
             RenderingUnavailable: no OpenGL here.
             ClosedEnvironmentError: after `close`.
         """
         if self.render_mode is None:
             return None
-        return tuple(self._render_row(row) for row in (range(self.num_envs) if rows is None else rows))
+        every = range(self.num_envs)
+        rows = every if rows is None else list(rows)
+        for row in rows:
+            if row not in every:
+                raise ValueError(f"rows: expected integers from 0 to {self.num_envs - 1}, got {row!r}")
+        return tuple(self._render_row(row) for row in rows)
 
     def close_extras(self) -> None:
         """Frees the simulations and what they were rendered with."""

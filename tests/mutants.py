@@ -114,6 +114,11 @@ MUTANTS = (
         "feet of a random body above the floor", "robots/generator.py", "(p.height - foot_radius) /", "p.height * 0.9 /"
     ),
     Mutant("sign of zero kept", "spec.py", "float(value) + 0.0", "float(value)"),
+    Mutant("fork unnoticed", "forks.py", "    count += 1\n", "    count += 0\n"),
+    Mutant("batch destroyed in a forked child", "physics.py", "        forks.keep(self._simulations)\n", ""),
+    Mutant("picture of another moment", "physics.py", "        shared.pose(self)\n", ""),
+    Mutant("user's choice of OpenGL overwritten", "rendering.py", '"MUJOCO_GL" not in os.environ and ', ""),
+    Mutant("two threads in one vector environment", "vector.py", "not self._busy.acquire(blocking=False)", "False"),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
 )
 
