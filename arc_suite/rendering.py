@@ -151,7 +151,7 @@ def contexts(model):
         model: dm_control's `MjModel`; its `vis.global_` says how large pictures can be.
 
     Returns:
-        dm_control's `Contexts`, good until the next call with another model.
+        dm_control's `Contexts`, good until the function returns.
 
     Raises:
         RenderingUnavailable: no OpenGL here.
@@ -178,6 +178,7 @@ class _Renderer:
         backend = _backend()
         self._open = backend.Renderer
         self._gl = None
+        self._closed = False
         self._drawings = {}  # dm_control's model -> MuJoCo's context for it; the latest used comes last
         self._forks = forks.count
         forks.keep(self)
@@ -195,6 +196,8 @@ class _Renderer:
                 "cannot render: OpenGL was opened before this process was forked; "
                 "make no picture before the fork, or start processes with multiprocessing's spawn"
             )
+        if self._closed:
+            raise RenderingUnavailable("cannot render: the interpreter is ending, and has closed OpenGL")
         if self._thread in (None, threading.current_thread()):
             with self._busy:
                 return function()
@@ -237,6 +240,7 @@ class _Renderer:
         if self._forks == forks.count:
             with contextlib.suppress(Exception):  # another library may have closed the display already
                 self.call(self._free)
+            self._closed = True
         else:  # what is the parent's would hang
             egl = sys.modules.get(f"{_BACKEND}.pyopengl.egl_renderer")
             if egl is not None:

@@ -16,7 +16,6 @@ from tqdm import tqdm
 
 import arc_suite  # noqa: F401 (registers)
 
-BLOCK = 10_000  # steps between frames
 ROWS = 8
 GROWTH = 20.0  # MB, that 500 lives may cost
 WARM_UP = 0.1  # share of the samples that come before the memory's slope
@@ -33,8 +32,8 @@ def handles() -> tuple[int, int]:
     return len(os.listdir("/proc/self/task")), len(os.listdir("/proc/self/fd"))
 
 
-def soak(steps: int) -> tuple[float, set[tuple[int, int]], int]:
-    """Steps for long.
+def soak(steps: int, block: int) -> tuple[float, set[tuple[int, int]], int]:
+    """Steps for long, with a frame of each environment after every block of steps.
 
     Returns:
         Slope of the memory after the warm-up, MB per million steps; all pairs of threads and file
@@ -46,20 +45,20 @@ def soak(steps: int) -> tuple[float, set[tuple[int, int]], int]:
     single.reset(seed=0)
     rows.reset(seed=0)
     samples, seen, resets = [], set(), 0
-    for _ in tqdm(range(steps // BLOCK), unit="block", smoothing=0.0):
-        for _ in range(BLOCK // 2):
+    for _ in tqdm(range(steps // block), unit="block", smoothing=0.0):
+        for _ in range(block // 2):
             _, _, terminated, truncated, _ = single.step(random.uniform(-1, 1, 18).astype(np.float32))
             if terminated or truncated:
                 single.reset()
                 resets += 1
-        for _ in range(BLOCK // 2 // ROWS):
+        for _ in range(block // 2 // ROWS):
             _, _, terminated, truncated, _ = rows.step(random.uniform(-1, 1, (ROWS, 18)).astype(np.float32))
             resets += int((terminated | truncated).sum())
         single.render(), rows.render([0])
         samples.append(memory())
         seen.add(handles())
     first = int(WARM_UP * len(samples)) + 1
-    million = np.arange(len(samples)) * BLOCK / 1e6
+    million = np.arange(len(samples)) * block / 1e6
     slope = np.polyfit(million[first:], samples[first:], 1)[0]
     single.close(), rows.close()
     return float(slope), seen, resets
@@ -82,11 +81,12 @@ def lives(count: int) -> float:
 def main() -> int:
     """Runs both and prints what came of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--steps", type=int, default=2_000_000, help="at least 40,000")
+    parser.add_argument("--steps", type=int, default=2_000_000, help="at least four blocks")
+    parser.add_argument("--block", type=int, default=10_000, help="steps between frames")
     parser.add_argument("--lives", type=int, default=500)
     parser.add_argument("--slope", type=float, default=1.0, help="MB per million steps that memory may grow")
     options = parser.parse_args()
-    slope, seen, resets = soak(options.steps)
+    slope, seen, resets = soak(options.steps, options.block)
     threads, files = (sorted({pair[i] for pair in seen}) for i in (0, 1))
     print(
         f"{options.steps} steps, {resets} resets: {slope:+.2f} MB per million steps; threads {threads}, files {files}"

@@ -211,6 +211,19 @@ def test_a_callback_may_draw():
     assert inner[0].shape == (24, 32, 3)
 
 
+def test_pictures_while_the_interpreter_ends_are_refused():
+    code = (
+        "import atexit, sys, arc_suite\n"
+        "environment = arc_suite.load('tick', 'walk')\n"
+        "def late():\n"
+        "    try: environment.physics.render(32, 32)\n"
+        "    except arc_suite.rendering.RenderingUnavailable as error: print(error)\n"
+        "atexit.register(late)\n"
+        "environment.physics.render(32, 32)\n"
+    )
+    assert script(code) == ["cannot render: the interpreter is ending, and has closed OpenGL"]
+
+
 def test_mistakes_in_drawing_arrive_as_they_are():
     environment = arc_suite.load("tick", "walk")
     environment.reset()
