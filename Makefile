@@ -2,6 +2,9 @@
 # make test    installs everything, runs all tests
 # make check   lint and tests: what CI runs
 # make check-sb3  stable-baselines3's checker and a short SAC run, in an environment of their own
+# make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
+# make census  walks 500 random bodies and tells which do
+# make soak    two million steps: memory, threads and files stay what they are
 # make mutants plants mistakes and tells which test catches each; takes minutes
 # make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
 SHELL := /bin/bash
@@ -9,7 +12,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-sb3 mutants golden clean
+.PHONY: demo test check lint check-sb3 bench census soak mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -43,6 +46,15 @@ check-sb3: setup.cfg
 	$(VENV)/bin/python -m pip install -q '$(TORCH)'
 	$(VENV)/bin/python -m pip install -q -e '.[sb3]'
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
+
+bench: $(INSTALLED)
+	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md
+
+census: $(INSTALLED)
+	$(PYTHON) tools/walk_census.py --count 500
+
+soak: $(INSTALLED)
+	$(PYTHON) tests/soak.py
 
 mutants: $(INSTALLED)
 	$(PYTHON) tests/mutants.py

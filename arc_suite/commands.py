@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from absl import app, flags
+from absl import app, flags, logging
 
 from arc_suite.rendering import RenderingUnavailable
 
@@ -32,6 +32,7 @@ def run(main: Callable[[], int | None]) -> None:
             sys.exit(_fail(error))
 
     def wrapped(arguments):
+        logging.set_verbosity(logging.WARNING)  # dm_control tells of its backend at absl's usual verbosity
         try:
             if arguments[1:]:
                 raise ValueError(f"unexpected argument {arguments[1]!r}; see --help")
