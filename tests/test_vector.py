@@ -305,3 +305,15 @@ def test_bad_seeds_are_one_line_errors(seed, message):
     with pytest.raises(ValueError) as error:
         batch.reset(seed=seed)
     assert str(error.value) == message
+
+
+def test_reset_of_some_rows_leaves_handed_out_observations_alone():
+    environments = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=3)
+    environments.reset(seed=0)
+    observations, *_ = environments.step(np.zeros((3, 18), np.float32))
+    kept = observations.copy()
+    again, _ = environments.reset(options={"reset_mask": np.array([False, True, False])})
+    np.testing.assert_array_equal(observations, kept)
+    np.testing.assert_array_equal(again[[0, 2]], kept[[0, 2]])
+    assert not np.array_equal(again[1], kept[1])
+    environments.close()
