@@ -21,7 +21,7 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
         name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1]; or
             `module:attribute`, a function on Python's path that makes a policy from `robot`.
         robot: queen, bastion, tick or leaper, or any body.
-        preset: of the demonstrator: slow, medium or fast.
+        preset: of the demonstrator; see `cpg.Demonstrator`.
         seed: of the random policy.
 
     Returns:

@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 
 from arc_suite.cpg.demonstrator import pattern
-from arc_suite.cpg.presets import PRESETS, TUNINGS, Tuning
+from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.looks import LOOKS
 from arc_suite.robots.looks.look import Look
@@ -24,7 +24,7 @@ def register(
     *,
     body: Body | None = None,
     walk: Mapping[str, Any] | None = None,
-    tuning: Tuning | None = None,
+    tuning: Mapping[str, Preset] | None = None,
     look: Look | None = None,
     tasks: Mapping[str, Callable] | None = None,
 ) -> None:
@@ -37,7 +37,8 @@ def register(
         body: of the robot; its name becomes a domain.
         walk: the robot's row of numbers in the task walk: keys and units as in `tasks.walk.SETTINGS`,
             and any of `tasks.walk.COMMON`; None to have them fitted to the body.
-        tuning: for a demonstrator of the robot; None to have one fitted likewise.
+        tuning: presets of a demonstrator of the robot by name, slow, medium and fast among them; None
+            to have them fitted likewise.
         look: what the robot wears; None for what every body wears.
         tasks: factories by name, called as `tasks.walk.walk` is: with a body, `environment_kwargs` and
             the caller's `task_kwargs`, `random` among them. The environment's physics is a
@@ -92,15 +93,18 @@ def _check_row(body: Body, row: Mapping[str, Any]) -> None:
     walk.settings(body, row)
 
 
-def _check_tuning(body: Body, tuning: Tuning) -> None:
-    legs, offsets = len(body.legs), len(tuning.phase_offsets)
-    if legs != offsets:
-        raise ValueError(f"tuning: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
-    try:
-        for preset in PRESETS:
-            pattern(body, tuning, tuning.presets[preset])
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise ValueError(f"tuning: does not fit {body.name}: {type(error).__name__}: {error}") from None
+def _check_tuning(body: Body, tuning: Mapping[str, Preset]) -> None:
+    if missing := [name for name in SPEEDS if name not in tuning]:
+        raise ValueError(f"tuning: {body.name} has no {' and no '.join(missing)}")
+    for name, preset in tuning.items():
+        legs, offsets = len(body.legs), len(preset.phase_offsets)
+        if legs != offsets:
+            raise ValueError(f"tuning: {body.name} has {legs} legs, and phase_offsets of {name} is for {offsets}")
+        try:
+            pattern(body, preset)
+        except (AttributeError, LookupError, TypeError, ValueError) as error:
+            message = f"tuning: {name} does not fit {body.name}: {type(error).__name__}: {error}"
+            raise ValueError(message) from None
 
 
 def register_ids() -> None:

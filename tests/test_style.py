@@ -299,8 +299,8 @@ class Scripted:
     """A demonstrator that cheats: `stand`, `hop` with all feet at once, `drag` the first leg, or walk `back`."""
 
     def __init__(self, robot, cheat):
-        body, self.tuning, self.cheat = ROBOTS[robot], TUNINGS[robot], cheat
-        honest = pattern(body, self.tuning, self.tuning.presets["medium"])
+        body, self.preset, self.cheat = ROBOTS[robot], TUNINGS[robot]["medium"], cheat
+        honest = pattern(body, self.preset)
         changes = {"hop": {"offset": 0.0 * honest.offset}, "back": {"sweep": -honest.sweep}}
         self.pattern = honest._replace(**changes.get(cheat, {}))
         self.limp = len(body.legs[0].joints)
@@ -311,7 +311,7 @@ class Scripted:
         targets = joint_targets(self.pattern, np.float64(DT * self.clock))
         if self.cheat == "stand":
             targets = 0.0 * targets
-        action = torques(targets, angles, velocities, self.tuning.stiffness, self.tuning.damping)
+        action = torques(targets, angles, velocities, self.preset.stiffness, self.preset.damping)
         if self.cheat == "drag":
             action[: self.limp] = 0.0
         return action

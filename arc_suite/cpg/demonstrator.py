@@ -1,13 +1,14 @@
 """Demonstrators: policies that walk by rote, from nothing but their clock and the joints they feel."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from arc_suite import gaits, names
 from arc_suite.cpg.law import Pattern, joint_targets, torques
-from arc_suite.cpg.presets import PRESETS, TUNINGS, ByRank, Preset, Tuning
+from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.stride import Stride
 from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
@@ -27,15 +28,16 @@ class Demonstrator:
     of an episode restarts the clock; with flat observations, call `reset`.
     """
 
-    def __init__(self, robot: str | Body, preset: str = "medium", froude: float | None = None, gait=None):
+    def __init__(self, robot: str | Body, preset: str | Preset = "medium", froude: float | None = None, gait=None):
         """Prepares a demonstrator.
 
         Args:
             robot: queen, bastion, tick or leaper, or any body.
-            preset: slow, medium or fast.
+            preset: slow, medium or fast; for the four robots also tuned, which earns most of what
+                the law can earn, or numbers of your own.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
-                a preset; negative ones walk backwards. Not for the four robots, whose presets are
-                published.
+                a preset; negative ones walk backwards. Not for the four robots, which have presets
+                alone.
             gait: a name of `gaits.NAMES` or a `Gait`; None for that of the robot or body.
 
         Raises:
@@ -43,16 +45,17 @@ class Demonstrator:
                 nearest valid one.
         """
         body = robot if isinstance(robot, Body) else ROBOTS[names.check(robot, ROBOTS, "robot")]
-        names.check(preset, PRESETS, "preset")
         if isinstance(gait, str):
             gait = gaits.gait(body, gait)
-        if ROBOTS.get(body.name) == body and body.name in TUNINGS:
-            if froude is not None:
-                raise ValueError(f"froude: {body.name} has presets alone: {', '.join(PRESETS)}")
-            self._control = Tuned.fit(body, preset, gait)
+        if not isinstance(preset, Preset):
+            presets = presets_of(body)
+            preset = presets[names.check(preset, presets, "preset")]
+        if isinstance(preset, float):
+            self._control = Stride.fit(body, preset if froude is None else froude, gait or fitted_gait(body))
+        elif froude is not None:
+            raise ValueError(f"froude: {body.name} has presets alone: {', '.join(presets_of(body))}")
         else:
-            froude = FROUDES[preset] if froude is None else froude
-            self._control = Stride.fit(body, froude, gait or fitted_gait(body))
+            self._control = Prescribed.fit(body, preset, gait)
         self._joints = len(body.joint_names)
         self._size = 5 + self._joints + 6 + self._joints + 6 * len(body.part_names) + 2
         self.reset()
@@ -106,46 +109,67 @@ class Demonstrator:
         return vector[..., 1:5], vector[..., 5 : 5 + n], vector[..., 11 + n : 11 + 2 * n]
 
 
-class Tuned(NamedTuple):
-    """The published control of one of the four robots."""
+def presets_of(body: Body) -> Mapping[str, Preset | float]:
+    """A body's presets by name: of a robot its numbers, of any other body its speed as a share of sqrt(g h)."""
+    return TUNINGS[body.name] if ROBOTS.get(body.name) == body and body.name in TUNINGS else FROUDES
 
-    tuning: Tuning
+
+class Prescribed(NamedTuple):
+    """Control by a preset's numbers: of one simulation, or with leading axes (rows, 1) of a batch.
+
+    Attributes:
+        pattern: of the joints.
+        stiffness, damping, settle, ramp, ramp_start: as in `Preset`.
+    """
+
     pattern: Pattern
+    stiffness: float | np.ndarray
+    damping: float | np.ndarray
+    settle: int | np.ndarray
+    ramp: float | np.ndarray
+    ramp_start: float | np.ndarray
 
     @classmethod
-    def fit(cls, body: Body, preset: str, gait: gaits.Gait | None = None) -> Self:
-        """A preset, laid out over the robot's joints, in its own gait or another."""
-        tuning = TUNINGS[body.name]
-        preset = tuning.presets[preset]
+    def fit(cls, body: Body, preset: Preset, gait: gaits.Gait | None = None) -> Self:
+        """A preset, laid out over a body's joints, in its own gait or another."""
         if gait is not None:
-            tuning = tuning._replace(phase_offsets=gait.offsets)
-            preset = preset._replace(duty_factor=gait.duty_factor)
-        return cls(tuning, pattern(body, tuning, preset))
+            preset = preset._replace(phase_offsets=gait.offsets, duty_factor=gait.duty_factor)
+        return cls(pattern(body, preset), *(getattr(preset, name) for name in cls._fields[1:]))
+
+    @classmethod
+    def stacked(cls, controls: Sequence[Self]) -> Self:
+        """Several controls of one body as one, of a batch that has a row for each."""
+
+        def stack(values):
+            return np.stack([np.atleast_1d(value) for value in values])
+
+        patterns, *numbers = zip(*controls, strict=True)
+        return cls(Pattern(*map(stack, zip(*patterns, strict=True))), *map(stack, numbers))
 
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
         """Actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
-        tuning = self.tuning
         steps = clock[..., None]
         walking = joint_targets(self.pattern, CONTROL_TIMESTEP * clock)
-        targets = np.where(steps < tuning.settle, self.pattern.centre, walking)
-        ramp = (tuning.ramp_start + (1.0 - tuning.ramp_start) * steps / tuning.ramp).clip(max=1.0)
-        return torques(targets, angles, velocities, ramp * tuning.stiffness, tuning.damping)
+        targets = np.where(steps < self.settle, self.pattern.centre, walking)
+        ramp = (self.ramp_start + (1.0 - self.ramp_start) * steps / self.ramp).clip(max=1.0)
+        return torques(targets, angles, velocities, ramp * self.stiffness, self.damping)
 
 
-def pattern(body: Body, tuning: Tuning, preset: Preset) -> Pattern:
+def pattern(body: Body, preset: Preset) -> Pattern:
     """Lays a preset out over a body's joints."""
 
     def by_rank(angle: ByRank, rank: int) -> float:
         return math.radians(angle[rank] if isinstance(angle, tuple) else angle)
 
     rows = []
-    for leg, rank, offset in zip(body.legs, body.ranks, tuning.phase_offsets, strict=True):
+    for leg, rank, offset in zip(body.legs, body.ranks, preset.phase_offsets, strict=True):
+        forwards = -1.0 if leg.side == "left" else 1.0
         for joint in leg.joints:
             if joint.name == "hip":
-                sweep = math.radians(preset.sweep) * (-1.0 if leg.side == "left" else 1.0)
-                rows.append((offset, sweep, 0.0, 0.0, 0.0))
+                angles = (preset.sweep, preset.centre.get("hip", 0.0))
+                rows.append((offset, *(forwards * by_rank(angle, rank) for angle in angles), 0.0, 0.0))
             else:
                 bend = preset.bends[joint.name]
-                angles = (tuning.centre[joint.name], bend.stance, bend.swing)
+                angles = (preset.centre[joint.name], bend.stance, bend.swing)
                 rows.append((offset, 0.0, *(by_rank(angle, rank) for angle in angles)))
     return Pattern(preset.frequency, preset.duty_factor, *np.array(rows).T)

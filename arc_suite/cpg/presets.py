@@ -1,5 +1,6 @@
-"""The demonstrators' numbers, by robot: how its joints are held, and three speeds."""
+"""The demonstrators' numbers, by robot and preset."""
 
+import functools
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -15,159 +16,124 @@ class Bend(NamedTuple):
 
 
 class Preset(NamedTuple):
-    """One speed.
-
-    Attributes:
-        frequency: of the cycle, Hz.
-        duty_factor: share of the cycle spent in stance.
-        sweep: half of the hip's sweep, degrees.
-        bends: of the other joints, by name.
-    """
-
-    frequency: float
-    duty_factor: float
-    sweep: float
-    bends: Mapping[str, Bend]
-
-
-class Tuning(NamedTuple):
-    """What a robot's speeds share.
+    """One way to walk.
 
     Attributes:
         stiffness: action per rad of error (kp).
         damping: action per rad/s (kd).
-        settle: first control steps in which the target is the stance pose.
+        settle: first control steps in which the target is the centre.
         ramp: control steps over which the stiffness grows linearly to its full value.
         ramp_start: share of the stiffness at the first step.
-        centre: angles about which joints bend, degrees, by joint.
+        frequency: of the cycle, Hz.
+        duty_factor: share of the cycle spent in stance.
         phase_offsets: of the legs, cycles.
-        presets: the speeds by name.
+        sweep: half of the hip's sweep, degrees.
+        centre: angles about which joints move, degrees, by joint; a hip's is positive forwards and
+            0 if it is not there.
+        bends: of the other joints, by name.
     """
 
     stiffness: float
     damping: float
     settle: int
-    ramp: int
+    ramp: float
     ramp_start: float
-    centre: Mapping[str, ByRank]
+    frequency: float
+    duty_factor: float
     phase_offsets: tuple[float, ...]
-    presets: Mapping[str, Preset]
+    sweep: ByRank
+    centre: Mapping[str, ByRank]
+    bends: Mapping[str, Bend]
 
+
+SPEEDS = ("slow", "medium", "fast")  # the published ones
+PRESETS = SPEEDS
 
 _TRIPOD = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0)  # of l1 l2 l3 r1 r2 r3
 _TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
 
-TUNINGS = {
-    "queen": Tuning(
-        stiffness=0.8,
-        damping=0.18,
-        settle=15,
-        ramp=20,
-        ramp_start=0.3,
-        centre={"knee": (-25, -25, 25), "ankle": (15, 30, -15)},
-        phase_offsets=_TRIPOD,
-        presets={
-            "slow": Preset(
-                frequency=1.5,
-                duty_factor=0.65,
-                sweep=22,
-                bends={
-                    "knee": Bend(stance=(10, 10, -10), swing=(-40, -40, 40)),
-                    "ankle": Bend(stance=(25, 0, -25), swing=(30, 45, -30)),
-                },
-            ),
-            "medium": Preset(
-                frequency=1.5,
-                duty_factor=0.60,
-                sweep=26,
-                bends={
-                    "knee": Bend(stance=(15, 15, -15), swing=(-45, -45, 45)),
-                    "ankle": Bend(stance=(35, 0, -35), swing=(35, 55, -35)),
-                },
-            ),
-            "fast": Preset(
-                frequency=1.5,
-                duty_factor=0.55,
-                sweep=30,
-                bends={
-                    "knee": Bend(stance=(20, 20, -20), swing=(-50, -50, 50)),
-                    "ankle": Bend(stance=(45, 0, -45), swing=(40, 65, -40)),
-                },
-            ),
-        },
-    ),
-    "bastion": Tuning(
-        stiffness=0.8,
-        damping=0.15,
-        settle=15,
-        ramp=20,
-        ramp_start=0.3,
-        centre={"ankle": 30},
-        phase_offsets=_TRIPOD,
-        presets={
-            "slow": Preset(frequency=1.2, duty_factor=0.65, sweep=22, bends={"ankle": Bend(stance=-15, swing=35)}),
-            "medium": Preset(frequency=1.5, duty_factor=0.60, sweep=26, bends={"ankle": Bend(stance=-20, swing=45)}),
-            "fast": Preset(frequency=1.8, duty_factor=0.55, sweep=30, bends={"ankle": Bend(stance=-25, swing=55)}),
-        },
-    ),
-    "tick": Tuning(
-        stiffness=0.8,
-        damping=0.18,
-        settle=15,
-        ramp=20,
-        ramp_start=0.3,
-        centre={"knee": 0, "ankle": 0},
-        phase_offsets=_TRIPOD,
-        presets={
-            "slow": Preset(
-                frequency=1.5,
-                duty_factor=0.65,
-                sweep=32,
-                bends={"knee": Bend(stance=8, swing=-35), "ankle": Bend(stance=0, swing=35)},
-            ),
-            "medium": Preset(
-                frequency=1.5,
-                duty_factor=0.60,
-                sweep=40,
-                bends={"knee": Bend(stance=12, swing=-40), "ankle": Bend(stance=0, swing=45)},
-            ),
-            "fast": Preset(
-                frequency=1.5,
-                duty_factor=0.55,
-                sweep=40,
-                bends={"knee": Bend(stance=18, swing=-45), "ankle": Bend(stance=0, swing=55)},
-            ),
-        },
-    ),
-    "leaper": Tuning(
-        stiffness=0.8,
-        damping=0.15,
-        settle=0,
-        ramp=15,
-        ramp_start=0.2,
-        centre={"knee": 0, "ankle": 0},
-        phase_offsets=_TROT,
-        presets={
-            "slow": Preset(
-                frequency=1.0,
-                duty_factor=0.65,
-                sweep=30,
-                bends={"knee": Bend(stance=0, swing=-50), "ankle": Bend(stance=(20, 0), swing=(70, -70))},
-            ),
-            "medium": Preset(
-                frequency=1.2,
-                duty_factor=0.60,
-                sweep=30,
-                bends={"knee": Bend(stance=0, swing=-55), "ankle": Bend(stance=(25, 0), swing=(75, -75))},
-            ),
-            "fast": Preset(
-                frequency=1.5,
-                duty_factor=0.60,
-                sweep=30,
-                bends={"knee": Bend(stance=0, swing=-60), "ankle": Bend(stance=(30, 0), swing=(80, -80))},
-            ),
-        },
-    ),
-}
+_hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=_TRIPOD)
+_queen = functools.partial(
+    _hexapod, damping=0.18, frequency=1.5, centre={"knee": (-25, -25, 25), "ankle": (15, 30, -15)}
+)
+_bastion = functools.partial(_hexapod, damping=0.15, centre={"ankle": 30})
+_tick = functools.partial(_hexapod, damping=0.18, frequency=1.5, centre={"knee": 0, "ankle": 0})
+_leaper = functools.partial(
+    Preset,
+    stiffness=0.8,
+    damping=0.15,
+    settle=0,
+    ramp=15,
+    ramp_start=0.2,
+    phase_offsets=_TROT,
+    sweep=30,
+    centre={"knee": 0, "ankle": 0},
+)
 
-PRESETS = ("slow", "medium", "fast")
+TUNINGS = {
+    "queen": {
+        "slow": _queen(
+            duty_factor=0.65,
+            sweep=22,
+            bends={
+                "knee": Bend(stance=(10, 10, -10), swing=(-40, -40, 40)),
+                "ankle": Bend(stance=(25, 0, -25), swing=(30, 45, -30)),
+            },
+        ),
+        "medium": _queen(
+            duty_factor=0.60,
+            sweep=26,
+            bends={
+                "knee": Bend(stance=(15, 15, -15), swing=(-45, -45, 45)),
+                "ankle": Bend(stance=(35, 0, -35), swing=(35, 55, -35)),
+            },
+        ),
+        "fast": _queen(
+            duty_factor=0.55,
+            sweep=30,
+            bends={
+                "knee": Bend(stance=(20, 20, -20), swing=(-50, -50, 50)),
+                "ankle": Bend(stance=(45, 0, -45), swing=(40, 65, -40)),
+            },
+        ),
+    },
+    "bastion": {
+        "slow": _bastion(frequency=1.2, duty_factor=0.65, sweep=22, bends={"ankle": Bend(stance=-15, swing=35)}),
+        "medium": _bastion(frequency=1.5, duty_factor=0.60, sweep=26, bends={"ankle": Bend(stance=-20, swing=45)}),
+        "fast": _bastion(frequency=1.8, duty_factor=0.55, sweep=30, bends={"ankle": Bend(stance=-25, swing=55)}),
+    },
+    "tick": {
+        "slow": _tick(
+            duty_factor=0.65,
+            sweep=32,
+            bends={"knee": Bend(stance=8, swing=-35), "ankle": Bend(stance=0, swing=35)},
+        ),
+        "medium": _tick(
+            duty_factor=0.60,
+            sweep=40,
+            bends={"knee": Bend(stance=12, swing=-40), "ankle": Bend(stance=0, swing=45)},
+        ),
+        "fast": _tick(
+            duty_factor=0.55,
+            sweep=40,
+            bends={"knee": Bend(stance=18, swing=-45), "ankle": Bend(stance=0, swing=55)},
+        ),
+    },
+    "leaper": {
+        "slow": _leaper(
+            frequency=1.0,
+            duty_factor=0.65,
+            bends={"knee": Bend(stance=0, swing=-50), "ankle": Bend(stance=(20, 0), swing=(70, -70))},
+        ),
+        "medium": _leaper(
+            frequency=1.2,
+            duty_factor=0.60,
+            bends={"knee": Bend(stance=0, swing=-55), "ankle": Bend(stance=(25, 0), swing=(75, -75))},
+        ),
+        "fast": _leaper(
+            frequency=1.5,
+            duty_factor=0.60,
+            bends={"knee": Bend(stance=0, swing=-60), "ankle": Bend(stance=(30, 0), swing=(80, -80))},
+        ),
+    },
+}
