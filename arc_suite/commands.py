@@ -48,6 +48,20 @@ def _fail(error: Exception) -> int:
     return 1
 
 
+def folder(path: str | os.PathLike) -> Path:
+    """A folder, made if need be.
+
+    Raises:
+        OSError: it cannot be made; one line that names it.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make folder {path}: {error.strerror.lower()}") from None
+    return path
+
+
 @contextlib.contextmanager
 def writing(path: str | os.PathLike) -> Iterator[Path]:
     """Writes a file atomically: `with writing("a.png") as temporary: save(temporary)`.

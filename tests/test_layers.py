@@ -23,6 +23,7 @@ LAYERS = (
     ("registration",),
     ("window", "gym", "vector"),
     ("commands", "body_flags"),
+    ("tuning",),
     ("benchmark",),
     ("doctor",),
 )

@@ -10,7 +10,6 @@ metric means is written in arc_suite/style/metrics.py.
 
 import contextlib
 import math
-import pathlib
 
 from absl import flags
 from tqdm import tqdm
@@ -102,11 +101,7 @@ def pictures():
         from arc_suite.style.pictures import PICTURES
     except ImportError as error:
         raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
-    folder = pathlib.Path(FLAGS.output)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OSError(f"cannot make folder {folder}: {error.strerror.lower()}") from None
+    folder = commands.folder(FLAGS.output)
     with contextlib.ExitStack() as stack:
         files = {name: stack.enter_context(commands.writing(folder / f"{name}.png")) for name in PICTURES}
         yield lambda tracks: [PICTURES[name](tracks).savefig(file) for name, file in files.items()]
