@@ -37,7 +37,7 @@ MUTANTS = (
     Mutant("dropped clip of the action", "tasks/walker.py", "return array.clip(-1.0, 1.0)", "return array"),
     Mutant("dropped clip of the contact forces", "tasks/readings.py", ".clip(-1.0, 1.0)", ""),
     Mutant("sign of a weight", "tasks/walk.py", '"smoothness": -0.02', '"smoothness": 0.02'),
-    Mutant("sign of the sweep", "cpg/demonstrator.py", "(-1.0 if leg.side", "(1.0 if leg.side"),
+    Mutant("sign of the sweep", "cpg/demonstrator.py", "= -1.0 if leg.side", "= 1.0 if leg.side"),
     Mutant(
         "ignored seed",
         "tasks/walk.py",

@@ -1,8 +1,8 @@
 """Searches the demonstrator's numbers of a robot that earn most, walking no worse than `medium` does.
 
 The search is CMA-ES on the vector environment. Broken off at any moment, the same command goes on.
-At the end the best numbers are judged by the evaluation protocol and over further resets, and
-printed as a row for the table of presets.
+At the end the best numbers are judged beside `medium` over many resets and printed as a row for the
+table of presets.
 
   python tools/tune_cpg.py --robot queen --output out/tune/queen
 """
@@ -13,9 +13,7 @@ import pathlib
 from absl import flags
 from tqdm import tqdm
 
-import arc_suite
 from arc_suite import commands, evaluation, names
-from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import TUNINGS, Preset
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walk import HORIZON
@@ -54,20 +52,14 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
 
 
 def judge(preset: Preset) -> dict:
-    """The protocol's return, and falls and style over the resets, of the result and of medium."""
+    """Return, falls and style over the resets, of the result and of medium."""
     body = ROBOTS[FLAGS.robot]
     presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
     score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()))
-    environment = arc_suite.load(body, "walk")
+    rows = zip(presets, HORIZON * score.rewards, score.falls, score.style().tolist(), strict=True)
     return {
-        name: {
-            "return": evaluation.summary(
-                [episode.total for episode in evaluation.episodes(environment, Demonstrator(body, preset))]
-            ),
-            "falls": int(falls.sum()),
-        }
-        | dict(zip(STYLE, style.tolist(), strict=True))
-        for (name, preset), falls, style in zip(presets.items(), score.falls, score.style(), strict=True)
+        name: {"return": evaluation.summary(returns), "falls": int(falls.sum()), **dict(zip(STYLE, style, strict=True))}
+        for name, returns, falls, style in rows
     }
 
 

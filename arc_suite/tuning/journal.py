@@ -27,43 +27,47 @@ class Journal:
             ValueError: the file belongs to another search, or is no journal; one line.
             OSError: the file cannot be read or written.
         """
-        settings, path = json.loads(json.dumps(settings)), Path(path)
-        header, *lines = path.read_bytes().splitlines(keepends=True) if path.exists() else [b""]
-        if header:
-            _check(path, header, settings)
-        # A last line without its end was being written when the search was broken off.
-        complete = [line for line in lines if line.endswith(b"\n")]
-        try:
-            self.generations = [Generation(**json.loads(line)) for line in complete]
-        except (ValueError, TypeError):
-            raise ValueError(f"{path}: no journal of a search; delete it or write to another folder") from None
+        path, header = Path(path), _line(settings)
+        text = path.read_bytes() if path.exists() else b""
+        # What has no end was being written when the search was broken off.
+        if not header.startswith(text):
+            text = text[: text.rfind(b"\n") + 1] or text
+        elif text != header:
+            text = b""
+        self.generations = _generations(path, text, header) if text else []
         self._file = path.open("ab")
-        self._file.truncate(len(header) + sum(map(len, complete)))
-        if not header:
-            self._write(settings)
+        self._file.truncate(len(text))
+        if not text:
+            self._write(header)
 
     def append(self, generation: Generation) -> None:
         """Adds a generation, which is in the file from then on."""
-        self._write(generation._asdict())
+        self._write(_line(generation._asdict()))
         self.generations.append(generation)
 
     def close(self) -> None:
         """Closes the file."""
         self._file.close()
 
-    def _write(self, value) -> None:
-        self._file.write(json.dumps(value).encode() + b"\n")
+    def _write(self, line: bytes) -> None:
+        self._file.write(line)
         self._file.flush()
 
 
-def _check(path: Path, header: bytes, settings: Mapping[str, Any]) -> None:
+def _line(value: Mapping[str, Any]) -> bytes:
+    return json.dumps(value).encode() + b"\n"
+
+
+def _generations(path: Path, text: bytes, header: bytes) -> list[Generation]:
+    """The generations of a journal's text, if its header is that one."""
+    advice = "delete it or write to another folder"
     try:
-        found = json.loads(header)
-        differing = next((name for name in settings if found[name] != settings[name]), None)
+        found, *lines = map(json.loads, text.splitlines())
+        wanted = json.loads(header)
+        differing = [name for name in wanted if found[name] != wanted[name]]
+        generations = [Generation(**line) for line in lines]
     except (ValueError, LookupError, TypeError):
-        raise ValueError(f"{path}: no journal of a search; delete it or write to another folder") from None
-    if differing is not None:
-        raise ValueError(
-            f"{path}: of a search with {differing} {found[differing]}, not {settings[differing]}; "
-            "delete it or write to another folder"
-        )
+        raise ValueError(f"{path}: no journal of a search; {advice}") from None
+    for name in differing:
+        raise ValueError(f"{path}: of a search with {name} {found[name]}, not {wanted[name]}; {advice}")
+    return generations
