@@ -51,7 +51,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     assert picture.shape[0] > 500 and picture.std() > 10.0
 
     lines = done.stdout.splitlines()
-    assert lines[0].split() == ["preset", "return", "falls", "of", "2", "posture", "smoothness"]
+    assert lines[0].split() == ["preset", "return", "falls", "of", "2", "posture", "smoothness", "tilt"]
     assert [line.split()[0] for line in lines[2:4]] == ["tuned", "medium"]
     assert lines[5].startswith("Preset(stiffness=")
 

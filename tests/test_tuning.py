@@ -1,6 +1,7 @@
 """The search for a demonstrator's numbers: its space, its judge, its course and its journal."""
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -73,15 +74,17 @@ def test_judge_plays_the_episodes_of_ordinary_environments():
         for episode in range(2):
             policy = Demonstrator("leaper", preset)
             observation, _ = environment.reset(seed=5 + episode)
-            total, smoothness = 0.0, 0.0
+            total, smoothness, tilt, axis = 0.0, 0.0, 0.0, np.zeros(3)
             for _ in range(30):
                 observation, reward, _, _, info = environment.step(policy(observation))
                 total += reward
                 smoothness += info["reward_terms"]["smoothness"]
+                mujoco.mju_rotVecQuat(axis, (0.0, 0.0, 1.0), observation[1:5].astype(float))
+                tilt += axis[0] ** 2 + axis[1] ** 2
             assert_allclose(score.rewards[row, episode], total / 30, rtol=1e-12)
-            assert_allclose(score.terms["smoothness"][row, episode], smoothness / 30, rtol=1e-12)
+            assert_allclose(score.style["smoothness"][row, episode], smoothness / 30, rtol=1e-12)
+            assert_allclose(score.style["tilt"][row, episode], tilt / 30, rtol=1e-4)
     assert not score.falls.any()
-    assert_allclose(score.style()[:, 1], score.terms["smoothness"].mean(axis=-1))
 
 
 def test_judge_counts_falls_and_pays_nothing_after_them():
@@ -90,7 +93,7 @@ def test_judge_counts_falls_and_pays_nothing_after_them():
     score = Judge(ROBOTS["leaper"], presets=2, episodes=1, steps=60)([folding, medium])
     assert_array_equal(score.falls, [[True], [False]])
     assert score.rewards[0, 0] < 0.5 * score.rewards[1, 0]
-    assert np.isfinite(score.terms["posture"]).all()
+    assert np.isfinite(score.style["posture"]).all()
 
 
 def test_a_search_goes_on_where_it_was_broken_off():

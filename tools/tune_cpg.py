@@ -56,10 +56,10 @@ def judge(preset: Preset) -> dict:
     body = ROBOTS[FLAGS.robot]
     presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
     score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()))
-    rows = zip(presets, HORIZON * score.rewards, score.falls, score.style().tolist(), strict=True)
     return {
-        name: {"return": evaluation.summary(returns), "falls": int(falls.sum()), **dict(zip(STYLE, style, strict=True))}
-        for name, returns, falls, style in rows
+        name: {"return": evaluation.summary(HORIZON * score.rewards[row]), "falls": int(score.falls[row].sum())}
+        | {cost: float(values[row].mean()) for cost, values in score.style.items()}
+        for row, name in enumerate(presets)
     }
 
 
@@ -97,7 +97,7 @@ def main():
     print(header, "-" * len(header), sep="\n")
     for name, row in figures.items():
         total = f"{row['return'].mean:.1f} +- {row['return'].deviation:.1f}"
-        print(columns.format(name, total, row["falls"], *(f"{row[term]:.3f}" for term in STYLE)))
+        print(columns.format(name, total, row["falls"], *(f"{row[cost]:.3f}" for cost in STYLE)))
     print(f"\n{preset}")
     if broken := violations(figures):
         raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")

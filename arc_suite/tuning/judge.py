@@ -1,6 +1,6 @@
 """Judges many presets of a robot at once, on the vector environment."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,8 @@ from arc_suite.cpg.presets import Preset
 from arc_suite.spec import Body
 from arc_suite.vector import VectorEnv
 
-STYLE = ("posture", "smoothness")  # the terms by which presets may not be worse than another
+TERMS = ("posture", "smoothness")  # of the reward, unweighted
+STYLE = (*TERMS, "tilt")  # costs by which presets may not be worse than another
 
 
 class Score(NamedTuple):
@@ -19,16 +20,13 @@ class Score(NamedTuple):
     Attributes:
         rewards: mean over the steps of an episode; a robot that has fallen earns nothing any more.
         falls: booleans.
-        terms: of the reward, unweighted, means until the fall, by name.
+        style: means until the fall, by name: the reward's terms `posture` and `smoothness`, and
+            `tilt`, the squared sine of the angle between the torso's axis and the vertical.
     """
 
     rewards: np.ndarray
     falls: np.ndarray
-    terms: Mapping[str, np.ndarray]
-
-    def style(self) -> np.ndarray:
-        """The terms of style, means over episodes, (presets, terms)."""
-        return np.stack([self.terms[name].mean(axis=-1) for name in STYLE], axis=-1)
+    style: Mapping[str, np.ndarray]
 
 
 class Judge:
@@ -54,7 +52,7 @@ class Judge:
         control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
         observations, _ = self._environment.reset(seed=[seed + k for _ in range(count) for k in range(episodes)])
         upright = np.ones(count * episodes, bool)
-        totals, lengths, sums = np.zeros(upright.size), np.zeros(upright.size), {}
+        totals, lengths, style = np.zeros(upright.size), np.zeros(upright.size), dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
             clock, felt = np.full(upright.size, step), observations.astype(float)
             angles, velocities = felt[:, 5 : 5 + joints], felt[:, 11 + joints : 11 + 2 * joints]
@@ -63,13 +61,13 @@ class Judge:
             )
             totals += rewards * upright
             lengths += upright
-            for name, term in _terms(info):
-                sums[name] = sums.get(name, 0.0) + term * upright
+            for name, cost in _costs(observations, info).items():
+                style[name] += cost * upright
             upright &= ~fallen
         return Score(
             rewards=(totals / self._steps).reshape(self._shape),
             falls=~upright.reshape(self._shape),
-            terms={name: (total / lengths).reshape(self._shape) for name, total in sums.items()},
+            style={name: (total / lengths).reshape(self._shape) for name, total in style.items()},
         )
 
     def close(self) -> None:
@@ -77,5 +75,8 @@ class Judge:
         self._environment.close()
 
 
-def _terms(info: Mapping[str, Any]) -> Iterator[tuple[str, np.ndarray]]:
-    return ((name, term) for name, term in info.get("reward_terms", {}).items() if not name.startswith("_"))
+def _costs(observations, info: Mapping[str, Any]) -> dict[str, np.ndarray]:
+    """What a step costs in style, (rows,) by name."""
+    _, x, y, _ = observations[:, 1:5].astype(float).T
+    terms = info.get("reward_terms", dict.fromkeys(TERMS, 0.0))  # not there if all rows start anew
+    return {name: terms[name] for name in TERMS} | {"tilt": 1.0 - (1.0 - 2.0 * (x * x + y * y)) ** 2}

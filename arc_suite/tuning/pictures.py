@@ -33,14 +33,14 @@ def course(robot: str, reward: float, generations: Sequence[Generation], length:
     returns.set_title(f"{robot}: a search by CMA-ES", loc="left", fontweight="bold")
     returns.legend(loc="lower right", frameon=False)
     for name, color, shares in zip(
-        STYLE, ("#D55E00", "#CC79A7"), np.transpose([g.style for g in generations]), strict=True
+        STYLE, ("#D55E00", "#CC79A7", "#E69F00"), np.transpose([g.style for g in generations]), strict=True
     ):
         style.plot(counts, shares, color=color, label=f"{name} of the fittest")
     style.axhline(1.0, color="#8C8C8C", linestyle="--", label="medium")
     style.set_ylabel("share of medium's")
     style.set_xlabel("generation")
     style.set_ylim(0.0, 1.5)
-    style.legend(loc="lower right", frameon=False, ncols=3)
+    style.legend(loc="lower right", frameon=False, ncols=4)
     for axis in (returns, style):
         axis.spines[["top", "right"]].set_visible(False)
     return figure

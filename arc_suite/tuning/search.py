@@ -1,8 +1,8 @@
 """CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the numbers of a demonstrator.
 
 A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
-generation and the same for all of its candidates, less a penalty for posture or smoothness that is
-worse than that of the preset from which the search sets out.
+generation and the same for all of its candidates, less a penalty for a style that is worse than
+that of the preset from which the search sets out.
 """
 
 from typing import NamedTuple
@@ -11,13 +11,13 @@ import numpy as np
 
 from arc_suite.cpg.presets import TUNINGS, Preset
 from arc_suite.robots import ROBOTS
-from arc_suite.tuning.judge import Judge
+from arc_suite.tuning.judge import STYLE, Judge, Score
 from arc_suite.tuning.space import Space
 
 SPREAD = 0.5  # of the first generation, in scales of the numbers
 LEADS = 20  # of all legs over the clock, tried beforehand
 
-_EXCESS = 1.5  # reward that a term of style twice as large costs
+_EXCESS = 1.5  # reward that a cost of style twice as large takes
 _MARGIN = 0.03  # by which style is to be better, as it is judged by few episodes
 
 
@@ -28,7 +28,7 @@ class Generation(NamedTuple):
         fitness: of its candidates.
         reward: mean over the episodes of the fittest.
         falls: share of all episodes.
-        style: the fittest's terms of style as shares of the origin's, in the order of `judge.STYLE`.
+        style: the fittest's costs of style as shares of the origin's, in the order of `judge.STYLE`.
     """
 
     fitness: list[float]
@@ -69,7 +69,7 @@ class Search:
         score = judge([medium, *(self._space.preset(self._space.vector(lead)) for lead in leads)], seed)
         judge.close()
         self.reward, *by_lead = score.rewards.mean(axis=-1).tolist()
-        self._style = score.style()[0]
+        self._style = _style(score)[0]
         self._origin = self._space.vector(leads[np.argmax(by_lead)])
         self._scale = self._space.bounds()[0]
         options = {"randn": np.random.RandomState(seed).randn, "seed": np.nan, "verbose": -9}
@@ -105,7 +105,12 @@ class Search:
 
     def _judged(self, presets) -> Generation:
         score = self._judge(presets, self._seed + (1 + self._generations) * self._episodes)
-        rewards, style = score.rewards.mean(axis=-1), score.style() / self._style
+        rewards, style = score.rewards.mean(axis=-1), _style(score) / self._style
         fitness = rewards - _EXCESS * (style - (1.0 - _MARGIN)).clip(0.0).sum(axis=-1)
         best = fitness.argmax()
         return Generation(fitness.tolist(), float(rewards[best]), float(score.falls.mean()), style[best].tolist())
+
+
+def _style(score: Score) -> np.ndarray:
+    """Costs of style, means over episodes, (presets, costs)."""
+    return np.stack([score.style[name].mean(axis=-1) for name in STYLE], axis=-1)
