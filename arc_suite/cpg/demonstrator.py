@@ -32,7 +32,7 @@ class Demonstrator:
 
         Args:
             robot: queen, bastion, tick or leaper, or any body.
-            preset: slow, medium or fast.
+            preset: a speed, one of `PRESETS`.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, whose presets are
                 published.
