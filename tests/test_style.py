@@ -18,6 +18,7 @@ from arc_suite.cpg.demonstrator import pattern
 from arc_suite.cpg.law import joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.generator import generate
 from arc_suite.style import METRICS, Track, measure, record
 from arc_suite.style.metrics import phase_error
 from arc_suite.style.tracks import lowest_point_velocities, mirrors
@@ -69,6 +70,8 @@ def synthetic(cycles=10, speed=0.5, course=0.0, facing=0.0, late=(0, 0, 0, 0), s
     positions = np.stack([way, 0.0 * way, np.full_like(way, HEIGHT)], axis=-1)
     quaternion = (math.cos(facing / 2), 0.0, 0.0, math.sin(facing / 2))
     return Track(
+        body=generate(4, 2),
+        seed=0,
         time_step=DT,
         positions=positions @ about_z(course).T,
         quaternions=np.tile(quaternion, (len(steps), 1)),
@@ -492,4 +495,4 @@ def test_metrics_come_without_matplotlib():
 
 
 def test_package_exports():
-    assert style.__all__ == ["METRICS", "Track", "measure", "record"]
+    assert style.__all__ == ["METRICS", "Track", "load", "measure", "record", "report", "save"]
