@@ -135,6 +135,36 @@ def test_every_metric_states_its_definition_and_measures_robot_or_legs():
     assert all(tuple(measure(synthetic())[name].legs) == LEGS for name in by_leg)
 
 
+def test_what_the_task_prescribes_is_what_a_perfect_walk_does():
+    track = synthetic()
+    prescribed = {name: metric.prescribed(track.parameters) for name, metric in METRICS.items() if metric.prescribed}
+    assert list(prescribed) == [
+        "gait_compliance",
+        "duty_factor",
+        "phase_error",
+        "phase_scatter",
+        "stride_length",
+        "stride_frequency",
+        "speed",
+    ]
+    assert prescribed == pytest.approx({name: value(name, track) for name in prescribed}, abs=1e-9)
+    for change in ({"duty_factor": 1.0}, {"gait_frequency": 0.0}):
+        assert math.isnan(METRICS["stride_length"].prescribed(track.parameters._replace(**change)))
+
+
+def test_a_report_sums_tracks_up():
+    figures = style.report([synthetic(), synthetic(speed=0.25, dragged=1)])
+    assert figures["return"].mean == 1.5 * 160
+    assert figures["length"].mean == 160
+    speed = figures["metrics"]["speed"]
+    assert (speed["unit"], speed["prescribed"], speed["legs"]) == ("m/s", 0.5, {})
+    assert speed["robot"].mean == pytest.approx(0.375)
+    duty = figures["metrics"]["duty_factor"]
+    assert duty["prescribed"] == 0.5
+    assert {leg: summary.mean for leg, summary in duty["legs"].items()} == dict.fromkeys(LEGS, 0.5) | {"fr": 0.75}
+    assert figures["metrics"]["foot_slip"]["prescribed"] is None
+
+
 def test_gait_compliance_counts_steps():
     # Two steps late: two wrong at touchdown and two at lift-off, of sixteen.
     assert_allclose(legs("gait_compliance", synthetic(late=(0, 2, 0, 8))), [1.0, 0.75, 1.0, 0.0])
@@ -177,6 +207,17 @@ def test_stride_length_and_frequency():
     assert_allclose(legs("stride_frequency", track._replace(time_step=0.1)), 0.625)
     assert_array_equal(np.isnan(legs("stride_length", synthetic(dragged=3))), [False, False, False, True])
     assert_array_equal(np.isnan(legs("stride_frequency", synthetic(cycles=1))), True)
+
+
+def test_a_foot_that_bounces_in_stance_does_not_stride():
+    track, bounced = synthetic(speed=0.25), synthetic(speed=0.25)
+    standing = np.flatnonzero(bounced.stance[:, 0]).reshape(-1, 8)
+    bounced.foot_positions[standing[:, 3], 0, 2] = RADIUS + 0.49 * CLEARANCE  # over the stance threshold
+    assert legs("duty_factor", bounced)[0] < 0.5
+    for name in ("stride_length", "stride_frequency"):
+        assert_allclose(legs(name, bounced), legs(name, track))
+    bounced.foot_positions[standing[:, 3], 0, 2] = RADIUS + 0.51 * CLEARANCE  # which is a step of its own
+    assert_allclose(legs("stride_frequency", bounced)[0], 2 * 1.25, rtol=0.05)
 
 
 def test_foot_slip():
@@ -479,6 +520,7 @@ def test_gait_diagram_shows_stance_and_schedule():
     texts = [text.get_text() for text in axis.texts]
     assert "50 %" in texts
     assert "+0.25 cycles" in texts
+    assert "duty factor\n(0.50 wanted)" in texts
 
 
 def test_pictures_of_a_track_of_one_step():
@@ -495,4 +537,14 @@ def test_metrics_come_without_matplotlib():
 
 
 def test_package_exports():
-    assert style.__all__ == ["METRICS", "Track", "load", "measure", "record", "report", "save"]
+    assert style.__all__ == [
+        "METRICS",
+        "Source",
+        "Track",
+        "load",
+        "measure",
+        "record",
+        "report",
+        "save",
+        "source",
+    ]
