@@ -69,10 +69,8 @@ def verify(
             for episode in step.finished:
                 there = recorded.pop(episode.seed)
                 if episode._replace(preset=there.preset).digest() != there.digest():
-                    where = f"episode {episode.seed - first} (seed {episode.seed})"
-                    raise ValueError(
-                        f"dataset {dataset_id!r}: {where} differs from its replay: {_where(there, episode)}"
-                    )
+                    where = f"episode {episode.seed - first} differs from its replay: {_difference(there, episode)}"
+                    raise ValueError(f"dataset {dataset_id!r}: {where}")
     environment.close()
     return count
 
