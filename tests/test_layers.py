@@ -23,6 +23,7 @@ LAYERS = (
     ("registration",),
     ("window", "gym", "vector"),
     ("commands", "body_flags"),
+    ("data",),
     ("benchmark",),
     ("doctor",),
 )
