@@ -92,3 +92,18 @@ def synthetic(cycles=10, speed=0.5, course=0.0, facing=0.0, late=(0, 0, 0, 0), s
 
 def about_z(angle):
     return np.array([(math.cos(angle), -math.sin(angle), 0), (math.sin(angle), math.cos(angle), 0), (0, 0, 1)])
+
+
+def assert_same(left, right):
+    """Two values are equal to the bit and of one type, and so is all that is in them, in its order."""
+    assert type(left) is type(right)
+    if isinstance(left, np.ndarray):
+        assert (left.dtype, left.shape, left.tobytes()) == (right.dtype, right.shape, right.tobytes())
+        return
+    left, right = (value._asdict() if hasattr(value, "_asdict") else value for value in (left, right))
+    if isinstance(left, dict):
+        assert list(left) == list(right)
+        for name in left:
+            assert_same(left[name], right[name])
+    else:
+        assert left == right

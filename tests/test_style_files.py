@@ -1,16 +1,17 @@
-"""Tracks on disk, equal to the bit, and sources of tracks."""
+"""Tracks on disk, equal to the bit."""
 
 import io
 import zipfile
 
 import numpy as np
 import pytest
+from synthetic import assert_same
 
 import arc_suite
 from arc_suite import style
 from arc_suite.policies import policy
-from arc_suite.robots import ROBOTS, generator
-from arc_suite.style import load, record, save, source
+from arc_suite.robots import generator
+from arc_suite.style import load, record, save
 
 BODY = generator.generate(5, 2)
 
@@ -30,21 +31,6 @@ def saved(leaper, tmp_path_factory):
     path = tmp_path_factory.mktemp("tracks") / "leaper.npz"
     save(path, leaper)
     return path
-
-
-def assert_same(left, right):
-    """Two values are equal to the bit and of one type, and so is all that is in them, in its order."""
-    assert type(left) is type(right)
-    if isinstance(left, np.ndarray):
-        assert (left.dtype, left.shape, left.tobytes()) == (right.dtype, right.shape, right.tobytes())
-        return
-    left, right = (value._asdict() if hasattr(value, "_asdict") else value for value in (left, right))
-    if isinstance(left, dict):
-        assert list(left) == list(right)
-        for name in left:
-            assert_same(left[name], right[name])
-    else:
-        assert left == right
 
 
 @pytest.mark.parametrize("body", ["queen", BODY], ids=str)
@@ -148,43 +134,3 @@ def test_files_that_cannot_be_read_are_one_line(tmp_path):
     for path, reason in ((tmp_path / "none.npz", "no such file or directory"), (tmp_path, "is a directory")):
         with pytest.raises(OSError, match=f"^cannot read {path}: {reason}$"):
             load(path)
-
-
-# Sources.
-
-
-def take(opened, body, seeds):
-    return [made() for made in opened.takes(body, seeds)]
-
-
-def test_policies_walk_any_body_once_for_each_seed():
-    opened = source("zero")
-    assert (opened.label, opened.body) == ("zero", None)
-    for body in (ROBOTS["tick"], BODY):
-        tracks = take(opened, body, (5, 6))
-        assert [(track.body, track.seed) for track in tracks] == [(body, 5), (body, 6)]
-        assert not tracks[0].actions.any()
-    assert source("cpg", "fast").label == "cpg fast"
-
-
-def test_files_have_the_tracks_that_they_have(leaper, saved):
-    opened = source(str(saved))
-    assert (opened.label, opened.body) == ("leaper.npz", ROBOTS["leaper"])
-    for count, expected in ((1, 1), (2, 2), (10, 2)):
-        tracks = take(opened, ROBOTS["leaper"], range(count))
-        assert len(tracks) == expected
-        assert_same(tracks[-1], leaper[expected - 1])
-
-
-def test_what_is_no_source_is_refused_before_any_work(saved):
-    for arguments, message in (
-        (("cgp",), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
-        (("cpg", "fats"), "unknown preset 'fats'; did you mean 'fast'? (there are: "),
-        (("none.npz",), "cannot read none.npz: no such file or directory"),
-    ):
-        with pytest.raises((ValueError, OSError)) as error:
-            source(*arguments)
-        assert str(error.value).startswith(message)
-    for body, other in ((ROBOTS["tick"], "leaper"), (ROBOTS["leaper"].replace(density=7.0), "another body")):
-        with pytest.raises(ValueError, match=f"^{saved}: expected tracks of {body.name}, got those of {other}"):
-            source(str(saved)).takes(body, (0,))

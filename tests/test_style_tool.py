@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from arc_suite import style
+from arc_suite import data, style
 from arc_suite.robots import ROBOTS
 from arc_suite.style import METRICS
 
@@ -81,6 +81,26 @@ def test_a_saved_body_beside_a_policy(tmp_path):
         other = run(f"--policy={saved}", f"--robot={robot}")
         message = f"style.py: {saved}: expected tracks of {'queen' if robot == 'all' else robot}, got those of spider\n"
         assert (other.returncode, other.stdout, other.stderr) == (1, "", message)
+
+
+def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    data.collect(
+        "arc_suite/tick/noisy-v0", data.Settings(ROBOTS["tick"], "cpg", ("medium",), 0.2, steps=50), episodes=2
+    )
+    done = run("--policy=arc_suite/tick/noisy-v0", "--compare=cpg", "--episodes=2", f"--output={tmp_path}")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[1].split() == ["tick", "unit", "prescribed", "arc_suite/tick/noisy-v0", "cpg", "medium"]
+    change = next(line for line in lines if line.startswith("action change")).split()[2::3]
+    assert float(change[0]) > float(change[1]) + 0.05
+
+
+def test_datasets_without_minari_say_what_to_install(tmp_path):
+    (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
+    done = run("--policy=arc_suite/tick/noisy-v0", path=tmp_path)
+    message = "datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')"
+    assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
 
 
 def test_all_robots(tmp_path):

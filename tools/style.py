@@ -5,6 +5,7 @@ Examples:
   python tools/style.py --policy my_package.policies:make --compare cpg --output out/style
   python tools/style.py --spec examples/spider.json --save out/spider.npz
   python tools/style.py --policy out/spider.npz --compare zero
+  python tools/style.py --policy arc_suite/queen/cpg-medium-v0 --compare arc_suite/queen/random-v0
 
 `--output` writes gait.png, reward.png, speed.png and path.png of the first episode. What every
 metric means is written in arc_suite/style/metrics.py.
