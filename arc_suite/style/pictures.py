@@ -87,9 +87,9 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
         compliance, duty, error = metrics.gait_compliance(track), metrics.duty_factor(track), metrics.phase_error(track)
         wanted = track.parameters.duty_factor
         for column, heading, texts in (
-            (1.065, "compliance", [f"{100 * share:.0f} %" for share in compliance]),
-            (1.19, f"duty factor\n({wanted:.2f} wanted)", [f"{share:.2f}" for share in duty]),
-            (1.315, "late by", ["–" if np.isnan(late) else f"{late:+.2f} cycles" for late in error]),
+            (1.06, "compliance", [f"{100 * share:.0f} %" for share in compliance]),
+            (1.195, f"duty factor\n({wanted:.2f} wanted)", [f"{share:.2f}" for share in duty]),
+            (1.315, "late by", ["–" if np.isnan(late) else f"{late:+z.2f} cycles" for late in error]),
         ):
             place = {"transform": axis.get_yaxis_transform(), "ha": "center", "fontsize": 8.5}
             axis.text(column, -0.6, heading, va="bottom", color=FAINT, linespacing=1.25, **place)
@@ -177,7 +177,7 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
         times = track.times[-len(steps) :]
         low, high = _range_over_a_cycle(track, steps)
         axis.fill_between(times, low, high, color=colour, alpha=0.2, linewidth=0)
-        name = f"{label}: {metrics.speed(track):.2f} m/s"
+        name = f"{label}: {metrics.speed(track):z.2f} m/s"
         axis.plot(times, _over_a_cycle(track, steps), color=colour, linewidth=1.8, label=name)
     axis.set_title("Forward speed: mean over a gait cycle, and range of the steps within")
     axis.set_ylabel("speed (m/s)")
