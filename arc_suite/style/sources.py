@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-import arc_suite
-from arc_suite import names, policies
+from arc_suite import names, policies, suite
 from arc_suite.cpg import PRESETS
 from arc_suite.spec import Body
 from arc_suite.style.files import load
@@ -61,7 +60,7 @@ def source(name: str, preset: str = "medium") -> Source:
 
 def _played(name: str, preset: str) -> Source:
     def takes(body, seeds):
-        environment, policy = arc_suite.load(body, "walk"), policies.policy(name, body, preset, seeds[0])
+        environment, policy = suite.load(body, "walk"), policies.policy(name, body, preset, seeds[0])
         return [functools.partial(record, environment, policy, seed) for seed in seeds]
 
     return Source(f"cpg {preset}" if name == "cpg" else name, None, takes)
@@ -72,7 +71,7 @@ def _saved(path: str) -> Source:
     body = tracks[0].body
 
     def takes(wanted, seeds):
-        check_body(path, body, wanted)
+        _check_body(path, body, wanted)
         return [functools.partial(lambda track: track, track) for track in tracks[: len(seeds)]]
 
     return Source(Path(path).name, body, takes)
@@ -96,7 +95,7 @@ def _replayed(dataset_id: str) -> Source:
         return track
 
     def takes(wanted, seeds):
-        check_body(dataset_id, dataset.body, wanted)
+        _check_body(dataset_id, dataset.body, wanted)
         if not len(dataset):
             raise ValueError(f"dataset {dataset_id!r} has no episodes")
         environment = dataset.environment()
@@ -105,7 +104,7 @@ def _replayed(dataset_id: str) -> Source:
     return Source(dataset_id, dataset.body, takes)
 
 
-def check_body(name: str, body: Body, wanted: Body) -> None:
+def _check_body(name: str, body: Body, wanted: Body) -> None:
     """Raises a ValueError of one line, unless tracks are of the body that is wanted."""
     if body != wanted:
         other = "another body of that name" if body.name == wanted.name else body.name
