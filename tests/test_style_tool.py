@@ -77,6 +77,11 @@ def test_a_saved_body_beside_a_policy(tmp_path):
     assert report["zero"]["return"]["episodes"] == 3
     both = run(f"--spec={SPIDER}", f"--policy={saved}", "--episodes=1")
     assert both.returncode == 0, both.stderr
+    twin = tmp_path / "twin" / "spider.npz"
+    twin.parent.mkdir()
+    twin.write_bytes(saved.read_bytes())
+    twins = run(f"--policy={saved}", f"--compare={twin}", "--episodes=1")
+    assert twins.stdout.splitlines()[1].split()[-2:] == [str(saved), str(twin)]
     for robot in ("tick", "all"):
         other = run(f"--policy={saved}", f"--robot={robot}")
         message = f"style.py: {saved}: expected tracks of {'queen' if robot == 'all' else robot}, got those of spider\n"

@@ -40,12 +40,15 @@ flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz)
 
 def chosen_sources() -> dict[str, style.Source]:
     """What is shown side by side, by label."""
-    chosen = [style.source(FLAGS.policy, FLAGS.preset)]
-    if FLAGS.compare is not None:
-        chosen.append(style.source(FLAGS.compare, FLAGS.compare_preset))
-        if chosen[0].label == chosen[1].label:
-            raise ValueError(f"--compare: expected another one than {chosen[0].label!r}")
-    return {source.label: source for source in chosen}
+    first = style.source(FLAGS.policy, FLAGS.preset)
+    if FLAGS.compare is None:
+        return {first.label: first}
+    second = style.source(FLAGS.compare, FLAGS.compare_preset)
+    if first.label != second.label:
+        return {first.label: first, second.label: second}
+    if FLAGS.policy == FLAGS.compare:
+        raise ValueError(f"--compare: expected another one than {first.label!r}")
+    return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
 
 
 def chosen_bodies(stored: list[Body]) -> dict[str, Body]:
