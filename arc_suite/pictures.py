@@ -30,7 +30,7 @@ class Take:
         Args:
             robot: a robot, or any other body.
             policy_name: cpg, zero or random.
-            preset: of the demonstrator: slow, medium or fast.
+            preset: of the demonstrator, one of `cpg.PRESETS`.
             seed: of the episode and of the random policy.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.

@@ -11,7 +11,11 @@ from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
 
 POLICIES = ("cpg", "zero", "random")
-HELP = f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name."
+HELP = (
+    f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name, or from the Body "
+    "of what is no robot of the suite."
+)
+PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}."
 
 
 def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | None = None) -> Callable:
@@ -19,9 +23,10 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
 
     Args:
         name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1]; or
-            `module:attribute`, a function on Python's path that makes a policy from `robot`.
+            `module:attribute`, a function on Python's path that makes a policy from the name of a
+            robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        preset: of the demonstrator; see `cpg.Demonstrator`.
+        preset: of the demonstrator, one of `cpg.PRESETS`.
         seed: of the random policy.
 
     Returns:
@@ -33,10 +38,10 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
     names.check(preset, PRESETS, "preset")
     body = robot if isinstance(robot, Body) else ROBOTS[names.check(robot, ROBOTS, "robot")]
     if isinstance(name, str) and ":" in name:
-        return _from_path(name, robot)
+        return _from_path(name, body)
     names.check(name, POLICIES, "policy")
     if name == "cpg":
-        return Demonstrator(robot, preset)
+        return Demonstrator(body, preset)
     size = len(body.joint_names)
     if name == "zero":
         return lambda time_step: np.zeros(size)
@@ -44,14 +49,14 @@ def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | Non
     return lambda time_step: random.uniform(-1.0, 1.0, size)
 
 
-def _from_path(path: str, robot: str | Body) -> Callable:
+def _from_path(path: str, body: Body) -> Callable:
     try:
         factory = pkgutil.resolve_name(path)
     except (ImportError, ValueError, AttributeError) as error:
         raise ValueError(f"policy {path!r}: {error}") from None
     if not callable(factory):
         raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
-    made = factory(robot)
+    made = factory(body.name if ROBOTS.get(body.name) == body else body)
     if not callable(made):
         raise ValueError(f"policy {path!r}: expected it to return a function of a TimeStep, got {type(made).__name__}")
     return made

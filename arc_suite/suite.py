@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from arc_suite import names
 from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
-from arc_suite.spec_files import load_body
+from arc_suite.spec_files import body_from_json, load_body
 from arc_suite.tasks import TASKS
 
 
@@ -26,7 +26,7 @@ def body_of(domain) -> Body:
 
     Args:
         domain: name of a robot, path of a file that holds a body (a `Path`, or a string that ends
-            in .json), or the body itself.
+            in .json), the text of such a file, or the body itself.
 
     Raises:
         ValueError: an unknown name, or a file that holds no body; one line.
@@ -36,6 +36,8 @@ def body_of(domain) -> Body:
         return domain
     if isinstance(domain, os.PathLike) or (isinstance(domain, str) and domain.endswith(".json")):
         return load_body(domain)
+    if isinstance(domain, str) and domain.startswith("{"):
+        return body_from_json(domain)
     return _find(domain, ROBOTS, "domain")
 
 

@@ -88,6 +88,14 @@ MUTANTS = (
     Mutant("early taken for late", "style/metrics.py", "actual * wanted.conj()", "wanted * actual.conj()"),
     Mutant("mirror image of a foot's path forgotten", "style/metrics.py", " * (1.0, -1.0, 1.0)", ""),
     Mutant("motors win back what they brake", "style/metrics.py", ".clip(0.0).sum()", ".sum()"),
+    Mutant("a foot that bounces strides", "style/metrics.py", "0.5 * foot_clearance(track)", "0.0"),
+    Mutant("order of tracks in a file", "style/files.py", "in range(count)]", "in range(count)[::-1]]"),
+    Mutant(
+        "a replay that differs let through",
+        "style/sources.py",
+        "np.array_equal(track.rewards, episode.rewards)",
+        "len(track.rewards) == episode.length",
+    ),
     Mutant("rows share a seed", "vector.py", "seeding.check(first + row)", "seeding.check(first)"),
     Mutant(
         "observations of a batch handed out live",

@@ -42,7 +42,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("tool", ["evaluate.py", "render.py"])
+@pytest.mark.parametrize("tool", ["evaluate.py", "render.py", "style.py"])
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

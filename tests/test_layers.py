@@ -19,11 +19,11 @@ LAYERS = (
     ("suite",),
     ("cpg",),
     ("evaluation", "policies", "pictures", "summary", "census"),
-    ("style",),
     ("registration",),
     ("window", "gym", "vector"),
     ("commands", "body_flags"),
-    ("tuning",),
+    ("data",),
+    ("style", "tuning"),
     ("benchmark",),
     ("doctor",),
 )

@@ -5,6 +5,8 @@ import pytest
 
 import arc_suite
 from arc_suite.policies import POLICIES, policy
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.generator import generate
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -46,6 +48,7 @@ import arc_suite.cpg
 number = 3
 def walk(robot): return arc_suite.cpg.Demonstrator(robot)
 def forgets(robot): return None
+def told(robot): return lambda time_step: robot
 """
 
 
@@ -60,6 +63,12 @@ def test_policies_from_pythons_path(own):
     expected = policy("cpg", "tick")(time_step)
     for path in ("own_policies:walk", "arc_suite.cpg:Demonstrator"):
         np.testing.assert_array_equal(policy(path, "tick")(time_step), expected)
+
+
+def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_any_other(own):
+    body = generate(4, 2)
+    told = [policy("own_policies:told", robot)(None) for robot in ("tick", ROBOTS["tick"], body)]
+    assert told == ["tick", "tick", body]
 
 
 @pytest.mark.parametrize(

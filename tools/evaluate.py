@@ -13,12 +13,13 @@ from tqdm import tqdm
 
 import arc_suite
 from arc_suite import body_flags, commands, evaluation, policies
+from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
 
 FLAGS = flags.FLAGS
-_ROBOT = flags.DEFINE_string("robot", "all", "queen, bastion, tick, leaper or all.")
+_ROBOT = flags.DEFINE_string("robot", "all", f"{', '.join(ROBOTS)}, or all.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
-flags.DEFINE_string("preset", "medium", "Of the cpg: slow, medium or fast.")
+flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")

@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from arc_suite import body_flags, commands, names, pictures
 from arc_suite.cpg import PRESETS
-from arc_suite.policies import POLICIES
+from arc_suite.policies import POLICIES, PRESET_HELP
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.builder import CAMERAS
 from arc_suite.robots.looks.scene import MAX_HEIGHT, MAX_WIDTH
@@ -29,7 +29,7 @@ _CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
 
 ROBOT = flags.DEFINE_string("robot", "queen", f"Who walks: {', '.join(ROBOTS)}, or all of them side by side.")
 POLICY = flags.DEFINE_string("policy", "cpg", f"Who steers: {', '.join(POLICIES)}.")
-PRESET = flags.DEFINE_string("preset", "medium", f"How the demonstrator (cpg) walks: {', '.join(PRESETS)}.")
+PRESET = flags.DEFINE_string("preset", "medium", PRESET_HELP)
 SEED = flags.DEFINE_integer("seed", 0, "Of the start of the episode and of the random policy.", 0, 2**32 - 1)
 CAMERA = flags.DEFINE_string(
     "camera", None, f"Where to look from: {', '.join(CAMERAS)}; by default profile, for several robots portrait."

@@ -1,8 +1,11 @@
-"""Judges how a policy walks: gait, course, torso, joints and effort, for the robot and for each leg.
+"""Judges how a robot walks: gait, course, torso, joints and effort, for the robot and for each leg.
 
 Examples:
   python tools/style.py --robot queen --policy cpg --preset medium
-  python tools/style.py --robot queen --policy my_package.policies:make --compare cpg --output out/style
+  python tools/style.py --policy my_package.policies:make --compare cpg --output out/style
+  python tools/style.py --spec examples/spider.json --save out/spider.npz
+  python tools/style.py --policy out/spider.npz --compare zero
+  python tools/style.py --policy arc_suite/queen/cpg-medium-v0 --compare arc_suite/queen/random-v0
 
 `--output` writes gait.png, reward.png, speed.png and path.png of the first episode. What every
 metric means is written in arc_suite/style/metrics.py.
@@ -14,126 +17,148 @@ import math
 from absl import flags
 from tqdm import tqdm
 
-import arc_suite
-from arc_suite import commands, evaluation, policies, style
+from arc_suite import body_flags, commands, evaluation, policies, style
+from arc_suite.robots import ROBOTS
+from arc_suite.spec import Body
+from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
-flags.DEFINE_string("robot", "queen", "queen, bastion, tick or leaper.")
-flags.DEFINE_string("policy", "cpg", policies.HELP)
-flags.DEFINE_string("preset", "medium", "Of the cpg: slow, medium or fast.")
-flags.DEFINE_string("compare", None, "A second policy, shown beside the first.")
-flags.DEFINE_string("compare_preset", "medium", "Of the second policy, if that is the cpg.")
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes.", lower_bound=1)
+_ROBOT = flags.DEFINE_string(
+    "robot", "queen", f"{', '.join(ROBOTS)}, or all. By default the one whose tracks are shown, if they are stored."
+)
+flags.DEFINE_string("policy", "cpg", sources.HELP)
+flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
+flags.DEFINE_string("compare", None, "A second one, shown beside the first.")
+flags.DEFINE_string("compare_preset", "medium", "Preset of the second, if that is the cpg.")
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the figures to, as JSON.")
-flags.DEFINE_string("output", None, "Folder to write pictures to; it is made if need be.")
+flags.DEFINE_string("output", None, "Folder to write pictures to; it is made if need be. Of several robots, one each.")
+flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz).")
 
 
-def record(label: str, policy) -> list[style.Track]:
-    """Records the episodes of a policy behind a progress bar."""
-    environment = arc_suite.load(FLAGS.robot, "walk")
-    with tqdm(range(FLAGS.seed, FLAGS.seed + FLAGS.episodes), desc=label, unit="episode", leave=False) as seeds:
-        return [style.record(environment, policy, seed) for seed in seeds]
+def chosen_sources() -> dict[str, style.Source]:
+    """What is shown side by side, by label."""
+    first = style.source(FLAGS.policy, FLAGS.preset)
+    if FLAGS.compare is None:
+        return {first.label: first}
+    second = style.source(FLAGS.compare, FLAGS.compare_preset)
+    if first.label != second.label:
+        return {first.label: first, second.label: second}
+    if FLAGS.policy == FLAGS.compare:
+        raise ValueError(f"--compare: expected another one than {first.label!r}")
+    return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
 
 
-def report(tracks: list[style.Track]) -> dict:
-    """The figures of a policy, as they go into the JSON."""
-    measured = [style.measure(track) for track in tracks]
-    summaries = {
-        name: {
-            "unit": metric.unit,
-            "robot": evaluation.summary([measurement[name].value for measurement in measured]),
-            "legs": {
-                leg: evaluation.summary([measurement[name].legs[leg] for measurement in measured])
-                for leg in measured[0][name].legs
-            },
-        }
-        for name, metric in style.METRICS.items()
-    }
-    return {
-        "return": evaluation.summary([track.rewards.sum() for track in tracks]),
-        "length": evaluation.summary([len(track.times) for track in tracks]),
-        "metrics": summaries,
-    }
+def chosen_bodies(stored: list[Body]) -> dict[str, Body]:
+    """The bodies that flags ask for, else the one whose tracks are stored, by name."""
+    if stored and not _ROBOT.present and body_flags.made() is None:
+        return {stored[0].name: stored[0]}
+    return body_flags.bodies(_ROBOT)
 
 
-def number(value: float) -> str:
-    """Three decimals, fewer for large numbers; a dash for NaN."""
-    if math.isnan(value):
-        return "-"
-    return f"{value:.3f}" if abs(value) < 100.0 else f"{value:.0f}"
+def number(value: float, decimals: int = 3) -> str:
+    """So many decimals; a dash for NaN."""
+    return "-" if math.isnan(value) else f"{value:.{decimals}f}"
 
 
-def print_robot(reports: dict) -> None:
-    """The table of the robot's figures, policies side by side, mean +- standard deviation over episodes."""
-    columns = "{:<18} {:<9}" + " {:>20}" * len(reports)
-    header = columns.format("metric", "unit", *reports)
-    print(header, "-" * len(header), sep="\n")
-    rows = {name: ("", [r[name] for r in reports.values()]) for name in ("return", "length")}
-    for name, metric in style.METRICS.items():
-        rows[name] = (metric.unit, [r["metrics"][name]["robot"] for r in reports.values()])
-    for name, (unit, summaries) in rows.items():
-        cells = [
-            f"{number(s.mean)} +- {number(s.deviation)}" if math.isfinite(s.mean) else number(s.mean) for s in summaries
-        ]
-        print(columns.format(name.replace("_", " "), unit, *cells))
+def spread(summary: evaluation.Summary) -> str:
+    """Mean +- standard deviation, the mean alone where it is not finite."""
+    if not math.isfinite(summary.mean):
+        return number(summary.mean)
+    decimals = 1 if abs(summary.mean) >= 100.0 else 3
+    return f"{number(summary.mean, decimals)} +- {number(summary.deviation, decimals)}"
 
 
-def print_legs(label: str, figures: dict) -> None:
-    """The table of a policy's figures by leg, means over episodes."""
-    by_leg = {name: metric for name, metric in figures["metrics"].items() if metric["legs"]}
-    legs = next(iter(by_leg.values()))["legs"]
-    columns = "{:<18} {:<9}" + " {:>7}" * len(legs)
-    header = columns.format(f"{label}, by leg", "", *legs)
+def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, list[str]]]) -> None:
+    """Rows of a name, a metric's figures, and a cell for each column."""
+    width = max(8, *(len(text) for text in [*columns, *(cell for _, _, cells in rows for cell in cells)]))
+    first = max(18, len(heading))
+    line = f"{{:<{first}}} {{:<8}} {{:>10}}" + f"  {{:>{width}}}" * len(columns)
+    header = line.format(heading, "unit", "prescribed", *columns)
     print("", header, "-" * len(header), sep="\n")
-    for name, metric in by_leg.items():
-        cells = [number(summary.mean) for summary in metric["legs"].values()]
-        print(columns.format(name.replace("_", " "), metric["unit"], *cells))
+    for name, metric, cells in rows:
+        prescribed = metric.get("prescribed")
+        prescribed = "" if prescribed is None else number(prescribed)
+        print(line.format(name.replace("_", " "), metric.get("unit", ""), prescribed, *cells))
+
+
+def print_report(robot: str, reports: dict) -> None:
+    """The tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
+    first = next(iter(reports.values()))
+    rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
+    rows += [
+        (name, metric, [spread(r["metrics"][name]["robot"]) for r in reports.values()])
+        for name, metric in first["metrics"].items()
+    ]
+    print_table(robot, list(reports), rows)
+    for label, figures in reports.items():
+        rows = [
+            (name, metric, [number(summary.mean) for summary in metric["legs"].values()])
+            for name, metric in figures["metrics"].items()
+            if metric["legs"]
+        ]
+        print_table(f"{robot}, {label}", list(first["metrics"]["duty_factor"]["legs"]), rows)
 
 
 @contextlib.contextmanager
-def pictures():
-    """Yields a function that writes the pictures of tracks by label; does nothing without `--output`."""
+def pictures(robots: list[str]):
+    """Yields a function that writes the pictures of a robot's tracks by label; does nothing without `--output`."""
     if FLAGS.output is None:
-        yield lambda tracks: None
+        yield lambda robot, tracks: None
         return
     try:
         from arc_suite.style.pictures import PICTURES
     except ImportError as error:
         raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
-    folder = commands.folder(FLAGS.output)
     with contextlib.ExitStack() as stack:
-        files = {name: stack.enter_context(commands.writing(folder / f"{name}.png")) for name in PICTURES}
-        yield lambda tracks: [PICTURES[name](tracks).savefig(file) for name, file in files.items()]
+        files = {}
+        for robot in robots:
+            folder = commands.folder(pathlib.Path(FLAGS.output, robot if len(robots) > 1 else ""))
+            files[robot] = {name: stack.enter_context(commands.writing(folder / f"{name}.png")) for name in PICTURES}
+
+        def draw(robot, tracks):
+            for name, file in files[robot].items():
+                PICTURES[name](tracks).savefig(file)
+
+        yield draw
+
+
+@contextlib.contextmanager
+def saving(robots: list[str]):
+    """Yields a function that saves tracks; does nothing without `--save`."""
+    if FLAGS.save is None:
+        yield lambda tracks: None
+        return
+    if not FLAGS.save.endswith(".npz"):
+        raise ValueError(f"--save={FLAGS.save}: expected a file that ends in .npz")
+    if len(robots) > 1:
+        raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")
+    with commands.writing(FLAGS.save) as file:
+        yield lambda tracks: style.save(file, tracks)
 
 
 def main():
     """Records, measures, prints and writes."""
-    chosen = [(FLAGS.policy, FLAGS.preset)]
-    if FLAGS.compare is not None:
-        chosen.append((FLAGS.compare, FLAGS.compare_preset))
-    labels = [f"{policy} {preset}" if policy == "cpg" else policy for policy, preset in chosen]
-    if len(set(labels)) < len(labels):
-        raise ValueError(f"--compare: expected another policy than {labels[0]!r}")
-    walkers = {
-        label: policies.policy(policy, FLAGS.robot, preset, FLAGS.seed)
-        for label, (policy, preset) in zip(labels, chosen, strict=True)
+    chosen = chosen_sources()
+    bodies = chosen_bodies([source.body for source in chosen.values() if source.body is not None])
+    seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
+    takes = {
+        robot: {label: source.takes(body, seeds) for label, source in chosen.items()} for robot, body in bodies.items()
     }
-    with commands.writing_json(FLAGS.json) as file, pictures() as draw:
-        tracks = {label: record(label, policy) for label, policy in walkers.items()}
-        reports = {label: report(recorded) for label, recorded in tracks.items()}
-        print(f"{FLAGS.robot}, {FLAGS.episodes} episodes, mean +- standard deviation\n")
-        print_robot(reports)
-        for label, figures in reports.items():
-            print_legs(label, figures)
-        draw({f"{FLAGS.robot}, {label}": recorded[0] for label, recorded in tracks.items()})
-        file.update(
-            robot=FLAGS.robot,
-            episodes=FLAGS.episodes,
-            seed=FLAGS.seed,
-            policies=reports,
-            versions=evaluation.versions(),
-        )
+    robots = list(bodies)
+    with commands.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
+        reports = {}
+        for robot, by_label in takes.items():
+            tracks = {}
+            for label, several in by_label.items():
+                with tqdm(several, desc=f"{robot}, {label}", unit="episode", leave=False) as progress:
+                    tracks[label] = [take() for take in progress]
+            save(next(iter(tracks.values())))
+            reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
+            print_report(robot, reports[robot])
+            draw(robot, {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()})
+        file.update(episodes=FLAGS.episodes, seed=FLAGS.seed, robots=reports, versions=evaluation.versions())
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """How well a robot walks, beside what it earns: recorded rollouts, metrics of style, and pictures of both."""
 
-from arc_suite.style.metrics import METRICS, measure
+from arc_suite.style.files import load, save
+from arc_suite.style.measures import METRICS, measure, report
+from arc_suite.style.sources import Source, source
 from arc_suite.style.tracks import Track, record
 
-__all__ = ["METRICS", "Track", "measure", "record"]
+__all__ = ["METRICS", "Source", "Track", "load", "measure", "record", "report", "save", "source"]

@@ -6,9 +6,6 @@ that stands. A robot that gets nowhere, over less than 5 % of the way that the t
 for, has no course, and its expenses per metre are infinite.
 """
 
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
-
 import numpy as np
 
 from arc_suite.style.tracks import Track
@@ -65,7 +62,8 @@ def phase_scatter(track: Track) -> float:
 def stride_length(track: Track) -> np.ndarray:
     """Mean way of a foot from touchdown to touchdown along world x, the way to go (Alexander, 1984), m; (feet,).
 
-    Negative backwards. NaN for a foot without two touchdowns.
+    Negative backwards. NaN for a foot without two touchdowns. A touchdown ends a swing in which the
+    foot rose over half of its clearance: a foot that bounces in stance does not stride.
     """
     return _between_touchdowns(track, lambda leg, rows: np.diff(track.foot_positions[rows, leg, 0])[0])
 
@@ -73,7 +71,7 @@ def stride_length(track: Track) -> np.ndarray:
 def stride_frequency(track: Track) -> np.ndarray:
     """Strides, from touchdown to touchdown, in a second (Alexander, 1984), Hz; (feet,).
 
-    NaN for a foot without two touchdowns.
+    Touchdowns are those of the stride's length; NaN for a foot without two of them.
     """
     return 1.0 / _between_touchdowns(track, lambda leg, rows: track.time_step * (rows[1] - rows[0]))
 
@@ -81,9 +79,11 @@ def stride_frequency(track: Track) -> np.ndarray:
 def _between_touchdowns(track, difference) -> np.ndarray:
     """A difference between the first and the last touchdown of each leg, by number of strides; (feet,)."""
     touchdown = track.stance[1:] & ~track.stance[:-1]
+    lifts = (~track.stance & (_heights(track) > 0.5 * foot_clearance(track))).cumsum(axis=0)
     means = np.full(len(track.legs), np.nan)
     for leg in range(len(track.legs)):
         rows = np.flatnonzero(touchdown[:, leg]) + 1
+        rows = rows[np.diff(lifts[rows, leg], prepend=0) > 0]
         if rows.size > 1:
             means[leg] = difference(leg, rows[[0, -1]]) / (rows.size - 1)
     return means
@@ -106,10 +106,15 @@ def foot_clearance(track: Track) -> np.ndarray:
     The usual peak height of swing, but also defined for a foot that never swings, where it is the
     height it is dragged at. Cycles that the track cuts short do not count unless there is no other.
     """
-    heights = track.foot_positions[..., 2] - track.foot_radii
+    heights = _heights(track)
     starts = np.flatnonzero(np.diff(track.phases) < 0.0) + 1
     cycles = np.split(heights, starts)
     return np.mean([cycle.max(axis=0) for cycle in cycles[1:-1] or cycles], axis=0)
+
+
+def _heights(track) -> np.ndarray:
+    """(steps, feet) of the feet's lowest points over the floor, m."""
+    return track.foot_positions[..., 2] - track.foot_radii
 
 
 def speed(track: Track) -> float:
@@ -247,60 +252,3 @@ def _mean_where(values, mask) -> np.ndarray:
     counts = mask.sum(axis=-1)
     sums = np.where(mask, values, 0.0).sum(axis=-1)
     return np.where(counts > 0, sums / counts.clip(1), np.nan)
-
-
-class Metric(NamedTuple):
-    """A metric's function and its unit; shares and indices have none."""
-
-    function: Callable[[Track], np.ndarray | float]
-    unit: str
-
-
-class Measurement(NamedTuple):
-    """The robot's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
-
-    value: float
-    legs: Mapping[str, float]
-
-
-METRICS = {
-    function.__name__: Metric(function, unit)
-    for function, unit in (
-        (gait_compliance, ""),
-        (duty_factor, ""),
-        (phase_error, "cycles"),
-        (phase_scatter, ""),
-        (stride_length, "m"),
-        (stride_frequency, "Hz"),
-        (foot_slip, "m/m"),
-        (foot_clearance, "m"),
-        (speed, "m/s"),
-        (heading_error, "rad"),
-        (lateral_drift, "m/m"),
-        (torso_pitch, "rad"),
-        (torso_roll, "rad"),
-        (height_variation, "m"),
-        (posture_deviation, "rad"),
-        (action_change, ""),
-        (torque, "N m"),
-        (asymmetry, "m"),
-        (cost_of_transport, "J/(N m)"),
-    )
-}
-
-
-def measure(track: Track) -> dict[str, Measurement]:
-    """All metrics of a track, by name.
-
-    A robot's phase error is the mean size of its legs' errors, so that early and late do not
-    cancel. Legs whose value is NaN do not count; NaN if that is all of them.
-    """
-    return {name: _measurement(track, name, metric.function(track)) for name, metric in METRICS.items()}
-
-
-def _measurement(track, name, values) -> Measurement:
-    if np.ndim(values) == 0:
-        return Measurement(float(values), {})
-    counted = abs(values) if name == "phase_error" else values
-    value = float(_mean_where(counted, ~np.isnan(counted)))
-    return Measurement(value, dict(zip(track.legs, map(float, values), strict=True)))

@@ -50,6 +50,7 @@ _LOOK = {
     "savefig.dpi": 150,
 }
 _WIDTH = 9.5  # inches
+_BELOW = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}  # a legend
 _WINDOW = 4.0  # s of footfalls
 
 
@@ -58,7 +59,7 @@ def _drawn(draw):
     def wrapped(tracks: Mapping[str, Track]) -> Figure:
         with matplotlib.rc_context(_LOOK):
             figure = draw(tracks)
-            figure.get_layout_engine().set(w_pad=0.12, h_pad=0.12, hspace=0.04)
+            figure.get_layout_engine().set(w_pad=0.1, h_pad=0.06, hspace=0.06)
             figure.draw_without_rendering()  # while the look holds
             return figure
 
@@ -83,15 +84,17 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
             ):
                 spans = [(start + dt * first, dt * (last - first)) for first, last in _runs(mask)]
                 axis.broken_barh(spans, (leg - height / 2, height), color=colour, linewidth=0)
-        compliance, error = metrics.gait_compliance(track), metrics.phase_error(track)
+        compliance, duty, error = metrics.gait_compliance(track), metrics.duty_factor(track), metrics.phase_error(track)
+        wanted = track.parameters.duty_factor
         for column, heading, texts in (
-            (1.055, "compliance", [f"{100 * share:.0f} %" for share in compliance]),
-            (1.15, "late by", ["–" if np.isnan(late) else f"{late:+.2f} cycles" for late in error]),
+            (1.06, "compliance", [f"{100 * share:.0f} %" for share in compliance]),
+            (1.195, f"duty factor\n({wanted:.2f} wanted)", [f"{share:.2f}" for share in duty]),
+            (1.315, "late by", ["–" if np.isnan(late) else f"{late:+z.2f} cycles" for late in error]),
         ):
-            place = {"transform": axis.get_yaxis_transform(), "va": "center", "ha": "center", "fontsize": 8.5}
-            axis.text(column, -0.85, heading, color=FAINT, **place)
+            place = {"transform": axis.get_yaxis_transform(), "ha": "center", "fontsize": 8.5}
+            axis.text(column, -0.6, heading, va="bottom", color=FAINT, linespacing=1.25, **place)
             for leg, text in enumerate(texts):
-                axis.text(column, leg, text, **place)
+                axis.text(column, leg, text, va="center", **place)
         axis.set_title(label)
         axis.set_yticks(range(len(track.legs)), track.legs)
         axis.set_ylim(len(track.legs) - 0.5, -0.5)
@@ -100,15 +103,14 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
         axis.spines["left"].set_visible(False)
     axes[-1].set_xlabel("time (s)")
     entries = {
-        "prescribed stance": PALE,
+        "prescribed stance (bare where missed)": PALE,
         "stance as prescribed": BLUE,
         "stance in place of swing": VERMILION,
     }
     figure.legend(
         handles=[Patch(color=colour, label=text) for text, colour in entries.items()],
-        loc="outside lower center",
         ncols=3,
-        handlelength=1.4,
+        **_BELOW,
     )
     return figure
 
@@ -131,9 +133,8 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
                     floor,
                     ceiling,
                     facecolor=TERM_COLOURS.get(name, FAINT),
-                    edgecolor="white",
-                    linewidth=0.3,
-                    label=f"{weighted[name].mean():+z.3f}  {name.replace('_', ' ')}",
+                    linewidth=0,
+                    label=f"{weighted[name].mean():+.3f}  {name.replace('_', ' ')}",
                 )
                 floor = ceiling
         (total,) = axis.plot(
@@ -141,7 +142,7 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
             _over_a_cycle(track, track.rewards),
             color="black",
             linewidth=1.2,
-            label=f"{track.rewards.mean():+z.3f}  reward",
+            label=f"{track.rewards.mean():+.3f}  reward",
         )
         axis.axhline(0.0, color="white", linewidth=0.8)
         axis.set_title(f"{label}: return {track.rewards.sum():.0f}")
@@ -168,24 +169,21 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
     axis = figure.subplots()
     parameters = next(iter(tracks.values())).parameters
     target, band = parameters.target_velocity, parameters.velocity_band
-    axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0)
-    axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)))
-    beside = {"transform": axis.get_yaxis_transform(), "va": "center", "fontsize": 8.5}
-    axis.text(1.01, target, f"target\n{target:.2f} m/s", **beside)
-    axis.text(1.01, target + band, "reward's\nband", color=FAINT, **beside)
+    axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0, label="where speed is rewarded")
+    axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)), label=f"target: {target:.2f} m/s")
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x = track.positions[:, 0]
         steps = np.diff(x) / track.time_step if len(x) > 1 else np.array([np.nan])
         times = track.times[-len(steps) :]
         low, high = _range_over_a_cycle(track, steps)
         axis.fill_between(times, low, high, color=colour, alpha=0.2, linewidth=0)
-        name = f"{label}: {metrics.speed(track):.2f} m/s"
+        name = f"{label}: {metrics.speed(track):z.2f} m/s"
         axis.plot(times, _over_a_cycle(track, steps), color=colour, linewidth=1.8, label=name)
     axis.set_title("Forward speed: mean over a gait cycle, and range of the steps within")
     axis.set_ylabel("speed (m/s)")
     axis.set_xlabel("time (s)")
     axis.set_xlim(0.0, max(track.times[-1] for track in tracks.values()))
-    figure.legend(loc="outside lower center", ncols=2, handlelength=1.4)
+    figure.legend(ncols=2, **_BELOW)
     return figure
 
 
@@ -225,7 +223,7 @@ def path(tracks: Mapping[str, Track]) -> Figure:
     axis.set_title("Path of the torso from above")
     axis.set_xlabel("x (m), the way to go")
     axis.set_ylabel("y (m)")
-    figure.legend(loc="outside lower center", ncols=2, handlelength=1.4)
+    figure.legend(ncols=2, **_BELOW)
     return figure
 
 

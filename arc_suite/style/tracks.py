@@ -15,6 +15,8 @@ class Track(NamedTuple):
     """A rollout: one row for the end of every control step, SI units, angles in rad.
 
     Attributes:
+        body: what walked.
+        seed: of the episode, with which the actions repeat it.
         time_step: s between rows.
         positions: (steps, 3) of the torso.
         quaternions: (steps, 4) of the torso, w first.
@@ -39,6 +41,8 @@ class Track(NamedTuple):
         foot_radii: (feet,)
     """
 
+    body: Body
+    seed: int
     time_step: float
     positions: np.ndarray
     quaternions: np.ndarray
@@ -122,6 +126,8 @@ def record(environment, policy, seed: int, max_steps: int | None = None) -> Trac
         rows.append({name: np.array(value) for name, value in row.items()})
         terms.append(task.terms)
     return Track(
+        body=body,
+        seed=int(seed),
         time_step=environment.control_timestep(),
         **{name: np.stack([row[name] for row in rows]) for name in rows[0]},
         terms={name: np.array([row[name] for row in terms]) for name in terms[0]},

@@ -32,6 +32,17 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
     return array.clip(-1.0, 1.0)
 
 
+def blocks(vector: np.ndarray, joints: int) -> collections.OrderedDict:
+    """An observation vector (..., size) as the named blocks of `Walker.observation`, views of it."""
+    velocities, contact_forces = 5 + joints, 11 + 2 * joints
+    return collections.OrderedDict(
+        posture=vector[..., :velocities],
+        velocities=vector[..., velocities:contact_forces],
+        contact_forces=vector[..., contact_forces:-2],
+        gait_clock=vector[..., -2:],
+    )
+
+
 class Walker:
     """What one walk, or each walk of a batch, remembers between control steps, and what follows from it.
 
@@ -144,15 +155,7 @@ class Walker:
             posture (..., 5 + joints), velocities (..., 6 + joints), contact_forces (..., 6 * parts)
             and gait_clock (..., 2).
         """
-        vector = self.observation_vector(data)
-        joints = self._shape[-1]
-        velocities, contact_forces = 5 + joints, 11 + 2 * joints
-        return collections.OrderedDict(
-            posture=vector[..., :velocities],
-            velocities=vector[..., velocities:contact_forces],
-            contact_forces=vector[..., contact_forces:-2],
-            gait_clock=vector[..., -2:],
-        )
+        return blocks(self.observation_vector(data), self._shape[-1])
 
     def fallen(self, data):
         """Whose torso has left its healthy range: (...) booleans."""

@@ -1,0 +1,20 @@
+"""Datasets of walks in Minari's format, which offline-RL libraries open and which replay to the bit.
+
+dataset = arc_suite.data.open("arc_suite/queen/cpg-medium-v0")
+episode = dataset[0]
+track = style.record(dataset.environment(), episode.playback(), episode.seed, max_steps=episode.length)
+"""
+
+try:
+    import h5py  # noqa: F401
+    import minari  # noqa: F401
+except ImportError as error:
+    raise ImportError(f"datasets need Minari: pip install 'arc_suite[data]' ({error})") from error
+
+from arc_suite.data.collection import collect
+from arc_suite.data.dataset import Dataset, open
+from arc_suite.data.episodes import Episode
+from arc_suite.data.settings import Settings
+from arc_suite.data.verification import verify
+
+__all__ = ["Dataset", "Episode", "Settings", "collect", "open", "verify"]

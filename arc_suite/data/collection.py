@@ -1,0 +1,179 @@
+"""Collecting a dataset."""
+
+import math
+import time
+from collections.abc import Callable
+
+import gymnasium
+import numpy as np
+from minari import __version__ as minari_version
+from minari.serialization import serialize_space
+from tqdm import tqdm
+
+from arc_suite import evaluation, names, seeding
+from arc_suite.cpg import PRESETS
+from arc_suite.data import rollouts
+from arc_suite.data.actors import actor
+from arc_suite.data.settings import Settings
+from arc_suite.data.storage import Storage
+from arc_suite.suite import load
+from arc_suite.tasks import rewards
+from arc_suite.vector import VectorEnv
+
+ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
+
+# Episodes are written when this many times the last writing's duration has passed, so that writing takes a
+# small share of the time however short episodes are, or when they have this size.
+PATIENCE = 20
+BYTES = 1 << 26
+
+
+def collect(
+    dataset_id: str,
+    settings: Settings,
+    episodes: int,
+    rows: int = ROWS,
+    threads: int | None = None,
+    overwrite: bool = False,
+    progress: Callable = tqdm,
+) -> int:
+    """Collects the episodes that a dataset does not have yet.
+
+    Args:
+        dataset_id: Minari's.
+        settings: what the episodes depend on.
+        episodes: how many the dataset is to have.
+        rows: how many are played at a time; what is collected does not depend on it.
+        threads: on which to simulate; None for all cores. Nor does it depend on these.
+        overwrite: replace a dataset that is there, when the new one is complete.
+        progress: makes progress bars as `tqdm` does.
+
+    Returns:
+        How many episodes were missing.
+
+    Raises:
+        ValueError: settings that do not fit, a dataset that is damaged or has other settings, or a
+            policy whose action is none; one line. Episodes finished before are kept.
+        OSError: the disk is full, or the like; likewise.
+        KeyboardInterrupt: likewise.
+    """
+    _check(settings, episodes)
+    with Storage.opened(dataset_id, overwrite) as storage:
+        provenance, specification = settings.provenance(), settings.environment_spec().to_json()
+        if storage.metadata is not None:
+            difference = _difference(storage.metadata, provenance, specification)
+            if difference and not overwrite:
+                raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
+            if difference:
+                storage.clear()
+        missing = [index for index in range(episodes) if index not in storage.kept]
+        try:
+            if missing:
+                actor(settings, 1)  # finds a wrong policy before the work
+                if storage.metadata is None:
+                    storage.metadata = _metadata(dataset_id, settings, provenance, specification)
+                _play(storage, settings, missing, rows, threads, progress)
+            storage.finish(lambda indices: progress(indices, desc="merging", unit="episode", leave=False))
+        except (ValueError, OSError, KeyboardInterrupt) as error:
+            kind = next(kind for kind in (ValueError, OSError, KeyboardInterrupt) if isinstance(error, kind))
+            cause = "interrupted" if kind is KeyboardInterrupt else error
+            kept = len(storage.kept.intersection(range(episodes)))
+            raise kind(f"{cause}; {kept} of {episodes} episodes are kept") from None
+        return len(missing)
+
+
+def _check(settings: Settings, episodes: int) -> None:
+    for preset in settings.presets:
+        names.check(preset, PRESETS, "preset")
+    if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
+        raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
+    seeding.check(settings.seed)
+    seeding.check(settings.seed + episodes - 1)
+
+
+def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
+    """The first difference between what a dataset was and would be collected with, in words."""
+    was = metadata["arc_suite"]
+    for group in ("settings", "versions"):
+        for name, value in provenance[group].items():
+            if was[group].get(name) != value:
+                return f"its {name} is {was[group].get(name)!r}, and not {value!r}"
+    if was["model_sha256"] != provenance["model_sha256"]:
+        return f"the sha256 of its model is {was['model_sha256'][:12]}, and not {provenance['model_sha256'][:12]}"
+    if metadata["env_spec"] != specification:
+        return "its environment is specified otherwise"
+    return None
+
+
+def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, threads, progress: Callable) -> None:
+    """Plays the missing episodes into the storage."""
+    rows = math.ceil(len(missing) / math.ceil(len(missing) / rows))  # all rows busy to the end, or nearly
+    environment = VectorEnv(settings.body, "walk", rows, threads, max_episode_steps=settings.steps)
+    seeds = [settings.seed + index for index in missing]
+    pending, size, due = {}, 0, 0.0
+
+    def write():
+        nonlocal pending, size, due
+        started = time.monotonic()
+        storage.add(pending)
+        pending, size = {}, 0
+        due = time.monotonic() + PATIENCE * (time.monotonic() - started)
+
+    total, done = len(missing) + len(storage.kept), len(storage.kept)
+    with progress(
+        desc=settings.body.name,
+        total=total * settings.steps,
+        initial=done * settings.steps,
+        unit="step",
+        unit_scale=True,
+    ) as bar:
+        try:
+            for step in rollouts.play(environment, actor(settings, rows), seeds, settings.steps):
+                bar.update(step.playing)
+                for episode in step.finished:
+                    episode = episode._replace(preset=settings.preset(episode.seed))
+                    pending[episode.seed - settings.seed] = episode
+                    size += episode.nbytes
+                    bar.update(settings.steps - episode.length)
+                if pending and (time.monotonic() >= due or size >= BYTES):
+                    write()
+                    bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
+        finally:
+            if pending:
+                write()
+            environment.close()
+
+
+def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str) -> dict:
+    """Minari's metadata, but for the counts."""
+    environment = gymnasium.make(settings.environment_spec())
+    weights = load(settings.body, "walk").task.settings.weights
+    presets = f", presets {' and '.join(settings.presets)} in turn" if settings.presets else ""
+    noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
+    return {
+        "dataset_id": dataset_id,
+        "minari_version": minari_version,
+        "data_format": "hdf5",
+        "jpeg_encoding": False,
+        "observation_space": serialize_space(environment.observation_space),
+        "action_space": serialize_space(environment.action_space),
+        "env_spec": specification,
+        "algorithm_name": "-".join([settings.policy, *settings.presets]),
+        "description": f"{settings.body.name} walks by policy {settings.policy}{presets}{noise}; "
+        f"episode k has seed {settings.seed} + k.",
+        "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
+        "ref_min_score": _mean_return(settings._replace(policy="zero", presets=(), noise=0.0, seed=0)),
+        "ref_max_score": rewards.greatest(weights) * settings.steps,
+        "num_episodes_average_score": evaluation.EPISODES,
+        "arc_suite": provenance,
+    }
+
+
+def _mean_return(settings: Settings) -> float:
+    """Of the episodes of the evaluation protocol."""
+    count = evaluation.EPISODES
+    environment = VectorEnv(settings.body, "walk", count, max_episode_steps=settings.steps)
+    played = rollouts.play(environment, actor(settings, count), range(count), settings.steps)
+    totals = {episode.seed: episode.total for step in played for episode in step.finished}
+    environment.close()
+    return float(np.mean([totals[seed] for seed in range(count)]))

@@ -1,0 +1,112 @@
+"""Datasets, opened to be read."""
+
+import contextlib
+import json
+import operator
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+
+from arc_suite import suite
+from arc_suite.data import episodes, ids
+from arc_suite.data.episodes import Episode
+from arc_suite.spec import Body
+
+METADATA = "metadata.json"
+MAIN = "main_data.hdf5"
+
+
+def open(dataset_id: str) -> "Dataset":
+    """Opens a dataset that `tools/collect.py` has written.
+
+    Args:
+        dataset_id: such as "arc_suite/queen/cpg-medium-v0"; Minari says where datasets lie.
+
+    Raises:
+        ValueError: no such dataset, or one that is damaged or not of this suite; one line.
+    """
+    return Dataset(dataset_id, ids.find(dataset_id))
+
+
+class Dataset:
+    """The recorded episodes of one body: a sequence of `Episode`s, each read when it is asked for.
+
+    Attributes:
+        id: Minari's.
+        path: its folder.
+        metadata: Minari's for the dataset; "arc_suite" holds `settings`, `versions` and `model_sha256`.
+        body: what walked.
+        steps: after which episodes were truncated.
+    """
+
+    def __init__(self, dataset_id: str, path: Path):
+        """Reads the metadata; see `open`."""
+        self.id, self.path = dataset_id, path
+        self.metadata = read_metadata(dataset_id, path)
+        with damages(dataset_id, path / "data" / METADATA):
+            specification = json.loads(self.metadata["env_spec"])
+            domain = specification["kwargs"]["domain_name"]
+            self.steps = operator.index(specification["max_episode_steps"])
+            self._length = operator.index(self.metadata["total_episodes"])
+        self.body: Body = suite.body_of(domain)
+
+    def environment(self):
+        """The dm_env in which the episodes play: `arc_suite.load(body, "walk")`."""
+        return suite.load(self.body, "walk")
+
+    def __len__(self) -> int:
+        return self._length
+
+    def __getitem__(self, index: int) -> Episode:
+        """Reads one episode.
+
+        Raises:
+            IndexError: there is none.
+            ValueError: it is damaged; one line.
+        """
+        index = range(len(self))[index]
+        with self.reading() as file:
+            return episodes.read(file, index)
+
+    def __iter__(self) -> Iterator[Episode]:
+        return (self[index] for index in range(len(self)))
+
+    def summaries(self) -> list[dict]:
+        """The metadata of every episode: `seed`, `length`, `return`, `sha256`, and `preset` if there is one.
+
+        Raises:
+            ValueError: the file is damaged; one line.
+        """
+        with self.reading() as file:
+            return [dict(file[episodes.name(index)].attrs) for index in range(len(self))]
+
+    @contextlib.contextmanager
+    def reading(self):
+        """Yields the open HDF5 file; what goes wrong in reading it becomes a ValueError of one line."""
+        path = self.path / "data" / MAIN
+        with damages(self.id, path), h5py.File(path, "r") as file:
+            yield file
+
+
+@contextlib.contextmanager
+def damages(dataset_id: str, file: Path):
+    """Turns what h5py raises at a damaged file into a ValueError of one line that names dataset and file."""
+    try:
+        yield
+    except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
+        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {error}") from None
+
+
+def read_metadata(dataset_id: str, path: Path) -> dict:
+    """The metadata of a dataset in a folder.
+
+    Raises:
+        ValueError: it is damaged, or the dataset is not of this suite; one line.
+    """
+    path = path / "data" / METADATA
+    with damages(dataset_id, path):
+        metadata = json.loads(path.read_text())
+    if not isinstance(metadata, dict) or "arc_suite" not in metadata:
+        raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
+    return metadata

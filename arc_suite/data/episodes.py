@@ -1,0 +1,128 @@
+"""Episodes as arrays, and as groups of an HDF5 file in Minari's layout."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
+TERMS = "infos/reward_terms"  # as in the info of a step
+
+
+class Episode(NamedTuple):
+    """One recorded episode.
+
+    Attributes:
+        seed: of its reset.
+        preset: of the demonstrator that walked; None for other policies.
+        observations: (steps + 1, size) float32; the first is that of the reset.
+        actions: (steps, joints) float32 in [-1, 1], as applied.
+        rewards: (steps,) float64.
+        terminations: (steps,) booleans.
+        truncations: (steps,) booleans.
+        terms: the reward's unweighted terms by name, each (steps,) float64.
+    """
+
+    seed: int
+    preset: str | None
+    observations: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    terminations: np.ndarray
+    truncations: np.ndarray
+    terms: Mapping[str, np.ndarray]
+
+    @property
+    def length(self) -> int:
+        """Control steps."""
+        return len(self.rewards)
+
+    @property
+    def total(self) -> float:
+        """The return: the sum of the rewards, undiscounted."""
+        return float(self.rewards.sum())
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the arrays."""
+        return sum(array.nbytes for array in self.arrays().values())
+
+    def playback(self) -> Callable:
+        """A policy that does what was done: TimeStep -> action; the first `TimeStep` of an episode rewinds it.
+
+        In an environment of the same body whose reset has the episode's seed it repeats the episode
+        to the bit. After the last recorded action it stands still.
+        """
+        step = 0
+
+        def policy(timestep):
+            nonlocal step
+            step = 0 if timestep.first() else step + 1
+            return self.actions[step] if step < self.length else np.zeros_like(self.actions[0])
+
+        return policy
+
+    def digest(self) -> str:
+        """The sha256 of everything in it: equal for episodes that are equal to the bit."""
+        total = hashlib.sha256(f"{self.seed} {self.preset}".encode())
+        for name, array in sorted(self.arrays().items()):
+            total.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            total.update(np.ascontiguousarray(array).data)
+        return total.hexdigest()
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All arrays by their paths in the file."""
+        terms = {f"{TERMS}/{name}": term for name, term in self.terms.items()}
+        return {name: getattr(self, name) for name in ARRAYS} | terms
+
+
+def write(file, index: int, episode: Episode) -> None:
+    """Writes an episode into an open HDF5 file, as `episode_<index>`.
+
+    Attributes of the group, which Minari shows as the episode's metadata: `id`, `seed`,
+    `total_steps`, `length`, `return`, `preset` if there is one, and `sha256`, the digest.
+    """
+    group = file.create_group(name(index))
+    for path, array in episode.arrays().items():
+        group.create_dataset(path, data=array)
+    group.attrs.update(_attributes(index, episode))
+
+
+def read(file, index: int) -> Episode:
+    """Reads an episode from an open HDF5 file.
+
+    Raises:
+        ValueError: its attributes, the digest among them, are not those of what is in it.
+        KeyError: there is no such episode, or something in it is missing.
+        OSError: it cannot be read.
+    """
+    group = file[name(index)]
+    attributes = dict(group.attrs)
+    episode = Episode(
+        int(attributes["seed"]),
+        attributes.get("preset"),
+        **{array: group[array][()] for array in ARRAYS},
+        terms={term: dataset[()] for term, dataset in group[TERMS].items()},
+    )
+    for key, value in _attributes(index, episode).items():
+        if attributes.get(key) != value:
+            raise ValueError(f"{group.name[1:]}: expected {key} {value}, found {attributes.get(key)}")
+    return episode
+
+
+def _attributes(index: int, episode: Episode) -> dict:
+    attributes = {
+        "id": index,
+        "seed": episode.seed,
+        "total_steps": episode.length,
+        "length": episode.length,
+        "return": episode.total,
+        "sha256": episode.digest(),
+    }
+    return attributes if episode.preset is None else attributes | {"preset": episode.preset}
+
+
+def name(index: int) -> str:
+    """Of an episode's group, as Minari has it."""
+    return f"episode_{index}"

@@ -1,0 +1,52 @@
+"""Ids of datasets, and where Minari keeps them."""
+
+import re
+from pathlib import Path
+
+from minari.dataset.minari_dataset import parse_dataset_id
+from minari.storage import get_dataset_path
+
+from arc_suite import names
+
+
+def check(dataset_id: str) -> str:
+    """Returns the id if Minari admits it.
+
+    Raises:
+        ValueError: it does not, or the version is missing; one line with an example.
+    """
+    try:
+        parse_dataset_id(dataset_id)
+    except (TypeError, ValueError):  # Minari's TypeError is that of a missing version
+        stem = re.sub(r"[^-\w/]+", "_", re.sub(r"-v\d*$", "", dataset_id)).strip("/") or "name"
+        raise ValueError(
+            f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
+            f"at the end, such as {stem + '-v0'!r}"
+        ) from None
+    return dataset_id
+
+
+def folder(dataset_id: str) -> Path:
+    """Where a dataset of this id lies, or would lie."""
+    return get_dataset_path(check(dataset_id))
+
+
+def existing() -> list[str]:
+    """Ids of all datasets on this machine, hidden folders left out."""
+    root = get_dataset_path()
+    found = sorted(path.parent.parent.relative_to(root) for path in root.rglob("data/metadata.json"))
+    return [path.as_posix() for path in found if not any(part.startswith(".") for part in path.parts)]
+
+
+def find(dataset_id: str) -> Path:
+    """Where a dataset lies.
+
+    Raises:
+        ValueError: a malformed id, or no such dataset; one line that names the nearest there is.
+    """
+    if not folder(dataset_id).joinpath("data").is_dir():
+        there = existing()
+        if not there:
+            raise ValueError(f"unknown dataset {dataset_id!r}: there are none in {get_dataset_path()}")
+        names.check(dataset_id, there, "dataset")
+    return folder(dataset_id)

@@ -1,0 +1,114 @@
+"""Seeded episodes, played in the rows of a vector environment."""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.data.episodes import Episode
+from arc_suite.vector import VectorEnv
+
+
+class Step(NamedTuple):
+    """What one control step of all rows brought.
+
+    Attributes:
+        playing: number of rows that played.
+        finished: episodes that ended.
+    """
+
+    playing: int
+    finished: list[Episode]
+
+
+def play(environment: VectorEnv, actor, seeds: Sequence[int], steps: int) -> Iterator[Step]:
+    """Plays one episode for each seed; a row whose episode ends starts the next one at once.
+
+    An episode depends on its seed and the actor alone, not on rows, threads or its neighbours.
+    Actions are rounded to float32 before they are applied, so that what is recorded is what was done.
+
+    Args:
+        environment: with at most as many rows as there are seeds.
+        actor: see `actors`.
+        seeds: of the episodes, started in this order.
+        steps: the most that an episode can have.
+
+    Yields:
+        A `Step` for every control step.
+    """
+    rows = environment.num_envs
+    recording = _Recording(environment, steps)
+    waiting = iter(seeds)
+    seated = [next(waiting) for _ in range(rows)]  # the seed that each row plays, None if it is done
+    observations, _ = environment.reset(seed=seated)
+    for row, seed in enumerate(seated):
+        actor.begin(row, seed)
+        recording.begin(row, observations)
+    rewards = np.zeros(rows)
+    playing = np.ones(rows, bool)
+    while playing.any():
+        actions = actor(observations, rewards).clip(-1.0, 1.0).astype(np.float32)
+        observations, rewards, terminated, truncated, info = environment.step(actions)
+        recording.add(actions, observations, rewards, info["reward_terms"])
+        ended = np.flatnonzero((terminated | truncated) & playing)
+        finished = [recording.episode(row, seated[row], terminated[row], truncated[row]) for row in ended]
+        count = int(playing.sum())
+        for row in ended:
+            seated[row] = next(waiting, None)
+            playing[row] = seated[row] is not None
+        starting = [row for row in ended if playing[row]]
+        if starting:
+            mask = np.zeros(rows, bool)
+            mask[starting] = True
+            observations, _ = environment.reset(seed=seated, options={"reset_mask": mask})
+            for row in starting:
+                actor.begin(row, seated[row])
+                recording.begin(row, observations)
+        yield Step(count, finished)
+
+
+class _Recording:
+    """What happens in the rows: allocated once, filled from step to step."""
+
+    def __init__(self, environment: VectorEnv, steps: int):
+        rows = environment.num_envs
+        self._rows = np.arange(rows)
+        self._clock = np.zeros(rows, int)
+        self._last = steps - 1
+        self._observations = np.empty((rows, steps + 1, *environment.single_observation_space.shape), np.float32)
+        self._actions = np.empty((rows, steps, *environment.single_action_space.shape), np.float32)
+        self._rewards = np.empty((rows, steps))
+        self._terms = None
+
+    def begin(self, row: int, observations) -> None:
+        """Starts an episode in a row."""
+        self._clock[row] = 0
+        self._observations[row, 0] = observations[row]
+
+    def add(self, actions, observations, rewards, terms) -> None:
+        """Takes a step of all rows down; rows that are done write over their last one."""
+        names = [name for name in terms if not name.startswith("_")]
+        if self._terms is None:
+            self._terms = {name: np.empty_like(self._rewards) for name in names}
+        at = self._rows, np.minimum(self._clock, self._last)
+        self._actions[at] = actions
+        self._rewards[at] = rewards
+        for name in names:
+            self._terms[name][at] = terms[name]
+        self._clock += 1
+        self._observations[self._rows, np.minimum(self._clock, self._last + 1)] = observations
+
+    def episode(self, row: int, seed: int, terminated: bool, truncated: bool) -> Episode:
+        """A copy of the episode that has just ended in a row."""
+        length = self._clock[row]
+        ends = np.arange(1, length + 1) == length
+        return Episode(
+            seed,
+            None,
+            self._observations[row, : length + 1].copy(),
+            self._actions[row, :length].copy(),
+            self._rewards[row, :length].copy(),
+            ends & terminated,
+            ends & truncated,
+            {name: term[row, :length].copy() for name, term in self._terms.items()},
+        )

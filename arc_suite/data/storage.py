@@ -1,0 +1,245 @@
+"""A dataset while it is collected: whenever a kill or a full disk comes, what is there opens.
+
+No file is written where it is read. Finished episodes go to part files, `data/parts/<n>.hdf5`, each
+written beside its place and moved there. `main_data.hdf5`, which Minari opens, is a small file of
+links to the episodes before the first that is missing, and is replaced after each part;
+`metadata.json` follows and tells how many there are. In the end the parts are merged into one plain
+`main_data.hdf5`, whose bytes do not depend on how the episodes got there.
+
+A new dataset starts in a hidden folder beside its place, and moves there with its first episodes;
+one that replaces another moves when it is complete.
+"""
+
+import contextlib
+import fcntl
+import itertools
+import json
+import os
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Self
+
+import h5py
+from minari.dataset.minari_dataset import parse_dataset_id
+from minari.namespace import create_namespace, list_local_namespaces
+
+from arc_suite import commands
+from arc_suite.data import episodes, ids
+from arc_suite.data.dataset import MAIN, METADATA, damages, read_metadata
+from arc_suite.data.episodes import Episode
+
+PARTS = "parts"
+
+
+class Storage:
+    """The files of one dataset; `opened` makes one.
+
+    Attributes:
+        id: Minari's.
+        metadata: Minari's, but for the counts; None in a new dataset until the caller sets it.
+        merged: whether the dataset is one plain file.
+    """
+
+    def __init__(self, dataset_id: str, folder: Path, place: Path, early: bool):
+        """Finds out what is in the folder, which moves to its place with the first episodes (early), or at the end."""
+        self.id, self.metadata = dataset_id, None
+        self._folder, self._place = folder, place
+        self._early = early
+        self._where: dict[int, tuple[str, int]] = {}  # by index of an episode its part and its steps
+        data = folder / "data"
+        if (data / METADATA).exists():
+            self.metadata = read_metadata(dataset_id, folder)
+        for leftover in data.rglob(".*"):  # of a kill in mid-writing
+            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
+        self.merged = (data / MAIN).exists() and not any(data.glob(f"{PARTS}/*.hdf5"))
+        self._scan(MAIN if self.merged else f"{PARTS}/*.hdf5")
+
+    @classmethod
+    @contextlib.contextmanager
+    def opened(cls, dataset_id: str, overwrite: bool) -> Iterator[Self]:
+        """Opens a dataset to collect into; no other process can meanwhile.
+
+        Args:
+            dataset_id: of a dataset that is there or of a new one.
+            overwrite: start anew even if it is there; the old one stays until `finish`.
+
+        Raises:
+            ValueError: the dataset is damaged, or being collected by another process; one line.
+            OSError: its files cannot be made; one line.
+        """
+        place = ids.folder(dataset_id)
+        new, old = (place.with_name(f".{place.name}.{suffix}") for suffix in ("new", "old"))
+        if old.exists():  # killed while a dataset was replaced
+            shutil.rmtree(old) if place.exists() else old.rename(place)
+        folder = new if overwrite or not place.exists() else place
+        _make_namespace(dataset_id)
+        (folder / "data").mkdir(parents=True, exist_ok=True)
+        with _locked(folder, dataset_id):
+            storage = cls(dataset_id, folder, place, early=not overwrite)
+            try:
+                yield storage
+            finally:
+                if not storage._where and storage._folder == new:
+                    shutil.rmtree(new)
+
+    @property
+    def kept(self) -> frozenset[int]:
+        """Indices of the episodes that are on disk."""
+        return frozenset(self._where)
+
+    def clear(self) -> None:
+        """Forgets what an overwriting collection that was given up has left."""
+        shutil.rmtree(self._folder / "data")
+        (self._folder / "data").mkdir()
+        self._where, self.metadata, self.merged = {}, None, False
+
+    def add(self, finished: Mapping[int, Episode]) -> None:
+        """Puts finished episodes on disk, by index, and lets Minari see them up to the first that is missing.
+
+        Raises:
+            OSError: a file cannot be written; one line that names it. What was there before is still.
+        """
+        parts = self._folder / "data" / PARTS
+        parts.mkdir(exist_ok=True)
+        if self.merged:
+            os.link(self._folder / "data" / MAIN, parts / f"{0:05}.hdf5")
+            self.merged = False
+            self._scan(f"{PARTS}/*.hdf5")
+        number = 1 + max((int(part.stem) for part in parts.glob("*.hdf5")), default=-1)
+        part = f"{PARTS}/{number:05}.hdf5"
+        with _image() as file:
+            for index, episode in finished.items():
+                episodes.write(file, index, episode)
+            self._write(part, file)
+        self._where |= {index: (part, episode.length) for index, episode in finished.items()}
+        self._publish()
+
+    def finish(self, progress: Callable) -> None:
+        """Merges the parts into one file, and puts a dataset that replaces another in its place.
+
+        Args:
+            progress: wraps an iterable of the episodes' indices, such as `tqdm`.
+
+        Raises:
+            OSError: there is no room, for a moment, for the dataset twice; what is there still opens.
+        """
+        data, count = self._folder / "data", self._count()
+        if not self.merged:
+            needed, free = self._size(), shutil.disk_usage(data).free
+            if free < needed:
+                raise OSError(f"cannot write {data / MAIN}: no space left on device: {needed} bytes are needed")
+            with commands.writing(data / MAIN) as temporary, _one_line(data / MAIN):
+                with h5py.File(temporary, "w") as merged:
+                    order = itertools.groupby(progress(range(count)), key=lambda index: self._where[index][0])
+                    for part, indices in order:
+                        with h5py.File(data / part, "r") as source:
+                            for index in indices:
+                                source.copy(episodes.name(index), merged)
+                _synchronise(temporary)
+            self._where = {index: (MAIN, self._where[index][1]) for index in range(count)}
+            self.merged = True
+            self._write_metadata()
+            (data / PARTS).rename(data / f".{PARTS}")
+            shutil.rmtree(data / f".{PARTS}")
+        self._move()
+
+    def _scan(self, pattern: str) -> None:
+        data = self._folder / "data"
+        for path in sorted(data.glob(pattern)):
+            part = path.relative_to(data).as_posix()
+            with damages(self.id, path), h5py.File(path, "r") as file:
+                for name, group in file.items():
+                    self._where[int(name.removeprefix("episode_"))] = part, int(group.attrs["total_steps"])
+
+    def _count(self) -> int:
+        """Episodes before the first that is missing."""
+        return next(index for index in itertools.count() if index not in self._where)
+
+    def _size(self) -> int:
+        """Bytes of the files that hold episodes."""
+        return sum((self._folder / "data" / part).stat().st_size for part in {part for part, _ in self._where.values()})
+
+    def _publish(self) -> None:
+        with _image() as file:
+            for index in range(self._count()):
+                name = episodes.name(index).encode()
+                file.id.links.create_external(name, self._where[index][0].encode(), name)
+            self._write(MAIN, file)
+        self._write_metadata()
+        if self._count() and self._early:
+            self._move()
+
+    def _write_metadata(self) -> None:
+        count = self._count()
+        counts = {
+            "total_episodes": count,
+            "total_steps": sum(self._where[index][1] for index in range(count)),
+            "dataset_size": round(self._size() / 1e6, 1),  # MB, as Minari counts
+        }
+        path = self._folder / "data" / METADATA
+        with commands.writing(path) as temporary, _one_line(path):
+            temporary.write_text(json.dumps(self.metadata | counts, indent=2) + "\n")
+            _synchronise(temporary)
+        _synchronise(path.parent)
+
+    def _write(self, name: str, file: h5py.File) -> None:
+        """Writes a file that was put together in memory, so that a full disk is Python's error and not HDF5's."""
+        file.flush()
+        path = self._folder / "data" / name
+        with commands.writing(path) as temporary, _one_line(path):
+            temporary.write_bytes(file.id.get_file_image())
+            _synchronise(temporary)
+        _synchronise(path.parent)
+
+    def _move(self) -> None:
+        """Puts the folder in its place."""
+        if self._folder == self._place:
+            return
+        old = self._place.with_name(f".{self._place.name}.old")
+        if self._place.exists():
+            self._place.rename(old)
+        self._folder.rename(self._place)
+        self._folder = self._place
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _make_namespace(dataset_id: str) -> None:
+    namespace = parse_dataset_id(dataset_id)[0]
+    if namespace is not None and namespace not in list_local_namespaces():
+        create_namespace(namespace)
+
+
+@contextlib.contextmanager
+def _locked(folder: Path, dataset_id: str):
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError:
+        raise ValueError(f"dataset {dataset_id!r} is being collected by another process") from None
+    finally:
+        os.close(descriptor)
+
+
+def _image():
+    """An HDF5 file in memory."""
+    return h5py.File("image", "w", driver="core", backing_store=False)
+
+
+@contextlib.contextmanager
+def _one_line(path: Path):
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise OSError(f"cannot write {path}: {reason.lower()}") from None
+
+
+def _synchronise(path: Path) -> None:
+    """Waits until a file or folder is on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

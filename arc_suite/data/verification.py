@@ -1,0 +1,86 @@
+"""Replaying a dataset."""
+
+from collections.abc import Callable
+
+from tqdm import tqdm
+
+from arc_suite import evaluation
+from arc_suite.data import rollouts
+from arc_suite.data.actors import Script
+from arc_suite.data.collection import ROWS
+from arc_suite.data.dataset import open
+from arc_suite.data.episodes import Episode
+from arc_suite.data.settings import model_sha256
+from arc_suite.spec import Body
+from arc_suite.vector import VectorEnv
+
+
+def verify(
+    dataset_id: str,
+    body: Body | None = None,
+    rows: int = ROWS,
+    threads: int | None = None,
+    progress: Callable = tqdm,
+) -> int:
+    """Replays every episode of a dataset from its seed and compares everything to the bit.
+
+    Args:
+        dataset_id: Minari's.
+        body: what should have walked; None for any.
+        rows: how many are replayed at a time.
+        threads: on which to simulate; None for all cores.
+        progress: makes a progress bar as `tqdm` does.
+
+    Returns:
+        How many episodes there are.
+
+    Raises:
+        ValueError: the dataset is missing, damaged, of another body, model or version, or its replay
+            differs; one line.
+    """
+    dataset = open(dataset_id)
+    if body not in (None, dataset.body):
+        raise ValueError(f"dataset {dataset_id!r} holds walks of {dataset.body.name}, and not of {body.name}")
+    was = dataset.metadata["arc_suite"]
+    for package, version in evaluation.versions().items():
+        if was["versions"].get(package) != version:
+            there = f"{package} {was['versions'].get(package)}"
+            raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
+    if was["model_sha256"] != model_sha256(dataset.body):
+        raise ValueError(f"dataset {dataset_id!r} was collected with another model of {dataset.body.name}")
+    count, first = len(dataset), was["settings"]["seed"]
+    if not count:
+        return 0
+    rows = min(rows, count)
+    recorded = {}
+
+    def script(seed):
+        episode = dataset[seed - first]
+        if episode.seed != seed:
+            raise ValueError(f"dataset {dataset_id!r}: episode {seed - first} has seed {episode.seed}, and not {seed}")
+        recorded[seed] = episode
+        return episode.actions
+
+    environment = VectorEnv(dataset.body, "walk", rows, threads, max_episode_steps=dataset.steps)
+    replayer = Script(script, *environment.action_space.shape)
+    with progress(desc="replaying", total=dataset.metadata["total_steps"], unit="step", unit_scale=True) as bar:
+        for step in rollouts.play(environment, replayer, range(first, first + count), dataset.steps):
+            bar.update(step.playing)
+            for episode in step.finished:
+                there = recorded.pop(episode.seed)
+                if episode._replace(preset=there.preset).digest() != there.digest():
+                    where = f"episode {episode.seed - first} differs from its replay: {_difference(there, episode)}"
+                    raise ValueError(f"dataset {dataset_id!r}: {where}")
+    environment.close()
+    return count
+
+
+def _difference(recorded: Episode, replayed: Episode) -> str:
+    """The array and the row in which episodes differ first."""
+    if recorded.length != replayed.length:
+        return f"{recorded.length} steps were recorded, {replayed.length} replayed"
+    for (name, there), here in zip(recorded.arrays().items(), replayed.arrays().values(), strict=True):
+        for row, (was, now) in enumerate(zip(there, here, strict=True)):
+            if was.tobytes() != now.tobytes():
+                return f"{name}[{row}]"
+    raise AssertionError("episodes with different digests differ")

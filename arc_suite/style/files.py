@@ -1,0 +1,86 @@
+"""Tracks on disk: one .npz file of plain arrays, with the body and the versions that made them, and no pickles.
+
+Track i's field positions is the array `i/positions`; what is a mapping or a tuple of names, such as
+the reward's terms, has an array for each, `i/terms/forward`. Numbers are arrays without axes.
+"""
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from arc_suite import evaluation
+from arc_suite.spec_files import body_from_json, body_to_json
+from arc_suite.style.tracks import Track
+from arc_suite.tasks import rewards
+
+FORMAT = "arc_suite tracks 1"  # another number for every change of what a file holds
+
+
+def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
+    """Writes tracks of one body.
+
+    Raises:
+        ValueError: no tracks, or tracks of several bodies; one line.
+        OSError: the file cannot be written.
+    """
+    bodies = {track.body for track in tracks}
+    if len(bodies) != 1:
+        raise ValueError(f"tracks: expected those of one body, got {sorted(body.name for body in bodies)}")
+    arrays = {"format": FORMAT, "body": body_to_json(*bodies), "versions": json.dumps(evaluation.versions())}
+    for index, track in enumerate(tracks):
+        fields = track._asdict()
+        del fields["body"]
+        arrays |= _flat(fields, str(index))
+    with open(path, "wb") as file:
+        np.savez(file, **arrays)
+
+
+def _flat(fields: Mapping, path: str) -> dict:
+    """The values of a mapping and of the mappings and named tuples in it, by path."""
+    values = {}
+    for name, value in fields.items():
+        value = value._asdict() if hasattr(value, "_asdict") else value
+        below = f"{path}/{name}"
+        values |= _flat(value, below) if isinstance(value, Mapping) else {below: value}
+    return values
+
+
+def load(path: str | os.PathLike) -> list[Track]:
+    """Reads tracks, equal to the bit to those that were saved.
+
+    Raises:
+        ValueError: the file holds no tracks, or those of another format, or is damaged; one line.
+        OSError: the file cannot be read; one line.
+    """
+    try:
+        file = open(path, "rb")  # noqa: SIM115
+    except OSError as error:
+        raise OSError(f"cannot read {path}: {error.strerror.lower()}") from None
+    with file:
+        try:
+            with np.load(file, allow_pickle=False) as archive:
+                arrays = dict(archive)
+            if (found := str(arrays.get("format", "no tracks"))) == FORMAT:
+                body = body_from_json(arrays["body"].item())
+                count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
+                return [_track(body, arrays, index) for index in range(count)]
+        except Exception as error:  # a damaged archive raises whatever its damage leads to
+            raise ValueError(f"{path}: not a file of tracks, or a damaged one: {error}") from None
+    raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}")
+
+
+def _track(body, arrays, index) -> Track:
+    """The track of an index; arrays without axes become numbers, and those of `Track`'s tuples tuples."""
+    fields = {}
+    for name, array in arrays.items():
+        top, *path = name.split("/")
+        if top == str(index):
+            mapping = fields
+            for key in path[:-1]:
+                mapping = mapping.setdefault(key, {})
+            mapping[path[-1]] = array if array.ndim else array.item()
+    low, high = fields["parameters"]["healthy_range"].tolist()
+    fields["parameters"] = rewards.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
+    return Track(body=body, **fields | {"legs": tuple(fields["legs"].tolist())})

@@ -1,0 +1,112 @@
+"""The report of style: all metrics of a track by name, and their figures over episodes."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import evaluation
+from arc_suite.style import metrics
+from arc_suite.style.tracks import Track
+from arc_suite.tasks.rewards import Parameters
+
+
+def _stride_frequency(parameters: Parameters) -> float:
+    """One stride a cycle of the clock, Hz; NaN where legs shall always stand or never."""
+    return parameters.gait_frequency if 0.0 < parameters.duty_factor < 1.0 else np.nan
+
+
+def _stride_length(parameters: Parameters) -> float:
+    """The way in a stride at the target speed, m; NaN where no stride is prescribed."""
+    return parameters.target_velocity / (_stride_frequency(parameters) or np.nan)
+
+
+class Metric(NamedTuple):
+    """What stands behind a metric's name.
+
+    Attributes:
+        function: of a track.
+        unit: shares and indices have none.
+        prescribed: the value that the task asks for, of its parameters; None where it leaves that open.
+    """
+
+    function: Callable[[Track], np.ndarray | float]
+    unit: str
+    prescribed: Callable[[Parameters], float] | None = None
+
+
+class Measurement(NamedTuple):
+    """The robot's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
+
+    value: float
+    legs: Mapping[str, float]
+
+
+METRICS = {
+    metric.function.__name__: metric
+    for metric in (
+        Metric(metrics.gait_compliance, "", lambda parameters: 1.0),
+        Metric(metrics.duty_factor, "", lambda parameters: parameters.duty_factor),
+        Metric(metrics.phase_error, "cycles", lambda parameters: 0.0),
+        Metric(metrics.phase_scatter, "", lambda parameters: 0.0),
+        Metric(metrics.stride_length, "m", _stride_length),
+        Metric(metrics.stride_frequency, "Hz", _stride_frequency),
+        Metric(metrics.foot_slip, "m/m"),
+        Metric(metrics.foot_clearance, "m"),
+        Metric(metrics.speed, "m/s", lambda parameters: parameters.target_velocity),
+        Metric(metrics.heading_error, "rad"),
+        Metric(metrics.lateral_drift, "m/m"),
+        Metric(metrics.torso_pitch, "rad"),
+        Metric(metrics.torso_roll, "rad"),
+        Metric(metrics.height_variation, "m"),
+        Metric(metrics.posture_deviation, "rad"),
+        Metric(metrics.action_change, ""),
+        Metric(metrics.torque, "N m"),
+        Metric(metrics.asymmetry, "m"),
+        Metric(metrics.cost_of_transport, "J/(N m)"),
+    )
+}
+
+
+def measure(track: Track) -> dict[str, Measurement]:
+    """All metrics of a track, by name.
+
+    A robot's phase error is the mean size of its legs' errors, so that early and late do not
+    cancel. Legs whose value is NaN do not count; NaN if that is all of them.
+    """
+    return {name: _measurement(track, name, metric.function(track)) for name, metric in METRICS.items()}
+
+
+def _measurement(track, name, values) -> Measurement:
+    if np.ndim(values) == 0:
+        return Measurement(float(values), {})
+    counted = abs(values) if name == "phase_error" else values
+    counted = counted[~np.isnan(counted)]
+    value = float(counted.mean()) if counted.size else np.nan
+    return Measurement(value, dict(zip(track.legs, map(float, values), strict=True)))
+
+
+def report(tracks: Sequence[Track]) -> dict:
+    """The figures of a policy, over tracks of one body and task.
+
+    Returns:
+        `return` and `length` as summaries of the evaluation protocol, and under `metrics`, by name,
+        the `unit`, the value `prescribed` or None, the summary of the `robot`, and of each of the `legs`.
+    """
+    measured = [measure(track) for track in tracks]
+    return {
+        "return": evaluation.summary([track.rewards.sum() for track in tracks]),
+        "length": evaluation.summary([len(track.times) for track in tracks]),
+        "metrics": {
+            name: {
+                "unit": metric.unit,
+                "prescribed": metric.prescribed and metric.prescribed(tracks[0].parameters),
+                "robot": evaluation.summary([measurement[name].value for measurement in measured]),
+                "legs": {
+                    leg: evaluation.summary([measurement[name].legs[leg] for measurement in measured])
+                    for leg in measured[0][name].legs
+                },
+            }
+            for name, metric in METRICS.items()
+        },
+    }

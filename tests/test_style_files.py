@@ -1,0 +1,136 @@
+"""Tracks on disk, equal to the bit."""
+
+import io
+import zipfile
+
+import numpy as np
+import pytest
+from synthetic import assert_same
+
+import arc_suite
+from arc_suite import style
+from arc_suite.policies import policy
+from arc_suite.robots import generator
+from arc_suite.style import load, record, save
+
+BODY = generator.generate(5, 2)
+
+
+def recorded(body, seeds=(3,), steps=12, **settings):
+    environment = arc_suite.load(body, "walk", settings)
+    return [record(environment, policy("cpg", body), seed, steps) for seed in seeds]
+
+
+@pytest.fixture(scope="module")
+def leaper():
+    return recorded("leaper", seeds=(3, 4))
+
+
+@pytest.fixture(scope="module")
+def saved(leaper, tmp_path_factory):
+    path = tmp_path_factory.mktemp("tracks") / "leaper.npz"
+    save(path, leaper)
+    return path
+
+
+@pytest.mark.parametrize("body", ["queen", BODY], ids=str)
+def test_tracks_survive_the_way_there_and_back(body, tmp_path):
+    tracks = recorded(body, seeds=(0, 2**32 - 1), gait="ripple", weights={"posture": -1e-9})
+    save(tmp_path / "tracks.npz", tracks)
+    loaded = load(str(tmp_path / "tracks.npz"))
+    assert len(loaded) == 2
+    for track, before in zip(loaded, tracks, strict=True):
+        assert_same(track, before)
+        assert_same(track.rewards, before.rewards)
+    assert style.measure(loaded[0]).keys() == style.METRICS.keys()
+
+
+def test_a_file_says_what_made_it(saved):
+    with np.load(saved, allow_pickle=False) as arrays:
+        assert arrays["format"] == "arc_suite tracks 1"
+        assert '"mujoco": "3.17' in str(arrays["versions"])
+
+
+def test_seed_and_actions_repeat_a_track(leaper):
+    actions = iter(leaper[1].actions)
+    again = record(arc_suite.load("leaper", "walk"), lambda time_step: next(actions), leaper[1].seed, 12)
+    assert_same(again, leaper[1])
+
+
+def test_what_cannot_be_saved_is_refused(leaper, tmp_path):
+    for tracks, found in (([], r"\[\]"), (leaper + recorded("tick", steps=2), r"\['leaper', 'tick'\]")):
+        with pytest.raises(ValueError, match=f"^tracks: expected those of one body, got {found}$"):
+            save(tmp_path / "a.npz", tracks)
+    assert not list(tmp_path.iterdir())
+
+
+def test_no_damage_goes_unnoticed(leaper, saved, tmp_path):
+    sound, random, path = saved.read_bytes(), np.random.default_rng(0), tmp_path / "damaged.npz"
+    for trial in range(300):
+        data = bytearray(sound)
+        # Half of the trials spare the arrays and hit the archive's directory, which is its end.
+        place = len(data) - 1 - random.integers(len(data) if trial % 2 else 12_000)
+        if trial % 10:
+            data[place] ^= 1 << random.integers(8)
+        else:
+            del data[place:]
+        path.write_bytes(data)
+        try:
+            loaded = load(path)
+        except ValueError as error:
+            assert str(error).startswith(f"{path}: ")
+            assert "\n" not in str(error)
+        else:
+            assert len(loaded) == len(leaper)
+            for track, before in zip(loaded, leaper, strict=True):
+                assert_same(track, before)
+
+
+def archive(**arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    return file.getvalue()
+
+
+def one_array():
+    file = io.BytesIO()
+    np.save(file, np.zeros(3))
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (b"", "not a file of tracks, or a damaged one: No data left in file"),
+        (b"walk", "not a file of tracks, or a damaged one: "),
+        (one_array(), "not a file of tracks, or a damaged one: "),
+        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 1', got 'no tracks'"),
+        (archive(format="arc_suite tracks 2"), "expected 'arc_suite tracks 1', got 'arc_suite tracks 2'"),
+        (archive(format="arc_suite tracks 1"), "not a file of tracks, or a damaged one: 'body'"),
+        (archive(format="arc_suite tracks 1", body="{}"), "not a file of tracks, or a damaged one: name: missing"),
+        (archive(format=np.array([print], dtype=object)), "not a file of tracks, or a damaged one: Object arrays"),
+    ],
+)
+def test_foreign_files_are_one_line(tmp_path, data, message):
+    path = tmp_path / "foreign.npz"
+    path.write_bytes(data)
+    with pytest.raises(ValueError) as error:
+        load(path)
+    assert str(error.value).startswith(f"{path}: {message}")
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_that_lacks_an_array_is_one_line(saved, tmp_path):
+    path = tmp_path / "lacking.npz"
+    with zipfile.ZipFile(saved) as whole, zipfile.ZipFile(path, "w") as lacking:
+        for name in whole.namelist():
+            if name != "1/contacts.npy":
+                lacking.writestr(name, whole.read(name))
+    with pytest.raises(ValueError, match="contacts"):
+        load(path)
+
+
+def test_files_that_cannot_be_read_are_one_line(tmp_path):
+    for path, reason in ((tmp_path / "none.npz", "no such file or directory"), (tmp_path, "is a directory")):
+        with pytest.raises(OSError, match=f"^cannot read {path}: {reason}$"):
+            load(path)

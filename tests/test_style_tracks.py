@@ -1,0 +1,77 @@
+"""Recorded tracks agree with the reward and the physics."""
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import arc_suite
+from arc_suite import evaluation
+from arc_suite.cpg import Demonstrator
+from arc_suite.robots import ROBOTS
+from arc_suite.style import measure, record
+from arc_suite.style.tracks import lowest_point_velocities, mirrors
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_tracks_agree_with_the_reward(robot):
+    environment = arc_suite.load(robot, "walk", {"time_limit": 5.0})
+    track = record(environment, Demonstrator(robot), seed=3)
+    episode = evaluation.run(environment, Demonstrator(robot), seed=3)
+    assert len(track.times) == episode.length == 100
+    assert track.times[-1] == pytest.approx(5.0)
+    assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
+    results = measure(track)
+    assert results["gait_compliance"].value == pytest.approx(track.terms["gait_bonus"].mean(), rel=1e-12)
+    joints = track.actions.shape[1]
+    for metric, term in (("action_change", "smoothness"), ("posture_deviation", "posture")):
+        squares = np.array(list(results[metric].legs.values())) ** 2
+        assert squares.mean() * joints == pytest.approx(track.terms[term].mean(), rel=1e-12)
+    assert_allclose(track.terms["vertical_velocity"], track.linear_velocities[:, 2] ** 2)
+    assert_allclose(track.terms["angular_velocity"], (track.angular_velocities[:, :2] ** 2).sum(axis=1))
+    assert_array_equal(track.joint_velocities[-1], environment.physics.data.qvel[6:])
+    gears = environment.physics.model.ptr.actuator_gear[:, 0]
+    assert_allclose(track.torques, track.actions * gears)
+    assert track.mass == pytest.approx(
+        {"queen": 12.0866, "bastion": 5.3677, "leaper": 0.2224, "tick": 0.0814}[robot], 1e-3
+    )
+    assert 0.05 < track.contacts.mean() < 0.95
+    assert (track.foot_positions[track.contacts][:, 2] < track.foot_radii[0] + 0.011).all()  # within the contact margin
+
+
+def test_recording_is_seeded():
+    environment = arc_suite.load("leaper", "walk", {"time_limit": 1.0})
+    first, second, other = (record(environment, Demonstrator("leaper"), seed) for seed in (1, 1, 2))
+    assert_array_equal(first.foot_velocities, second.foot_velocities)
+    assert (first.positions != other.positions).all()
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_leg_has_its_mirror(robot):
+    across = {"l": "r", "r": "l"}
+    names = [leg.name for leg in ROBOTS[robot].legs]
+    for name, mirror in zip(names, mirrors(ROBOTS[robot]), strict=True):
+        expected = name[0] + across[name[1]] if robot == "leaper" else across[name[0]] + name[1]
+        assert names[mirror] == expected
+
+
+def test_legs_without_a_mirror():
+    left = ROBOTS["queen"].replace(legs=ROBOTS["queen"].legs[:4])  # l1 l2 l3 r1
+    assert_array_equal(mirrors(left), [3, -1, -1, 0])
+
+
+def test_velocities_of_lowest_points_are_their_motion():
+    environment = arc_suite.load("queen", "walk", {"random": 0})
+    environment.reset()
+    model, data = environment.physics.model.ptr, environment.physics.data.ptr
+    data.qvel[:] = np.random.default_rng(0).normal(size=model.nv)
+    mujoco.mj_forward(model, data)
+    feet = [model.body(name).id for name in ROBOTS["queen"].foot_names]
+    radii = np.full(6, 0.05)
+    velocities = lowest_point_velocities(model, data, feet, radii)
+    before = [data.xpos[foot] + (0, 0, -0.05) for foot in feet]
+    fixed = [data.xmat[foot].reshape(3, 3).T @ (0, 0, -0.05) for foot in feet]
+    mujoco.mj_integratePos(model, data.qpos, data.qvel, 1e-6)
+    mujoco.mj_kinematics(model, data)
+    after = [data.xpos[foot] + data.xmat[foot].reshape(3, 3) @ point for foot, point in zip(feet, fixed, strict=True)]
+    assert_allclose(velocities, (np.array(after) - before) / 1e-6, atol=1e-4)
