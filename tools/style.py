@@ -13,6 +13,7 @@ metric means is written in arc_suite/style/metrics.py.
 
 import contextlib
 import math
+import pathlib
 
 from absl import flags
 from tqdm import tqdm
