@@ -19,7 +19,7 @@ SETTINGS = {"robot": "bastion", "seed": 3, "episodes": 2, "steps": 12}
 def test_space_holds_the_preset_that_it_is_about(robot):
     body, medium = ROBOTS[robot], TUNINGS[robot]["medium"]
     space = Space(body, medium)
-    assert space.bounds().shape == (3, space.vector().size)
+    assert len(space.ranges()) == space.vector().size
     same = space.preset(space.vector())
     for ours, published in zip(pattern(body, same), pattern(body, medium), strict=True):
         assert_allclose(ours, published, atol=1e-12)
@@ -38,7 +38,7 @@ def test_a_lead_moves_the_clock_of_all_legs():
 
 def test_every_number_of_a_vector_counts_and_stays_within_bounds():
     space = Space(ROBOTS["tick"], TUNINGS["tick"]["medium"])
-    vector, (scale, low, high) = space.vector(0.1), space.bounds()
+    vector, (scale, low, high, _) = space.vector(0.1), np.transpose(space.ranges())
     presets = [space.preset(vector + step) for step in np.diag(0.5 * scale)]
     assert len({str(preset) for preset in presets}) == vector.size
     assert space.preset(np.full(vector.size, 1e9)) == space.preset(high)

@@ -22,8 +22,8 @@ from arc_suite.tuning.judge import STYLE
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
-flags.DEFINE_integer("generations", 300, "Of the search; more make a finished one go on.", lower_bound=1)
-flags.DEFINE_integer("episodes", 1, "By which a candidate is judged.", lower_bound=1)
+flags.DEFINE_integer("generations", 250, "Of the search; more make a finished one go on.", lower_bound=1)
+flags.DEFINE_integer("episodes", 2, "By which a candidate is judged.", lower_bound=1)
 flags.DEFINE_integer("steps", 300, "Control steps of these.", 1, HORIZON)
 flags.DEFINE_integer("seed", 0, "Of the search; further ones count on from it.", lower_bound=0)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)

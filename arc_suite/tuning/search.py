@@ -71,7 +71,7 @@ class Search:
         self.reward, *by_lead = score.rewards.mean(axis=-1).tolist()
         self._style = _style(score)[0]
         self._origin = self._space.vector(leads[np.argmax(by_lead)])
-        self._scale = self._space.bounds()[0]
+        self._scale = np.array([number.scale for number in self._space.ranges()])
         options = {"randn": np.random.RandomState(seed).randn, "seed": np.nan, "verbose": -9}
         self._strategy = cma.CMAEvolutionStrategy(np.zeros_like(self._origin), SPREAD, options)
         self.candidates = self._strategy.popsize
@@ -87,21 +87,21 @@ class Search:
         Returns:
             What it came to; None with `fitness`.
         """
-        vectors = self._strategy.ask()
+        solutions = self._strategy.ask()
         generation = None
         if fitness is None:
-            generation = self._judged([self._preset(vector) for vector in vectors])
+            generation = self._judged([self._space.preset(self._vector(solution)) for solution in solutions])
             fitness = generation.fitness
-        self._strategy.tell(vectors, [-value for value in fitness])
+        self._strategy.tell(solutions, [-value for value in fitness])
         self._generations += 1
         return generation
 
     def result(self) -> Preset:
-        """What the search believes to be best: the mean of its distribution."""
-        return self._preset(self._strategy.mean)
+        """What the search believes to be best: the mean of its distribution, rounded."""
+        return self._space.preset(self._space.rounded(self._vector(self._strategy.mean)))
 
-    def _preset(self, vector) -> Preset:
-        return self._space.preset(self._origin + self._scale * vector)
+    def _vector(self, solution) -> np.ndarray:
+        return self._origin + self._scale * solution
 
     def _judged(self, presets) -> Generation:
         score = self._judge(presets, self._seed + (1 + self._generations) * self._episodes)

@@ -8,21 +8,39 @@ import numpy as np
 from arc_suite.cpg.presets import Bend, ByRank, Preset
 from arc_suite.spec import Body
 
-DECIMALS = 4  # of all numbers
 
-# How far a number is moved at first, and the least and most that it may be; degrees and cycles.
+class Range(NamedTuple):
+    """Of a number, in degrees or cycles.
+
+    Attributes:
+        scale: how far it is moved at first.
+        low, high: the least and the most that it may be.
+        decimals: that matter.
+    """
+
+    scale: float
+    low: float
+    high: float
+    decimals: int
+
+
 _SHARED = {
-    "stiffness": (0.3, 0.05, 5.0),
-    "damping": (0.08, 0.0, 1.0),
-    "ramp": (5.0, 1.0, 40.0),
-    "duty_factor": (0.08, 0.3, 0.85),
+    "stiffness": Range(0.3, 0.05, 5.0, 3),
+    "damping": Range(0.08, 0.0, 1.0, 3),
+    "ramp": Range(5.0, 1.0, 40.0, 1),
+    "duty_factor": Range(0.08, 0.3, 0.85, 3),
 }
-_BY_RANK = {"lead": (0.06, -1.0, 2.0), "sweep": (8.0, -60.0, 60.0), "hip": (6.0, -60.0, 60.0)}
+_BY_RANK = {
+    "lead": Range(0.06, -1.0, 2.0, 3),
+    "sweep": Range(8.0, -60.0, 60.0, 1),
+    "hip": Range(6.0, -60.0, 60.0, 1),
+}
 _BY_JOINT_AND_RANK = {
-    "centre": (8.0, -120.0, 120.0),
-    "stance": (8.0, -120.0, 120.0),
-    "swing": (10.0, -120.0, 120.0),
+    "centre": Range(8.0, -120.0, 120.0, 1),
+    "stance": Range(8.0, -120.0, 120.0, 1),
+    "swing": Range(10.0, -120.0, 120.0, 1),
 }
+_DECIMALS = 4  # of all numbers of a preset
 
 
 class Space(NamedTuple):
@@ -46,10 +64,14 @@ class Space(NamedTuple):
         """How many ranks of legs there are."""
         return max(self.body.ranks) + 1
 
-    def bounds(self) -> np.ndarray:
-        """Scale, least and most of every number, (3, size)."""
+    def ranges(self) -> list[Range]:
+        """Of every number of a vector, in order."""
         by_rank = [*_BY_RANK.values(), *len(self.origin.bends) * list(_BY_JOINT_AND_RANK.values())]
-        return np.array([*_SHARED.values(), *(bounds for bounds in by_rank for _ in range(self.ranks))]).T
+        return [*_SHARED.values(), *(number for number in by_rank for _ in range(self.ranks))]
+
+    def rounded(self, vector: np.ndarray) -> np.ndarray:
+        """The vector (size,) to the decimals that matter."""
+        return np.array([round(value, number.decimals) for value, number in zip(vector, self.ranges(), strict=True)])
 
     def vector(self, lead: float = 0.0) -> np.ndarray:
         """The vector (size,) of the preset itself, but for a lead of all legs in cycles."""
@@ -61,9 +83,9 @@ class Space(NamedTuple):
         return np.array([*(getattr(preset, name) for name in _SHARED), *by_rank])
 
     def preset(self, vector: np.ndarray) -> Preset:
-        """The preset of a vector (size,), within bounds and rounded."""
-        _, low, high = self.bounds()
-        numbers = iter(vector.clip(low, high).round(DECIMALS).tolist())
+        """The preset of a vector (size,), within its ranges."""
+        _, low, high, _ = np.transpose(self.ranges())
+        numbers = iter(vector.clip(low, high).round(_DECIMALS).tolist())
         shared = {name: next(numbers) for name in _SHARED}
 
         def by_rank() -> tuple[float, ...]:
@@ -77,7 +99,7 @@ class Space(NamedTuple):
         return self.origin._replace(
             **shared,
             settle=0,
-            phase_offsets=tuple(round((offset + leads[rank]) % 1.0, DECIMALS) for offset, rank in offsets),
+            phase_offsets=tuple(round((offset + leads[rank]) % 1.0, _DECIMALS) for offset, rank in offsets),
             sweep=sweep,
             centre=centre,
             bends=bends,
