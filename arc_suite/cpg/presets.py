@@ -47,7 +47,7 @@ class Preset(NamedTuple):
 
 
 SPEEDS = ("slow", "medium", "fast")  # the published ones
-PRESETS = SPEEDS
+PRESETS = (*SPEEDS, "tuned")
 
 _TRIPOD = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0)  # of l1 l2 l3 r1 r2 r3
 _TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
@@ -94,6 +94,22 @@ TUNINGS = {
             bends={
                 "knee": Bend(stance=(20, 20, -20), swing=(-50, -50, 50)),
                 "ankle": Bend(stance=(45, 0, -45), swing=(40, 65, -40)),
+            },
+        ),
+        "tuned": Preset(
+            stiffness=0.982,
+            damping=0.21,
+            settle=0,
+            ramp=6.6,
+            ramp_start=0.3,
+            frequency=1.5,
+            duty_factor=0.499,
+            phase_offsets=(0.772, 0.223, 0.768, 0.272, 0.723, 0.268),
+            sweep=(12.7, 18.8, 16.4),
+            centre={"hip": (-1.7, -16.8, -4.9), "knee": (-19.3, -23.6, 29.8), "ankle": (-5.7, 32.5, -3.9)},
+            bends={
+                "knee": Bend(stance=(16.8, 33.1, -24.9), swing=(-53.0, -54.9, 26.1)),
+                "ankle": Bend(stance=(16.5, -13.0, 0.4), swing=(45.7, -1.1, -5.6)),
             },
         ),
     },
