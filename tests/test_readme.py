@@ -6,14 +6,25 @@ import re
 import pytest
 
 import arc_suite
+from arc_suite import data
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import walk
 
 README = (pathlib.Path(__file__).parents[1] / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
+@pytest.fixture
+def dataset(tmp_path, monkeypatch):
+    """A little of what the README collects."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    settings = data.Settings(ROBOTS["queen"], "cpg", ("tuned",))
+    assert f"--verify {settings.dataset_id()}\n" in README
+    data.collect(settings.dataset_id(), settings._replace(steps=5), episodes=1)
+
+
 @pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
-def test_code(block):
+def test_code(block, dataset):
     exec(compile(block, "README.md", "exec"), {})
 
 
