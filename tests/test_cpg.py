@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import arc_suite
 from arc_suite import evaluation
 from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
+from arc_suite.tuning import Judge
 
 # preset medium: centre, stance and swing bends in degrees by rank from the front.
 MEDIUM = {
@@ -95,6 +97,21 @@ def test_medium_earns_the_published_return(robot):
     published, tolerance = PUBLISHED[robot]
     assert_allclose(np.mean([episode.total for episode in results]), published, rtol=tolerance)
     assert {episode.length for episode in results} == {1000}
+
+
+# Mean return of 10 seeds, with the tolerance that their scatter asks for.
+TUNED = {"queen": (3830, 0.005), "bastion": (0, 0.005), "tick": (0, 0.005), "leaper": (0, 0.01)}
+
+
+@pytest.mark.parametrize("robot", TUNED)
+def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
+    presets = [TUNINGS[robot][name] for name in ("tuned", "medium")]
+    score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets)
+    expected, tolerance = TUNED[robot]
+    assert_allclose(1000 * score.rewards[0].mean(), expected, rtol=tolerance)
+    assert not score.falls.any()
+    for cost, (tuned, medium) in score.style.items():
+        assert tuned.mean() <= medium.mean(), cost
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
