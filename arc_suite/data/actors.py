@@ -13,6 +13,7 @@ import numpy as np
 from arc_suite import policies
 from arc_suite.cpg import Demonstrator
 from arc_suite.data.settings import Settings
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walker import blocks, checked_action
 
 
@@ -113,11 +114,13 @@ class Individuals:
     def __init__(self, settings: Settings, rows: int):
         """Finds the policy."""
         self._settings = settings
+        body = settings.body
+        self._robot = body.name if ROBOTS.get(body.name) == body else body
         self._policies, self._seeds, self._clock = [None] * rows, [0] * rows, [0] * rows
         self._make()
 
     def _make(self):
-        return policies.policy(self._settings.policy, self._settings.body)
+        return policies.policy(self._settings.policy, self._robot)
 
     def begin(self, row: int, seed: int) -> None:
         """Starts the episode of a seed in a row."""

@@ -69,7 +69,6 @@ def collect(
         missing = [index for index in range(episodes) if index not in storage.kept]
         try:
             if missing:
-                actor(settings, 1)  # finds a wrong policy before the work
                 if storage.metadata is None:
                     storage.metadata = _metadata(dataset_id, settings, provenance, specification)
                 _play(storage, settings, missing, rows, threads, progress)
@@ -83,12 +82,15 @@ def collect(
 
 
 def _check(settings: Settings, episodes: int) -> None:
+    if settings.policy == "cpg" and not settings.presets:
+        raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
     for preset in settings.presets:
         names.check(preset, PRESETS, "preset")
     if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
         raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
     seeding.check(settings.seed)
     seeding.check(settings.seed + episodes - 1)
+    actor(settings, rows=1)
 
 
 def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
@@ -122,6 +124,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
     total, done = len(missing) + len(storage.kept), len(storage.kept)
     with progress(
         desc=settings.body.name,
+        leave=False,
         total=total * settings.steps,
         initial=done * settings.steps,
         unit="step",
