@@ -22,10 +22,10 @@ from arc_suite.vector import VectorEnv
 
 ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
 
-# Episodes are written when this many times the last writing's duration has passed, so that writing takes a
-# small share of the time however short episodes are, or when they have this size.
-PATIENCE = 20
-BYTES = 1 << 26
+# A finished episode is written at once, unless writing has taken more than this share of the time so far, which
+# happens where episodes are short, or when those that wait have this size in bytes.
+SHARE = 0.1
+BYTES = 1 << 24
 
 
 def collect(
@@ -90,7 +90,7 @@ def _check(settings: Settings, episodes: int) -> None:
         raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
     seeding.check(settings.seed)
     seeding.check(settings.seed + episodes - 1)
-    actor(settings, rows=1)
+    actor(settings, rows=1).begin(0, settings.seed)  # finds out whether there is such a policy
 
 
 def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
@@ -112,14 +112,15 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
     rows = math.ceil(len(missing) / math.ceil(len(missing) / rows))  # all rows busy to the end, or nearly
     environment = VectorEnv(settings.body, "walk", rows, threads, max_episode_steps=settings.steps)
     seeds = [settings.seed + index for index in missing]
-    pending, size, due = {}, 0, 0.0
+    pending, size, started, spent = {}, 0, time.monotonic(), 0.0
 
     def write():
-        nonlocal pending, size, due
-        started = time.monotonic()
+        nonlocal pending, size, spent
+        spent -= time.monotonic()
         storage.add(pending)
+        spent += time.monotonic()
         pending, size = {}, 0
-        due = time.monotonic() + PATIENCE * (time.monotonic() - started)
+        bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
 
     total, done = len(missing) + len(storage.kept), len(storage.kept)
     with progress(
@@ -134,13 +135,13 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
             for step in rollouts.play(environment, actor(settings, rows), seeds, settings.steps):
                 bar.update(step.playing)
                 for episode in step.finished:
-                    episode = episode._replace(preset=settings.preset(episode.seed))
-                    pending[episode.seed - settings.seed] = episode
+                    pending[episode.seed - settings.seed] = episode._replace(preset=settings.preset(episode.seed))
                     size += episode.nbytes
                     bar.update(settings.steps - episode.length)
-                if pending and (time.monotonic() >= due or size >= BYTES):
+                    if size >= BYTES:
+                        write()
+                if pending and spent <= SHARE * (time.monotonic() - started):
                     write()
-                    bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
         finally:
             if pending:
                 write()
