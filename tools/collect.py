@@ -56,7 +56,7 @@ def main():
         try:
             missing = data.collect(dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite)
         except KeyboardInterrupt as interrupt:
-            print(f"{dataset_id}: {interrupt}; the same command continues", file=sys.stderr)
+            print(f"{dataset_id}: {str(interrupt) or 'interrupted'}; the same command continues", file=sys.stderr)
             return 130
         dataset = data.open(dataset_id)
         if not missing:

@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Callable
 
-import gymnasium
 import numpy as np
 from minari import __version__ as minari_version
 from minari.serialization import serialize_space
@@ -16,8 +15,7 @@ from arc_suite.data import rollouts
 from arc_suite.data.actors import actor
 from arc_suite.data.settings import Settings
 from arc_suite.data.storage import Storage
-from arc_suite.suite import load
-from arc_suite.tasks import rewards
+from arc_suite.tasks import rewards, walk
 from arc_suite.vector import VectorEnv
 
 ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
@@ -150,34 +148,32 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
 
 def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str) -> dict:
     """Minari's metadata, but for the counts."""
-    environment = gymnasium.make(settings.environment_spec())
-    weights = load(settings.body, "walk").task.settings.weights
-    presets = f", presets {' and '.join(settings.presets)} in turn" if settings.presets else ""
+    environment = VectorEnv(settings.body, "walk", evaluation.EPISODES, max_episode_steps=settings.steps)
+    weights = walk.settings(settings.body, {}).weights
+    presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     return {
         "dataset_id": dataset_id,
         "minari_version": minari_version,
         "data_format": "hdf5",
         "jpeg_encoding": False,
-        "observation_space": serialize_space(environment.observation_space),
-        "action_space": serialize_space(environment.action_space),
+        "observation_space": serialize_space(environment.single_observation_space),
+        "action_space": serialize_space(environment.single_action_space),
         "env_spec": specification,
         "algorithm_name": "-".join([settings.policy, *settings.presets]),
         "description": f"{settings.body.name} walks by policy {settings.policy}{presets}{noise}; "
         f"episode k has seed {settings.seed} + k.",
         "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
-        "ref_min_score": _mean_return(settings._replace(policy="zero", presets=(), noise=0.0, seed=0)),
+        "ref_min_score": _mean_return(environment, Settings(settings.body, "zero", (), steps=settings.steps)),
         "ref_max_score": rewards.greatest(weights) * settings.steps,
         "num_episodes_average_score": evaluation.EPISODES,
         "arc_suite": provenance,
     }
 
 
-def _mean_return(settings: Settings) -> float:
-    """Of the episodes of the evaluation protocol."""
-    count = evaluation.EPISODES
-    environment = VectorEnv(settings.body, "walk", count, max_episode_steps=settings.steps)
+def _mean_return(environment: VectorEnv, settings: Settings) -> float:
+    """Over the seeds of the evaluation protocol, one in each row of the environment."""
+    count = environment.num_envs
     played = rollouts.play(environment, actor(settings, count), range(count), settings.steps)
     totals = {episode.seed: episode.total for step in played for episode in step.finished}
-    environment.close()
-    return float(np.mean([totals[seed] for seed in range(count)]))
+    return float(np.mean([totals[seed] for seed in range(count)]))  # in one order, whichever falls first
