@@ -114,6 +114,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             self._seed(self._seeds(seed), np.ones(self.num_envs, bool))
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
         self._ended = np.zeros(self.num_envs, bool)  # rows that start an episode in the next step
+        self._resting = np.zeros(self.num_envs, bool)
         self._begun = False
         self._busy = threading.Lock()
 
@@ -182,7 +183,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """
         if not self._begun:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
-        data, stepping, restarting = self.batch.data, ~self._ended, self._ended
+        data, stepping, restarting = self.batch.data, ~(self._ended | self._resting), self._ended & ~self._resting
         self._walker.before_step(actions, data)
         diverged = self.batch.step(self._substeps, stepping)
         self._walker.after_step(data)
@@ -197,7 +198,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         info = {}
         if self._same_step and self._ended.any():
-            restarting, stepping = self._ended, ~self._ended
+            restarting, stepping = self._ended, stepping & ~self._ended
             final = {"final_obs": _by_row(observation, restarting), "final_info": self._info(restarting, diverged)}
             info |= _marked(final, restarting)
         info |= self._info(stepping, diverged)
@@ -205,6 +206,19 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             self._begin(restarting, observation)
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
+
+    @_one_at_a_time
+    def rest(self, mask) -> None:
+        """Lets rows, and no others, stand still until they are reset; meanwhile they cost next to nothing.
+
+        Args:
+            mask: (num_envs,) booleans, at least one of them true.
+
+        Raises:
+            ValueError: a mask that does not fit.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._resting = self._rows(mask, "mask")
 
     @_one_at_a_time
     def render(self, rows: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
@@ -247,7 +261,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.batch.reset(rows, *map(np.stack, zip(*states, strict=True)))
         self._walker.restart(rows)
         self._steps[rows] = 0
-        self._ended = self._ended & ~rows
+        self._ended, self._resting = self._ended & ~rows, self._resting & ~rows
         observation[rows] = self._walker.observation_vector(self.batch.part(rows), rows)
 
     def _info(self, rows: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
@@ -276,13 +290,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             if seeds[row] is not None:
                 self._randoms[row] = np.random.RandomState(seeds[row])
 
-    def _rows(self, mask) -> np.ndarray:
-        """The rows of a reset mask; all of them for None."""
+    def _rows(self, mask, name: str = "reset_mask") -> np.ndarray:
+        """The rows of a mask; all of them for None."""
         if mask is None:
             return np.ones(self.num_envs, bool)
         mask = np.asarray(mask)
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
-            raise ValueError(f"reset_mask: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
+            raise ValueError(f"{name}: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
         return mask.copy()
 
 

@@ -136,6 +136,32 @@ def test_seeds_of_all_kinds():
 
 
 @pytest.mark.parametrize("mode", MODES)
+def test_rows_that_rest_stand_still_until_their_reset_and_the_others_notice_nothing(mode):
+    batch, awake = (make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"]) for _ in range(2))
+    batch.reset(seed=0), awake.reset(seed=0)
+    mask = np.array([True, False, True, False])
+    for count, actions in enumerate(random_actions(batch, 60)):
+        if count == 3:
+            batch.rest(mask)
+            still = batch.batch.data.qpos[mask].copy()
+        observations, rewards, terminated, truncated, info = batch.step(actions)
+        expected = awake.step(actions)
+        for here, there in zip((observations, rewards, terminated, truncated), expected[:4], strict=True):
+            assert_array_equal(here[~mask], there[~mask])
+        if count >= 3:
+            assert_array_equal(batch.batch.data.qpos[mask], still)
+            assert not (rewards[mask].any() or terminated[mask].any() or truncated[mask].any())
+            assert not info.get("_reward_terms", mask & False)[mask].any()
+    fresh = make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"])
+    fresh.reset(seed=7)
+    batch.reset(seed=7)  # wakes them
+    for actions in random_actions(batch, 20):
+        assert same(batch.step(actions), fresh.step(actions))
+    with pytest.raises(ValueError, match="^mask: expected 4 booleans, at least one of them true, got array"):
+        batch.rest(np.zeros(4, bool))
+
+
+@pytest.mark.parametrize("mode", MODES)
 def test_reset_mask_restarts_some_rows(mode):
     singles = make_singles("tick", 4, mode, task_kwargs=SHORT["tick"])
     batch = make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"])

@@ -5,6 +5,7 @@ are worth nothing.
 
 Example:
   python tools/bench.py --plot docs/performance.png --document docs/performance.md
+  python tools/bench.py --collect 128 --robots queen --rounds 3
 """
 
 import functools
@@ -27,6 +28,7 @@ flags.DEFINE_integer("steps", 60, "Control steps of one turn; a third of it wher
 flags.DEFINE_string("json", "out/bench.json", "Where to write all measurements.")
 flags.DEFINE_string("plot", "out/bench.png", "Where to write the plot.")
 flags.DEFINE_string("document", None, "A Markdown file between whose <!-- benchmark --> marks to put the tables.")
+flags.DEFINE_integer("collect", None, "Measure the collecting of so many episodes instead.", lower_bound=1)
 
 
 def numbers(flag: str) -> list[int]:
@@ -45,6 +47,11 @@ def numbers(flag: str) -> list[int]:
 def main():
     """Measures, prints and writes."""
     robots = [names.check(robot, ROBOTS, "robot") for robot in FLAGS.robots]
+    if FLAGS.collect is not None:
+        from arc_suite.benchmark import collecting  # needs Minari
+
+        print(collecting.measure(robots, FLAGS.collect, FLAGS.rounds))
+        return
     threads = contestants.all_threads()
     workers = numbers("workers") if FLAGS.workers else [factor * max(threads) for factor in (1, 2, 4)]
     rows = numbers("rows")

@@ -10,10 +10,12 @@ Examples:
   python tools/collect.py --verify arc_suite/queen/cpg-medium-v0
 """
 
+import sys
+
 import numpy as np
 from absl import flags
 
-from arc_suite import body_flags, commands, policies
+from arc_suite import body_flags, commands, names, policies
 from arc_suite.cpg import PRESETS
 from arc_suite.tasks.walk import HORIZON
 
@@ -43,14 +45,19 @@ def main():
         body = next(iter(bodies.values())) if _ROBOT.present or body_flags.made() else None
         count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads)
         print(f"{FLAGS.verify}: {count} episodes replayed, equal to the bit")
-        return
+        return 0
     if FLAGS.id is not None and len(bodies) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(bodies)}")
+    presets = tuple(names.check(preset, PRESETS, "preset") for preset in FLAGS.preset)
+    presets = presets if FLAGS.policy == "cpg" else ()
     for body in bodies.values():
-        presets = tuple(FLAGS.preset) if FLAGS.policy == "cpg" else ()
         settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = FLAGS.id or settings.dataset_id()
-        missing = data.collect(dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite)
+        try:
+            missing = data.collect(dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite)
+        except KeyboardInterrupt as interrupt:
+            print(f"{dataset_id}: {str(interrupt) or 'interrupted'}; the same command continues", file=sys.stderr)
+            return 130
         dataset = data.open(dataset_id)
         if not missing:
             print(f"{dataset_id}: has its {len(dataset)} episodes already")
@@ -62,6 +69,7 @@ def main():
             f"{dataset_id}: {len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
             f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
         )
+    return 0
 
 
 if __name__ == "__main__":

@@ -13,15 +13,12 @@ import numpy as np
 from arc_suite import policies
 from arc_suite.cpg import Demonstrator
 from arc_suite.data.settings import Settings
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walker import blocks, checked_action
 
 
 def actor(settings: Settings, rows: int):
-    """The actor that settings ask for.
-
-    Raises:
-        ValueError: an unknown policy; one line.
-    """
+    """The actor that settings ask for."""
     joints, steps = len(settings.body.joint_names), settings.steps
     if settings.policy == "cpg":
         made = Mixture([Demonstrator(settings.body, preset) for preset in settings.presets], rows)
@@ -111,17 +108,20 @@ class Individuals:
     """
 
     def __init__(self, settings: Settings, rows: int):
-        """Finds the policy."""
+        """Takes what tells the policy."""
         self._settings = settings
+        body = settings.body
+        self._robot = body.name if ROBOTS.get(body.name) == body else body
         self._policies, self._seeds, self._clock = [None] * rows, [0] * rows, [0] * rows
-        self._make()
-
-    def _make(self):
-        return policies.policy(self._settings.policy, self._settings.body)
 
     def begin(self, row: int, seed: int) -> None:
-        """Starts the episode of a seed in a row."""
-        self._policies[row], self._seeds[row], self._clock[row] = self._make(), seed, 0
+        """Starts the episode of a seed in a row.
+
+        Raises:
+            ValueError: there is no such policy; one line.
+        """
+        self._policies[row] = policies.policy(self._settings.policy, self._robot)
+        self._seeds[row], self._clock[row] = seed, 0
 
     def __call__(self, observations, rewards) -> np.ndarray:
         """The actions.

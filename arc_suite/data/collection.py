@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Callable
 
-import gymnasium
 import numpy as np
 from minari import __version__ as minari_version
 from minari.serialization import serialize_space
@@ -16,16 +15,15 @@ from arc_suite.data import rollouts
 from arc_suite.data.actors import actor
 from arc_suite.data.settings import Settings
 from arc_suite.data.storage import Storage
-from arc_suite.suite import load
-from arc_suite.tasks import rewards
+from arc_suite.tasks import rewards, walk
 from arc_suite.vector import VectorEnv
 
 ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
 
-# Episodes are written when this many times the last writing's duration has passed, so that writing takes a
-# small share of the time however short episodes are, or when they have this size.
-PATIENCE = 20
-BYTES = 1 << 26
+# A finished episode is written at once, unless writing has taken more than this share of the time so far, which
+# happens where episodes are short, or when those that wait have this size in bytes.
+SHARE = 0.1
+BYTES = 1 << 24
 
 
 def collect(
@@ -69,7 +67,6 @@ def collect(
         missing = [index for index in range(episodes) if index not in storage.kept]
         try:
             if missing:
-                actor(settings, 1)  # finds a wrong policy before the work
                 if storage.metadata is None:
                     storage.metadata = _metadata(dataset_id, settings, provenance, specification)
                 _play(storage, settings, missing, rows, threads, progress)
@@ -83,12 +80,15 @@ def collect(
 
 
 def _check(settings: Settings, episodes: int) -> None:
+    if settings.policy == "cpg" and not settings.presets:
+        raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
     for preset in settings.presets:
         names.check(preset, PRESETS, "preset")
     if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
         raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
     seeding.check(settings.seed)
     seeding.check(settings.seed + episodes - 1)
+    actor(settings, rows=1).begin(0, settings.seed)  # finds out whether there is such a policy
 
 
 def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
@@ -110,18 +110,20 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
     rows = math.ceil(len(missing) / math.ceil(len(missing) / rows))  # all rows busy to the end, or nearly
     environment = VectorEnv(settings.body, "walk", rows, threads, max_episode_steps=settings.steps)
     seeds = [settings.seed + index for index in missing]
-    pending, size, due = {}, 0, 0.0
+    pending, size, started, spent = {}, 0, time.monotonic(), 0.0
 
     def write():
-        nonlocal pending, size, due
-        started = time.monotonic()
+        nonlocal pending, size, spent
+        spent -= time.monotonic()
         storage.add(pending)
+        spent += time.monotonic()
         pending, size = {}, 0
-        due = time.monotonic() + PATIENCE * (time.monotonic() - started)
+        bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
 
     total, done = len(missing) + len(storage.kept), len(storage.kept)
     with progress(
         desc=settings.body.name,
+        leave=False,
         total=total * settings.steps,
         initial=done * settings.steps,
         unit="step",
@@ -131,13 +133,13 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
             for step in rollouts.play(environment, actor(settings, rows), seeds, settings.steps):
                 bar.update(step.playing)
                 for episode in step.finished:
-                    episode = episode._replace(preset=settings.preset(episode.seed))
-                    pending[episode.seed - settings.seed] = episode
+                    pending[episode.seed - settings.seed] = episode._replace(preset=settings.preset(episode.seed))
                     size += episode.nbytes
                     bar.update(settings.steps - episode.length)
-                if pending and (time.monotonic() >= due or size >= BYTES):
+                    if size >= BYTES:
+                        write()
+                if pending and spent <= SHARE * (time.monotonic() - started):
                     write()
-                    bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)
         finally:
             if pending:
                 write()
@@ -146,34 +148,32 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
 
 def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str) -> dict:
     """Minari's metadata, but for the counts."""
-    environment = gymnasium.make(settings.environment_spec())
-    weights = load(settings.body, "walk").task.settings.weights
-    presets = f", presets {' and '.join(settings.presets)} in turn" if settings.presets else ""
+    environment = VectorEnv(settings.body, "walk", evaluation.EPISODES, max_episode_steps=settings.steps)
+    weights = walk.settings(settings.body, {}).weights
+    presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     return {
         "dataset_id": dataset_id,
         "minari_version": minari_version,
         "data_format": "hdf5",
         "jpeg_encoding": False,
-        "observation_space": serialize_space(environment.observation_space),
-        "action_space": serialize_space(environment.action_space),
+        "observation_space": serialize_space(environment.single_observation_space),
+        "action_space": serialize_space(environment.single_action_space),
         "env_spec": specification,
         "algorithm_name": "-".join([settings.policy, *settings.presets]),
         "description": f"{settings.body.name} walks by policy {settings.policy}{presets}{noise}; "
         f"episode k has seed {settings.seed} + k.",
         "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
-        "ref_min_score": _mean_return(settings._replace(policy="zero", presets=(), noise=0.0, seed=0)),
+        "ref_min_score": _mean_return(environment, Settings(settings.body, "zero", (), steps=settings.steps)),
         "ref_max_score": rewards.greatest(weights) * settings.steps,
         "num_episodes_average_score": evaluation.EPISODES,
         "arc_suite": provenance,
     }
 
 
-def _mean_return(settings: Settings) -> float:
-    """Of the episodes of the evaluation protocol."""
-    count = evaluation.EPISODES
-    environment = VectorEnv(settings.body, "walk", count, max_episode_steps=settings.steps)
+def _mean_return(environment: VectorEnv, settings: Settings) -> float:
+    """Over the seeds of the evaluation protocol, one in each row of the environment."""
+    count = environment.num_envs
     played = rollouts.play(environment, actor(settings, count), range(count), settings.steps)
     totals = {episode.seed: episode.total for step in played for episode in step.finished}
-    environment.close()
-    return float(np.mean([totals[seed] for seed in range(count)]))
+    return float(np.mean([totals[seed] for seed in range(count)]))  # in one order, whichever falls first

@@ -1,6 +1,5 @@
 """Ids of datasets, and where Minari keeps them."""
 
-import re
 from pathlib import Path
 
 from minari.dataset.minari_dataset import parse_dataset_id
@@ -15,15 +14,21 @@ def check(dataset_id: str) -> str:
     Raises:
         ValueError: it does not, or the version is missing; one line with an example.
     """
+    if not _valid(dataset_id):
+        example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/cpg-medium-v0")))
+        raise ValueError(
+            f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
+            f"at the end, such as {example!r}"
+        )
+    return dataset_id
+
+
+def _valid(dataset_id: str) -> bool:
     try:
         parse_dataset_id(dataset_id)
     except (TypeError, ValueError):  # Minari's TypeError is that of a missing version
-        stem = re.sub(r"[^-\w/]+", "_", re.sub(r"-v\d*$", "", dataset_id)).strip("/") or "name"
-        raise ValueError(
-            f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
-            f"at the end, such as {stem + '-v0'!r}"
-        ) from None
-    return dataset_id
+        return False
+    return True
 
 
 def folder(dataset_id: str) -> Path:

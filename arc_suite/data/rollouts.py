@@ -64,6 +64,8 @@ def play(environment: VectorEnv, actor, seeds: Sequence[int], steps: int) -> Ite
             for row in starting:
                 actor.begin(row, seated[row])
                 recording.begin(row, observations)
+        if len(starting) < len(ended):
+            environment.rest(~playing)
         yield Step(count, finished)
 
 

@@ -63,7 +63,8 @@ def verify(
 
     environment = VectorEnv(dataset.body, "walk", rows, threads, max_episode_steps=dataset.steps)
     replayer = Script(script, *environment.action_space.shape)
-    with progress(desc="replaying", total=dataset.metadata["total_steps"], unit="step", unit_scale=True) as bar:
+    total = dataset.metadata["total_steps"]
+    with progress(desc="replaying", leave=False, total=total, unit="step", unit_scale=True) as bar:
         for step in rollouts.play(environment, replayer, range(first, first + count), dataset.steps):
             bar.update(step.playing)
             for episode in step.finished:
