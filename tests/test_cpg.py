@@ -106,7 +106,7 @@ TUNED = {"queen": (3830, 0.005), "bastion": (0, 0.005), "tick": (0, 0.005), "lea
 @pytest.mark.parametrize("robot", TUNED)
 def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
     presets = [TUNINGS[robot][name] for name in ("tuned", "medium")]
-    score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets)
+    score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets, range(10))
     expected, tolerance = TUNED[robot]
     assert_allclose(1000 * score.rewards[0].mean(), expected, rtol=tolerance)
     assert not score.falls.any()

@@ -11,7 +11,7 @@ import imageio.v3 as imageio
 import pytest
 
 TOOL = Path(__file__).parent.parent / "tools" / "tune_cpg.py"
-QUICK = ("--robot=bastion", "--steps=20", "--resets=2")
+QUICK = ("--robot=bastion", "--steps=20", "--starts=8", "--resets=2")
 
 
 def command(*arguments):

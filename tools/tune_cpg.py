@@ -19,20 +19,22 @@ from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walk import HORIZON
 from arc_suite.tuning import Journal, Judge, Search
 from arc_suite.tuning.judge import STYLE
+from arc_suite.tuning.search import HARD
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
 flags.DEFINE_integer("generations", 250, "Of the search; more make a finished one go on.", lower_bound=1)
 flags.DEFINE_integer("episodes", 2, "By which a candidate is judged.", lower_bound=1)
 flags.DEFINE_integer("steps", 300, "Control steps of these.", 1, HORIZON)
-flags.DEFINE_integer("seed", 0, "Of the search; further ones count on from it.", lower_bound=0)
+flags.DEFINE_integer("starts", 1000, "Of which candidates are tried in the hardest.", lower_bound=HARD)
+flags.DEFINE_integer("seed", 0, "Of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
 flags.DEFINE_string("output", "out/tune", "Folder of the journal, the plot and the result; it is made if need be.")
 
 
 def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     """Searches behind a progress bar, or goes on."""
-    settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps")}
+    settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps", "starts")}
     with contextlib.closing(
         Journal(folder / "journal.jsonl", settings | {"versions": evaluation.versions()})
     ) as journal:
@@ -55,7 +57,7 @@ def judge(preset: Preset) -> dict:
     """Return, falls and style over the resets, of the result and of medium."""
     body = ROBOTS[FLAGS.robot]
     presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
-    score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()))
+    score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()), range(FLAGS.resets))
     return {
         name: {"return": evaluation.summary(HORIZON * score.rewards[row]), "falls": int(score.falls[row].sum())}
         | {cost: float(values[row].mean()) for cost, values in score.style.items()}

@@ -1,7 +1,7 @@
 """Judges many presets of a robot at once, on the vector environment."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,11 +22,13 @@ class Score(NamedTuple):
         falls: booleans.
         style: means until the fall, by name: the reward's terms `posture` and `smoothness`, and
             `tilt`, the squared sine of the angle between the torso's axis and the vertical.
+        tipping: how far the torso was from upright at the worst: 0 for never, 1 for a fall or upside down.
     """
 
     rewards: np.ndarray
     falls: np.ndarray
     style: Mapping[str, np.ndarray]
+    tipping: np.ndarray
 
 
 class Judge:
@@ -44,15 +46,16 @@ class Judge:
         self._body, self._shape, self._steps = body, (presets, episodes), steps
         self._environment = VectorEnv(body, "walk", presets * episodes)
 
-    def __call__(self, presets: Sequence[Preset], seed: int = 0) -> Score:
-        """Plays the episodes of the seeds from `seed` on, which are the same for all presets."""
+    def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> Score:
+        """Plays the episodes of these seeds, which are the same for all presets."""
         count, episodes = self._shape
         joints = len(self._body.joint_names)
         controls = [Prescribed.fit(self._body, preset) for preset in presets]
         control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
-        observations, _ = self._environment.reset(seed=[seed + k for _ in range(count) for k in range(episodes)])
+        observations, _ = self._environment.reset(seed=[*seeds] * count)
         upright = np.ones(count * episodes, bool)
-        totals, lengths, style = np.zeros(upright.size), np.zeros(upright.size), dict.fromkeys(STYLE, 0.0)
+        totals, lengths, tipping = np.zeros((3, upright.size))
+        style = dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
             clock, felt = np.full(upright.size, step), observations.astype(float)
             angles, velocities = felt[:, 5 : 5 + joints], felt[:, 11 + joints : 11 + 2 * joints]
@@ -61,13 +64,18 @@ class Judge:
             )
             totals += rewards * upright
             lengths += upright
-            for name, cost in _costs(observations, info).items():
+            uprightness = _uprightness(observations)
+            terms = info.get("reward_terms", dict.fromkeys(TERMS, 0.0))  # not there if all rows start anew
+            costs = {name: terms[name] for name in TERMS} | {"tilt": 1.0 - uprightness**2}
+            for name, cost in costs.items():
                 style[name] += cost * upright
+            tipping = np.where(upright, np.maximum(tipping, np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)), tipping)
             upright &= ~fallen
         return Score(
             rewards=(totals / self._steps).reshape(self._shape),
             falls=~upright.reshape(self._shape),
             style={name: (total / lengths).reshape(self._shape) for name, total in style.items()},
+            tipping=tipping.reshape(self._shape),
         )
 
     def close(self) -> None:
@@ -75,8 +83,7 @@ class Judge:
         self._environment.close()
 
 
-def _costs(observations, info: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """What a step costs in style, (rows,) by name."""
+def _uprightness(observations: np.ndarray) -> np.ndarray:
+    """Cosine of the angle between the torso's axis and the vertical, (rows,)."""
     _, x, y, _ = observations[:, 1:5].astype(float).T
-    terms = info.get("reward_terms", dict.fromkeys(TERMS, 0.0))  # not there if all rows start anew
-    return {name: terms[name] for name in TERMS} | {"tilt": 1.0 - (1.0 - 2.0 * (x * x + y * y)) ** 2}
+    return 1.0 - 2.0 * (x * x + y * y)

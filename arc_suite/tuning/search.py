@@ -1,8 +1,9 @@
 """CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the numbers of a demonstrator.
 
 A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
-generation and the same for all of its candidates, less a penalty for a style that is worse than
-that of the preset from which the search sets out.
+generation and the same for all of its candidates, less two penalties: for a style that is worse
+than that of the preset from which the search sets out, in the same episodes, and for tipping over in hard starts, those
+of many that throw this preset about most.
 """
 
 from typing import NamedTuple
@@ -16,9 +17,14 @@ from arc_suite.tuning.space import Space
 
 SPREAD = 0.5  # of the first generation, in scales of the numbers
 LEADS = 20  # of all legs over the clock, tried beforehand
+HARD = 8  # starts that candidates are tried in
 
 _EXCESS = 1.5  # reward that a cost of style twice as large takes
 _MARGIN = 0.03  # by which style is to be better, as it is judged by few episodes
+_TIPPING = 1.0  # reward that falling in all hard starts takes
+
+_START_STEPS = 40  # control steps of these, after which a robot stands or lies
+_SEEDS = 100_000  # of a search; those below are left for judging what it finds
 
 
 class Generation(NamedTuple):
@@ -27,13 +33,13 @@ class Generation(NamedTuple):
     Attributes:
         fitness: of its candidates.
         reward: mean over the episodes of the fittest.
-        falls: share of all episodes.
+        tipping: of the fittest in the hard starts; see `Score`.
         style: the fittest's costs of style as shares of the origin's, in the order of `judge.STYLE`.
     """
 
     fitness: list[float]
     reward: float
-    falls: float
+    tipping: float
     style: list[float]
 
 
@@ -48,7 +54,7 @@ class Search:
         candidates: how many a generation has.
     """
 
-    def __init__(self, robot: str, seed: int, episodes: int, steps: int):
+    def __init__(self, robot: str, seed: int, episodes: int, steps: int, starts: int):
         """Judges `medium`, with leads over its clock too; the best one is where the search sets out.
 
         Args:
@@ -56,6 +62,7 @@ class Search:
             seed: of the search and its episodes.
             episodes: by which a candidate is judged.
             steps: control steps of each.
+            starts: of which the hard ones are taken, at least `HARD`.
 
         Raises:
             ImportError: no package `cma`.
@@ -63,19 +70,22 @@ class Search:
         import cma  # of the extra "tune"
 
         body, medium = ROBOTS[robot], TUNINGS[robot]["medium"]
-        self._space, self._seed, self._episodes = Space(body, medium), seed, episodes
+        self._space, self._episodes = Space(body, medium), episodes
+        self._first = _SEEDS * (1 + seed)
+        self._starts = range(self._first, self._first + starts)
         leads = [lead / LEADS for lead in range(LEADS)]
-        judge = Judge(body, 1 + LEADS, episodes, steps)
-        score = judge([medium, *(self._space.preset(self._space.vector(lead)) for lead in leads)], seed)
-        judge.close()
+        presets = [medium, *(self._space.preset(self._space.vector(lead)) for lead in leads)]
+        score = _judged(body, presets, range(self._first, self._first + episodes), steps)
         self.reward, *by_lead = score.rewards.mean(axis=-1).tolist()
-        self._style = _style(score)[0]
+        tipping = _judged(body, [medium], self._starts, _START_STEPS).tipping[0]
+        self._hard = [self._starts[index] for index in np.argsort(tipping, stable=True)[-HARD:]]
         self._origin = self._space.vector(leads[np.argmax(by_lead)])
         self._scale = np.array([number.scale for number in self._space.ranges()])
         options = {"randn": np.random.RandomState(seed).randn, "seed": np.nan, "verbose": -9}
         self._strategy = cma.CMAEvolutionStrategy(np.zeros_like(self._origin), SPREAD, options)
         self.candidates = self._strategy.popsize
-        self._judge = Judge(body, self.candidates, episodes, steps)
+        self._judge = Judge(body, self.candidates + 1, episodes, steps)
+        self._judge_of_starts = Judge(body, self.candidates, HARD, _START_STEPS)
         self._generations = 0
 
     def step(self, fitness: list[float] | None = None) -> Generation | None:
@@ -104,13 +114,19 @@ class Search:
         return self._origin + self._scale * solution
 
     def _judged(self, presets) -> Generation:
-        score = self._judge(presets, self._seed + (1 + self._generations) * self._episodes)
-        rewards, style = score.rewards.mean(axis=-1), _style(score) / self._style
-        fitness = rewards - _EXCESS * (style - (1.0 - _MARGIN)).clip(0.0).sum(axis=-1)
+        first = self._starts.stop + self._generations * self._episodes
+        score = self._judge([*presets, self._space.origin], range(first, first + self._episodes))
+        tipping = self._judge_of_starts(presets, self._hard).tipping.mean(axis=-1)
+        rewards = score.rewards[:-1].mean(axis=-1)
+        costs = np.stack([score.style[name].mean(axis=-1) for name in STYLE], axis=-1)
+        style = costs[:-1] / costs[-1]
+        fitness = rewards - _EXCESS * (style - (1.0 - _MARGIN)).clip(0.0).sum(axis=-1) - _TIPPING * tipping
         best = fitness.argmax()
-        return Generation(fitness.tolist(), float(rewards[best]), float(score.falls.mean()), style[best].tolist())
+        return Generation(fitness.tolist(), float(rewards[best]), float(tipping[best]), style[best].tolist())
 
 
-def _style(score: Score) -> np.ndarray:
-    """Costs of style, means over episodes, (presets, costs)."""
-    return np.stack([score.style[name].mean(axis=-1) for name in STYLE], axis=-1)
+def _judged(body, presets, seeds, steps) -> Score:
+    judge = Judge(body, len(presets), len(seeds), steps)
+    score = judge(presets, seeds)
+    judge.close()
+    return score

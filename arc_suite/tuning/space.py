@@ -27,7 +27,9 @@ class Range(NamedTuple):
 _SHARED = {
     "stiffness": Range(0.3, 0.05, 5.0, 3),
     "damping": Range(0.08, 0.0, 1.0, 3),
+    "settle": Range(5.0, 0.0, 40.0, 0),
     "ramp": Range(5.0, 1.0, 40.0, 1),
+    "ramp_start": Range(0.2, 0.0, 1.0, 2),
     "duty_factor": Range(0.08, 0.3, 0.85, 3),
 }
 _BY_RANK = {
@@ -46,10 +48,10 @@ _DECIMALS = 4  # of all numbers of a preset
 class Space(NamedTuple):
     """Vectors of numbers about a preset.
 
-    A vector holds the stiffness, the damping, the ramp and the duty factor; for each rank of legs
-    its lead over the preset's clock (cycles), the sweep and the centre of the hip (degrees); and
-    for each other joint and each rank its centre and bends (degrees). The frequency is the gait's
-    and stays; the robot walks at once, without settling.
+    A vector holds the stiffness, the damping, how it settles and ramps up, and the duty factor; for
+    each rank of legs its lead over the preset's clock (cycles), the sweep and the centre of the hip
+    (degrees); and for each other joint and each rank its centre and bends (degrees). The frequency
+    is the gait's and stays.
 
     Attributes:
         body: of the robot.
@@ -87,6 +89,7 @@ class Space(NamedTuple):
         _, low, high, _ = np.transpose(self.ranges())
         numbers = iter(vector.clip(low, high).round(_DECIMALS).tolist())
         shared = {name: next(numbers) for name in _SHARED}
+        shared["settle"] = round(shared["settle"])
 
         def by_rank() -> tuple[float, ...]:
             return tuple(next(numbers) for _ in range(self.ranks))
@@ -98,7 +101,6 @@ class Space(NamedTuple):
         offsets = zip(self.origin.phase_offsets, self.body.ranks, strict=True)
         return self.origin._replace(
             **shared,
-            settle=0,
             phase_offsets=tuple(round((offset + leads[rank]) % 1.0, _DECIMALS) for offset, rank in offsets),
             sweep=sweep,
             centre=centre,
