@@ -53,6 +53,20 @@ def test_ranks_and_sides_of_a_hip():
     assert_allclose(np.degrees(laid.centre[hips]), [-10, -20, -30, 10, 20, 30])
 
 
+def test_settling_is_a_crouch_or_the_centre():
+    medium = TUNINGS["bastion"]["medium"]
+    crouching = medium._replace(settle=4, crouch={"hip": 10, "ankle": (60, 50, 40)})
+    still = np.zeros((2, 12))
+    targets = []
+    for preset in (medium, crouching):
+        control = Prescribed.fit(ROBOTS["bastion"], preset._replace(stiffness=0.1, ramp_start=1.0))
+        targets.append([np.degrees(control(np.array(clock), None, *still) / 0.1) for clock in (0, 3, 4)])
+    assert_allclose(targets[0], np.tile([0, 30], (3, 6)), atol=1e-9)
+    left = [-10, 60, -10, 50, -10, 40]
+    assert_allclose(targets[1][:2], [left + [abs(angle) for angle in left]] * 2, atol=1e-9)
+    assert abs(targets[1][2] - targets[1][1]).max() > 10
+
+
 def test_stacked_controls_are_single_ones():
     body, presets = ROBOTS["queen"], TUNINGS["queen"]
     controls = [Prescribed.fit(body, preset) for preset in presets.values()]

@@ -119,10 +119,12 @@ class Prescribed(NamedTuple):
 
     Attributes:
         pattern: of the joints.
+        crouch: (joints,) angles held while settling, rad.
         stiffness, damping, settle, ramp, ramp_start: as in `Preset`.
     """
 
     pattern: Pattern
+    crouch: np.ndarray
     stiffness: float | np.ndarray
     damping: float | np.ndarray
     settle: int | np.ndarray
@@ -134,7 +136,8 @@ class Prescribed(NamedTuple):
         """A preset, laid out over a body's joints, in its own gait or another."""
         if gait is not None:
             preset = preset._replace(phase_offsets=gait.offsets, duty_factor=gait.duty_factor)
-        return cls(pattern(body, preset), *(getattr(preset, name) for name in cls._fields[1:]))
+        crouch = pattern(body, preset._replace(centre=preset.crouch or preset.centre)).centre
+        return cls(pattern(body, preset), crouch, *(getattr(preset, name) for name in cls._fields[2:]))
 
     @classmethod
     def stacked(cls, controls: Sequence[Self]) -> Self:
@@ -150,7 +153,7 @@ class Prescribed(NamedTuple):
         """Actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
         steps = clock[..., None]
         walking = joint_targets(self.pattern, CONTROL_TIMESTEP * clock)
-        targets = np.where(steps < self.settle, self.pattern.centre, walking)
+        targets = np.where(steps < self.settle, self.crouch, walking)
         ramp = (self.ramp_start + (1.0 - self.ramp_start) * steps / self.ramp).clip(max=1.0)
         return torques(targets, angles, velocities, ramp * self.stiffness, self.damping)
 

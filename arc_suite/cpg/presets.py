@@ -21,7 +21,7 @@ class Preset(NamedTuple):
     Attributes:
         stiffness: action per rad of error (kp).
         damping: action per rad/s (kd).
-        settle: first control steps in which the target is the centre.
+        settle: first control steps, in which the robot crouches.
         ramp: control steps over which the stiffness grows linearly to its full value.
         ramp_start: share of the stiffness at the first step.
         frequency: of the cycle, Hz.
@@ -31,6 +31,8 @@ class Preset(NamedTuple):
         centre: angles about which joints move, degrees, by joint; a hip's is positive forwards and
             0 if it is not there.
         bends: of the other joints, by name.
+        crouch: angles held while settling, as `centre`; None for the centre. Legs drawn up catch a
+            robot whom a reset with its feet in the ground has thrown.
     """
 
     stiffness: float
@@ -44,6 +46,7 @@ class Preset(NamedTuple):
     sweep: ByRank
     centre: Mapping[str, ByRank]
     bends: Mapping[str, Bend]
+    crouch: Mapping[str, ByRank] | None = None
 
 
 SPEEDS = ("slow", "medium", "fast")  # the published ones
@@ -117,6 +120,20 @@ TUNINGS = {
         "slow": _bastion(frequency=1.2, duty_factor=0.65, sweep=22, bends={"ankle": Bend(stance=-15, swing=35)}),
         "medium": _bastion(frequency=1.5, duty_factor=0.60, sweep=26, bends={"ankle": Bend(stance=-20, swing=45)}),
         "fast": _bastion(frequency=1.8, duty_factor=0.55, sweep=30, bends={"ankle": Bend(stance=-25, swing=55)}),
+        "tuned": Preset(
+            stiffness=0.65,
+            damping=0.115,
+            settle=6,
+            ramp=25.1,
+            ramp_start=0.69,
+            frequency=1.5,
+            duty_factor=0.62,
+            phase_offsets=(0.834, 0.33, 0.831, 0.334, 0.83, 0.331),
+            sweep=(28.1, 12.4, 30.3),
+            centre={"hip": (0.5, -5.3, 0.0), "ankle": (24.2, 26.7, 21.2)},
+            bends={"ankle": Bend(stance=(-24.7, -23.9, -17.1), swing=(59.8, 47.3, 40.8))},
+            crouch={"ankle": 60},
+        ),
     },
     "tick": {
         "slow": _tick(

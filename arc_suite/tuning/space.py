@@ -87,7 +87,7 @@ class Space(NamedTuple):
     def preset(self, vector: np.ndarray) -> Preset:
         """The preset of a vector (size,), within its ranges."""
         _, low, high, _ = np.transpose(self.ranges())
-        numbers = iter(vector.clip(low, high).round(_DECIMALS).tolist())
+        numbers = iter((vector.clip(low, high).round(_DECIMALS) + 0.0).tolist())
         shared = {name: next(numbers) for name in _SHARED}
         shared["settle"] = round(shared["settle"])
 
