@@ -151,6 +151,22 @@ TUNINGS = {
             sweep=40,
             bends={"knee": Bend(stance=18, swing=-45), "ankle": Bend(stance=0, swing=55)},
         ),
+        "tuned": Preset(
+            stiffness=0.648,
+            damping=0.27,
+            settle=0,
+            ramp=20.4,
+            ramp_start=0.85,
+            frequency=1.5,
+            duty_factor=0.539,
+            phase_offsets=(0.762, 0.288, 0.798, 0.262, 0.788, 0.298),
+            sweep=(45.9, 54.8, 46.4),
+            centre={"hip": (-12.9, -9.1, -4.6), "knee": (-9.3, 6.6, 2.6), "ankle": (6.4, -15.6, 3.2)},
+            bends={
+                "knee": Bend(stance=(43.6, 21.0, 5.3), swing=(-58.1, -82.7, -47.5)),
+                "ankle": Bend(stance=(-11.9, -7.3, -31.9), swing=(11.7, 34.7, 34.1)),
+            },
+        ),
     },
     "leaper": {
         "slow": _leaper(
