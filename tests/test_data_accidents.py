@@ -133,18 +133,18 @@ def last_line(text):
     ("accident", "status", "line"),
     [
         ("kill", -signal.SIGKILL, None),
-        ("interrupt", 130, f"{ID}: interrupted; 5 of 8 episodes are kept; the same command continues"),
+        ("interrupt", 130, f"collect.py: interrupted; 5 of 8 episodes of {ID!r} are kept"),
         (
             "nan",
             1,
             "collect.py: policy 'own:nan': episode of seed 5, step 2: action[0]: "
-            "expected a number from -1 to 1, got nan; 5 of 8 episodes are kept",
+            f"expected a number from -1 to 1, got nan; 5 of 8 episodes of {ID!r} are kept",
         ),
         (
             "short",
             1,
             "collect.py: policy 'own:short': episode of seed 5, step 2: action: expected shape (18,), got (3,); "
-            "5 of 8 episodes are kept",
+            f"5 of 8 episodes of {ID!r} are kept",
         ),
     ],
 )
@@ -177,7 +177,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
     assert line.startswith("collect.py: cannot write ")
     assert "file too large" in line
     kept = len(digests())
-    assert line.endswith(f"; {kept} of 8 episodes are kept")
+    assert line.endswith(f"; {kept} of 8 episodes of {ID!r} are kept")
     assert kept
     done = run(*few)
     assert done.returncode == 0, done.stderr

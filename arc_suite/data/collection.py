@@ -75,7 +75,7 @@ def collect(
             kind = next(kind for kind in (ValueError, OSError, KeyboardInterrupt) if isinstance(error, kind))
             cause = "interrupted" if kind is KeyboardInterrupt else error
             kept = len(storage.kept.intersection(range(episodes)))
-            raise kind(f"{cause}; {kept} of {episodes} episodes are kept") from None
+            raise kind(f"{cause}; {kept} of {episodes} episodes of {dataset_id!r} are kept") from None
         return len(missing)
 
 
