@@ -60,7 +60,7 @@ def collect(
         provenance, specification = settings.provenance(), settings.environment_spec().to_json()
         if storage.metadata is not None:
             difference = _difference(storage.metadata, provenance, specification)
-            if difference and not overwrite:
+            if difference and storage.kept and not overwrite:
                 raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
             if difference:
                 storage.clear()
