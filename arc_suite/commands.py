@@ -2,6 +2,7 @@
 
 import contextlib
 import errno
+import io
 import json
 import math
 import os
@@ -18,8 +19,10 @@ def run(main: Callable[[], int | None]) -> None:
     """Parses the command line into absl's flags, calls `main` and exits the process.
 
     A wrong flag, a stray argument, and a ValueError, OSError or RenderingUnavailable from `main`
-    become one line on standard error and exit status 1; any other exception is a mistake of ours
-    and keeps its traceback. `--help` shows the docstring of the tool's module and its flags.
+    become one line on standard error and exit status 1, Ctrl-C one line and exit status 130; any
+    other exception is a mistake of ours and keeps its traceback. Where nobody reads the output any
+    more, as in `tool | head`, the work goes on without it, so that its files are written. `--help`
+    shows the docstring of the tool's module and its flags.
 
     Args:
         main: reads `absl.flags.FLAGS`; takes nothing, returns an exit status or None.
@@ -39,13 +42,50 @@ def run(main: Callable[[], int | None]) -> None:
             return main()
         except (ValueError, OSError, RenderingUnavailable) as error:
             return _fail(error)
+        except KeyboardInterrupt as interrupt:
+            _fail(str(interrupt) or "interrupted")
+            return 130  # as shells count what SIGINT ends
 
-    app.run(wrapped, flags_parser=parse)
+    # A stream that was closed before the start is None.
+    output, errors = (_Output(stream or io.StringIO()) for stream in (sys.stdout, sys.stderr))
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+        try:
+            app.run(wrapped, flags_parser=parse)
+        finally:
+            output.flush()
 
 
-def _fail(error: Exception) -> int:
-    print(f"{Path(sys.argv[0]).name}: {' '.join(str(error).split())}", file=sys.stderr)
+def _fail(reason: object) -> int:
+    print(f"{Path(sys.argv[0]).name}: {' '.join(str(reason).split())}", file=sys.stderr)
     return 1
+
+
+class _Output:
+    """A stream that goes nowhere once its reader has gone."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def __getattr__(self, name):
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with self._enduring():
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with self._enduring():
+            self._stream.flush()
+
+    @contextlib.contextmanager
+    def _enduring(self):
+        try:
+            yield
+        except BrokenPipeError:
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())  # what is in the stream's buffer goes there too, at exit
+            os.close(nowhere)
 
 
 def folder(path: str | os.PathLike) -> Path:

@@ -65,13 +65,13 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
         (
             ["--policy=zero", "--preset=slow,fats"],
-            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast)",
+            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast, tuned)",
         ),
         (["--robot=all", "--id=some-v0"], "--id=some-v0: names one dataset, and --robot=all makes 4"),
         (
             ["--id=arc_suite/queen/mine"],
             "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between and a "
-            "version at the end, such as 'arc_suite/queen/mine-v0'",
+            "version at the end alone, such as 'arc_suite/queen/mine-v0'",
         ),
         (["--noise=-1"], "flag --noise=-1: -1.0 is not a non-negative number"),
         (["queen"], "unexpected argument 'queen'; see --help"),

@@ -2,6 +2,7 @@
 
 import collections
 import json
+import shlex
 import subprocess
 import sys
 
@@ -10,17 +11,27 @@ import pytest
 from arc_suite.commands import writing, writing_json
 
 TOOL = '''"""Counts."""
+import signal, sys
 from absl import flags
 from arc_suite import commands
 from arc_suite.rendering import RenderingUnavailable
 
 COUNT = flags.DEFINE_integer("count", 1, "How many.", lower_bound=0)
 RAISES = flags.DEFINE_string("raises", None, "What goes wrong.")
+OUTPUT = flags.DEFINE_string("output", None, "File to write after many lines.")
 
 def main():
+    kinds = {"value": ValueError, "os": OSError, "gl": RenderingUnavailable, "key": KeyError, "int": KeyboardInterrupt}
+    if RAISES.value == "signal":
+        signal.raise_signal(signal.SIGINT)
     if RAISES.value:
-        raise {"value": ValueError, "os": OSError, "gl": RenderingUnavailable, "key": KeyError}[RAISES.value]("a\\n  b")
+        raise kinds[RAISES.value]("a\\n  b")
     print("counted", COUNT.value)
+    with commands.writing_json(OUTPUT.value) as file:
+        for number in range(10_000 if OUTPUT.value else 0):
+            print("counting", number)
+            print("still counting", number, file=sys.stderr)
+        file["counted"] = COUNT.value
 
 if __name__ == "__main__":
     commands.run(main)
@@ -49,6 +60,22 @@ def test_unexpected_errors_keep_their_traceback(tool):
     done = tool("--raises=key")
     assert done.returncode == 1
     assert "Traceback" in done.stderr
+
+
+@pytest.mark.parametrize(("kind", "message"), [("signal", "interrupted"), ("int", "a b")])
+def test_an_interrupt_is_one_line_and_exit_status_130(tool, kind, message):
+    done = tool(f"--raises={kind}")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"count.py: {message}\n")
+
+
+@pytest.mark.parametrize("redirection", ["", "2>&1"])
+def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
+    target = tmp_path / "a.json"
+    line = f"{shlex.join(map(str, tool().args))} --output={target} {redirection} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
+    assert (done.returncode, done.stdout.count("\n")) == (0, 1)
+    assert "Error" not in done.stderr
+    assert json.loads(target.read_text()) == {"counted": 1}
 
 
 @pytest.mark.parametrize(

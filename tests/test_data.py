@@ -324,6 +324,24 @@ def test_another_version_or_model_is_refused(root):
     assert len(minari.load_dataset(ID)) == 2
 
 
+@pytest.mark.parametrize("name", ["settings", "versions", "model_sha256"])
+def test_metadata_that_do_not_tell_all_are_damage(root, name):
+    settings = data.Settings(QUEEN, **SHORT)
+    collect(ID, settings, 1)
+    for change in (lambda about: about.update({name: 1}), lambda about: about.pop(name)):
+        edited(root, lambda metadata, change=change: change(metadata["arc_suite"]))
+        for use in (verify, data.open, lambda dataset_id: collect(dataset_id, settings, 2)):
+            with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: .*{name}"):
+                use(ID)
+
+
+def test_episodes_without_metadata_are_not_continued_as_others(root):
+    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    (root / ID / "data" / "metadata.json").unlink()
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: "):
+        collect(ID, data.Settings(TICK, **SHORT), 3)
+
+
 @pytest.mark.parametrize("name", ["main_data.hdf5", "metadata.json"])
 @pytest.mark.parametrize("length", [0, 100])
 def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length):
@@ -340,6 +358,14 @@ def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length)
     assert digests() == before
 
 
+def test_a_folder_that_cannot_be_made_is_named(root):
+    (root / ID).mkdir(parents=True)
+    (root / ID / "data").touch()
+    with pytest.raises(OSError) as error:
+        collect(ID, data.Settings(QUEEN, **SHORT), 1)
+    assert str(error.value) == f"cannot make folder {root / ID / 'data'}: file exists"
+
+
 def test_unknown_ids():
     with pytest.raises(ValueError, match=f"^unknown dataset '{ID}': there are none in "):
         data.open(ID)
@@ -348,12 +374,12 @@ def test_unknown_ids():
         data.open("arc_suite/test/same-v0")
     assert str(error.value) == f"unknown dataset 'arc_suite/test/same-v0'; did you mean {ID!r}? (there are: {ID})"
     other = "arc_suite/queen/cpg-medium-v0"
-    for wrong, example in ((ID[:-3], ID), ("../some-v0", other), ("", other)):
+    for wrong, example in ((ID[:-3], ID), (f"{ID}/inner-v0", other), ("../some-v0", other), ("", other)):
         with pytest.raises(ValueError) as error:
             data.open(wrong)
         assert str(error.value) == (
             f"dataset id {wrong!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
-            f"at the end, such as {example!r}"
+            f"at the end alone, such as {example!r}"
         )
 
 

@@ -84,32 +84,40 @@ def killed_at(count, **arguments):
     return process.exitcode == 9
 
 
-@pytest.mark.parametrize("scenario", ["new", "more episodes", "overwrite"])
+@pytest.mark.parametrize("scenario", ["new", "new after another", "more episodes", "overwrite", "overwrite twice"])
 def test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it(root, scenario):
     old = SETTINGS._replace(seed=9)
     collect("arc_suite/test/old-v0", old, 3)
     collect("arc_suite/test/whole-v0", SETTINGS, 4)
     whole, arguments = digests("arc_suite/test/whole-v0"), {"settings": SETTINGS, "episodes": 4}
-    before = []
+    before, leftover = [], root / "leftover"
     if scenario == "more episodes":
         collect("arc_suite/test/before-v0", SETTINGS, 3)
         before = whole[:3]
-    elif scenario == "overwrite":
+    elif scenario.startswith("overwrite"):
         before = digests("arc_suite/test/old-v0")
         collect("arc_suite/test/before-v0", old, 3)
         arguments["overwrite"] = True
+    if scenario == "overwrite twice":
+        assert killed_at(8, settings=old, episodes=4, overwrite=True)
+        (root / "arc_suite/test/.some-v0.new").rename(leftover)
+    elif scenario == "new after another":
+        assert killed_at(2, settings=old, episodes=4)
+        (root / "arc_suite/test/.some-v0.new").rename(leftover)
     for count in range(1, 100):
         if before:
             shutil.copytree(root / "arc_suite/test/before-v0", root / ID)
             metadata = root / ID / "data" / "metadata.json"
             metadata.write_text(metadata.read_text().replace("before-v0", "some-v0"))
+        if leftover.exists():
+            shutil.copytree(leftover, root / "arc_suite/test/.some-v0.new")
         survived = not killed_at(count, **arguments)
         if (root / ID).exists():
             there = digests()
             assert there in (before, whole[: len(there)])
             assert len(there) >= len(before) or there == whole
         else:  # nothing had been finished, or the kill fell between two renamings
-            assert not before or scenario == "overwrite"
+            assert not before or "overwrite" in arguments
         collect(ID, **arguments)
         assert digests() == whole
         assert {path.name for path in (root / ID).rglob("*")} == {"data", "main_data.hdf5", "metadata.json"}
@@ -133,18 +141,18 @@ def last_line(text):
     ("accident", "status", "line"),
     [
         ("kill", -signal.SIGKILL, None),
-        ("interrupt", 130, f"{ID}: interrupted; 5 of 8 episodes are kept; the same command continues"),
+        ("interrupt", 130, f"collect.py: interrupted; 5 of 8 episodes of {ID!r} are kept"),
         (
             "nan",
             1,
             "collect.py: policy 'own:nan': episode of seed 5, step 2: action[0]: "
-            "expected a number from -1 to 1, got nan; 5 of 8 episodes are kept",
+            f"expected a number from -1 to 1, got nan; 5 of 8 episodes of {ID!r} are kept",
         ),
         (
             "short",
             1,
             "collect.py: policy 'own:short': episode of seed 5, step 2: action: expected shape (18,), got (3,); "
-            "5 of 8 episodes are kept",
+            f"5 of 8 episodes of {ID!r} are kept",
         ),
     ],
 )
@@ -177,7 +185,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
     assert line.startswith("collect.py: cannot write ")
     assert "file too large" in line
     kept = len(digests())
-    assert line.endswith(f"; {kept} of 8 episodes are kept")
+    assert line.endswith(f"; {kept} of 8 episodes of {ID!r} are kept")
     assert kept
     done = run(*few)
     assert done.returncode == 0, done.stderr
@@ -194,8 +202,8 @@ def test_two_processes_do_not_collect_into_one_dataset():
 
 
 def test_a_damaged_part_is_named(root):
-    assert killed_at(8, settings=SETTINGS, episodes=6)
-    part = next((root / ID / "data" / "parts").glob("*.hdf5"))
+    assert killed_at(10, settings=SETTINGS, episodes=6)
+    part = root / ID / "data" / "parts" / "00000.hdf5"
     os.truncate(part, 50)
     with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: {part}: "):
         collect(ID, SETTINGS, 6)

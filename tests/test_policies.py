@@ -33,7 +33,7 @@ def test_random_policies_differ_by_seed():
         ),
         (
             ("cpg", "queen", "midium"),
-            "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast)",
+            "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast, tuned)",
         ),
     ],
 )

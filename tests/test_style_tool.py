@@ -140,7 +140,11 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         (["--save=nowhere/a.npz"], "cannot write nowhere/a.npz: no such file or directory"),
         ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot beside --spec or --legs"),
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
-        (["--policy=own_walkers:broken", "--robot=leaper"], "action[0]: expected a number from -1 to 1, got nan"),
+        (
+            ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],
+            "policy 'own_walkers:broken': episode of seed 0: action[0]: expected a number from -1 to 1, got nan",
+        ),
+        ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
         ([f"--output={TOOL}"], f"cannot make folder {TOOL}: file exists"),
         (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),

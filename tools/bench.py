@@ -48,8 +48,10 @@ def main():
     """Measures, prints and writes."""
     robots = [names.check(robot, ROBOTS, "robot") for robot in FLAGS.robots]
     if FLAGS.collect is not None:
-        from arc_suite.benchmark import collecting  # needs Minari
-
+        try:
+            from arc_suite.benchmark import collecting
+        except ImportError as error:
+            raise ValueError(str(error)) from None
         print(collecting.measure(robots, FLAGS.collect, FLAGS.rounds))
         return
     threads = contestants.all_threads()

@@ -10,8 +10,6 @@ Examples:
   python tools/collect.py --verify arc_suite/queen/cpg-medium-v0
 """
 
-import sys
-
 import numpy as np
 from absl import flags
 
@@ -53,11 +51,7 @@ def main():
     for body in bodies.values():
         settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = FLAGS.id or settings.dataset_id()
-        try:
-            missing = data.collect(dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite)
-        except KeyboardInterrupt as interrupt:
-            print(f"{dataset_id}: {str(interrupt) or 'interrupted'}; the same command continues", file=sys.stderr)
-            return 130
+        missing = data.collect(dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite)
         dataset = data.open(dataset_id)
         if not missing:
             print(f"{dataset_id}: has its {len(dataset)} episodes already")

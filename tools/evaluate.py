@@ -12,7 +12,7 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import body_flags, commands, evaluation, policies
+from arc_suite import body_flags, commands, evaluation, policies, seeding
 from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
 
@@ -71,6 +71,7 @@ def over_all(reports: dict) -> dict:
 def main():
     """Prints the table and writes the JSON."""
     bodies = body_flags.bodies(_ROBOT)
+    seeding.check(FLAGS.seed + FLAGS.episodes - 1)
     walkers = {name: policies.policy(FLAGS.policy, body, FLAGS.preset, FLAGS.seed) for name, body in bodies.items()}
     with commands.writing_json(FLAGS.json) as file:
         header = COLUMNS.format(

@@ -1,5 +1,6 @@
 """Collecting a dataset."""
 
+import contextlib
 import math
 import time
 from collections.abc import Callable
@@ -60,7 +61,7 @@ def collect(
         provenance, specification = settings.provenance(), settings.environment_spec().to_json()
         if storage.metadata is not None:
             difference = _difference(storage.metadata, provenance, specification)
-            if difference and not overwrite:
+            if difference and storage.kept and not overwrite:
                 raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
             if difference:
                 storage.clear()
@@ -68,14 +69,14 @@ def collect(
         try:
             if missing:
                 if storage.metadata is None:
-                    storage.metadata = _metadata(dataset_id, settings, provenance, specification)
+                    storage.metadata = _metadata(dataset_id, settings, provenance, specification, threads)
                 _play(storage, settings, missing, rows, threads, progress)
             storage.finish(lambda indices: progress(indices, desc="merging", unit="episode", leave=False))
         except (ValueError, OSError, KeyboardInterrupt) as error:
             kind = next(kind for kind in (ValueError, OSError, KeyboardInterrupt) if isinstance(error, kind))
             cause = "interrupted" if kind is KeyboardInterrupt else error
             kept = len(storage.kept.intersection(range(episodes)))
-            raise kind(f"{cause}; {kept} of {episodes} episodes are kept") from None
+            raise kind(f"{cause}; {kept} of {episodes} episodes of {dataset_id!r} are kept") from None
         return len(missing)
 
 
@@ -146,29 +147,30 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
             environment.close()
 
 
-def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str) -> dict:
+def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str, threads) -> dict:
     """Minari's metadata, but for the counts."""
-    environment = VectorEnv(settings.body, "walk", evaluation.EPISODES, max_episode_steps=settings.steps)
     weights = walk.settings(settings.body, {}).weights
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
-    return {
-        "dataset_id": dataset_id,
-        "minari_version": minari_version,
-        "data_format": "hdf5",
-        "jpeg_encoding": False,
-        "observation_space": serialize_space(environment.single_observation_space),
-        "action_space": serialize_space(environment.single_action_space),
-        "env_spec": specification,
-        "algorithm_name": "-".join([settings.policy, *settings.presets]),
-        "description": f"{settings.body.name} walks by policy {settings.policy}{presets}{noise}; "
-        f"episode k has seed {settings.seed} + k.",
-        "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
-        "ref_min_score": _mean_return(environment, Settings(settings.body, "zero", (), steps=settings.steps)),
-        "ref_max_score": rewards.greatest(weights) * settings.steps,
-        "num_episodes_average_score": evaluation.EPISODES,
-        "arc_suite": provenance,
-    }
+    environment = VectorEnv(settings.body, "walk", evaluation.EPISODES, threads, max_episode_steps=settings.steps)
+    with contextlib.closing(environment):
+        return {
+            "dataset_id": dataset_id,
+            "minari_version": minari_version,
+            "data_format": "hdf5",
+            "jpeg_encoding": False,
+            "observation_space": serialize_space(environment.single_observation_space),
+            "action_space": serialize_space(environment.single_action_space),
+            "env_spec": specification,
+            "algorithm_name": "-".join([settings.policy, *settings.presets]),
+            "description": f"{settings.body.name} walks by policy {settings.policy}{presets}{noise}; "
+            f"episode k has seed {settings.seed} + k.",
+            "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
+            "ref_min_score": _mean_return(environment, Settings(settings.body, "zero", (), steps=settings.steps)),
+            "ref_max_score": rewards.greatest(weights) * settings.steps,
+            "num_episodes_average_score": evaluation.EPISODES,
+            "arc_suite": provenance,
+        }
 
 
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:

@@ -109,4 +109,8 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
         metadata = json.loads(path.read_text())
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
+    with damages(dataset_id, path):
+        for name, kind in (("settings", dict), ("versions", dict), ("model_sha256", str)):
+            if not isinstance(metadata["arc_suite"][name], kind):
+                raise TypeError(f"expected {name} of arc_suite to be a {kind.__name__}")
     return metadata

@@ -1,5 +1,6 @@
 """Ids of datasets, and where Minari keeps them."""
 
+import re
 from pathlib import Path
 
 from minari.dataset.minari_dataset import parse_dataset_id
@@ -7,28 +8,31 @@ from minari.storage import get_dataset_path
 
 from arc_suite import names
 
+_VERSIONED = re.compile(r"-v\d+$")
+
 
 def check(dataset_id: str) -> str:
-    """Returns the id if Minari admits it.
+    """Returns the id if Minari admits it, and it does not lie within another dataset.
 
     Raises:
-        ValueError: it does not, or the version is missing; one line with an example.
+        ValueError: it is no such id, or the version is missing; one line with an example.
     """
     if not _valid(dataset_id):
         example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/cpg-medium-v0")))
         raise ValueError(
             f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
-            f"at the end, such as {example!r}"
+            f"at the end alone, such as {example!r}"
         )
     return dataset_id
 
 
 def _valid(dataset_id: str) -> bool:
     try:
-        parse_dataset_id(dataset_id)
+        namespace, _, _ = parse_dataset_id(dataset_id)
     except (TypeError, ValueError):  # Minari's TypeError is that of a missing version
         return False
-    return True
+    # Minari lists no dataset within another, and replacing the outer one would delete it.
+    return namespace is None or not any(map(_VERSIONED.search, namespace.split("/")))
 
 
 def folder(dataset_id: str) -> Path:

@@ -3,8 +3,9 @@
 No file is written where it is read. Finished episodes go to part files, `data/parts/<n>.hdf5`, each
 written beside its place and moved there. `main_data.hdf5`, which Minari opens, is a small file of
 links to the episodes before the first that is missing, and is replaced after each part;
-`metadata.json` follows and tells how many there are. In the end the parts are merged into one plain
-`main_data.hdf5`, whose bytes do not depend on how the episodes got there.
+`metadata.json`, which is there before the first part, follows and tells how many there are. In the
+end the parts are merged into one plain `main_data.hdf5`, whose bytes do not depend on how the
+episodes got there.
 
 A new dataset starts in a hidden folder beside its place, and moves there with its first episodes;
 one that replaces another moves when it is complete.
@@ -48,7 +49,7 @@ class Storage:
         self._early = early
         self._where: dict[int, tuple[str, int]] = {}  # by index of an episode its part and its steps
         data = folder / "data"
-        if (data / METADATA).exists():
+        if (data / METADATA).exists() or any(data.rglob("*.hdf5")):
             self.metadata = read_metadata(dataset_id, folder)
         for leftover in data.rglob(".*"):  # of a kill in mid-writing
             shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
@@ -74,7 +75,7 @@ class Storage:
             shutil.rmtree(old) if place.exists() else old.rename(place)
         folder = new if overwrite or not place.exists() else place
         _make_namespace(dataset_id)
-        (folder / "data").mkdir(parents=True, exist_ok=True)
+        commands.folder(folder / "data")
         with _locked(folder, dataset_id):
             storage = cls(dataset_id, folder, place, early=not overwrite)
             try:
@@ -90,8 +91,11 @@ class Storage:
 
     def clear(self) -> None:
         """Forgets what an overwriting collection that was given up has left."""
-        shutil.rmtree(self._folder / "data")
-        (self._folder / "data").mkdir()
+        data = self._folder / "data"
+        (data / MAIN).unlink(missing_ok=True)
+        if (data / PARTS).exists():
+            shutil.rmtree(data / PARTS)
+        (data / METADATA).unlink()  # last: without it nobody would know what the others are
         self._where, self.metadata, self.merged = {}, None, False
 
     def add(self, finished: Mapping[int, Episode]) -> None:
@@ -100,6 +104,8 @@ class Storage:
         Raises:
             OSError: a file cannot be written; one line that names it. What was there before is still.
         """
+        if not (self._folder / "data" / METADATA).exists():
+            self._write_metadata()  # first: episodes of unknown settings must not be continued
         parts = self._folder / "data" / PARTS
         parts.mkdir(exist_ok=True)
         if self.merged:

@@ -1,5 +1,6 @@
 """Replaying a dataset."""
 
+import contextlib
 from collections.abc import Callable
 
 from tqdm import tqdm
@@ -63,8 +64,8 @@ def verify(
 
     environment = VectorEnv(dataset.body, "walk", rows, threads, max_episode_steps=dataset.steps)
     replayer = Script(script, *environment.action_space.shape)
-    total = dataset.metadata["total_steps"]
-    with progress(desc="replaying", leave=False, total=total, unit="step", unit_scale=True) as bar:
+    bar = progress(desc="replaying", leave=False, total=dataset.metadata["total_steps"], unit="step", unit_scale=True)
+    with contextlib.closing(environment), bar:
         for step in rollouts.play(environment, replayer, range(first, first + count), dataset.steps):
             bar.update(step.playing)
             for episode in step.finished:
@@ -72,7 +73,6 @@ def verify(
                 if episode._replace(preset=there.preset).digest() != there.digest():
                     where = f"episode {episode.seed - first} differs from its replay: {_difference(there, episode)}"
                     raise ValueError(f"dataset {dataset_id!r}: {where}")
-    environment.close()
     return count
 
 

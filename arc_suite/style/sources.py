@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import names, policies, suite
+from arc_suite import names, policies, seeding, suite
 from arc_suite.cpg import PRESETS
 from arc_suite.spec import Body
 from arc_suite.style.files import load
@@ -44,8 +44,9 @@ def source(name: str, preset: str = "medium") -> Source:
 
     Raises:
         ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened;
-            one line. `takes` raises it too, of a policy that does not go with the body, and of tracks
-            of another body; so does a replay whose rewards are not those recorded.
+            one line. `takes` raises it too, of a policy that does not go with the body, a seed that
+            is none, and tracks of another body; so do a policy whose action is none, and a replay whose
+            rewards are not those recorded.
         OSError: a file cannot be read; one line.
     """
     names.check(preset, PRESETS, "preset")
@@ -59,9 +60,16 @@ def source(name: str, preset: str = "medium") -> Source:
 
 
 def _played(name: str, preset: str) -> Source:
+    def play(environment, policy, seed):
+        try:
+            return record(environment, policy, seed)
+        except ValueError as error:
+            raise ValueError(f"policy {name!r}: episode of seed {seed}: {error}") from None
+
     def takes(body, seeds):
+        seeds = [seeding.check(seed) for seed in seeds]
         environment, policy = suite.load(body, "walk"), policies.policy(name, body, preset, seeds[0])
-        return [functools.partial(record, environment, policy, seed) for seed in seeds]
+        return [functools.partial(play, environment, policy, seed) for seed in seeds]
 
     return Source(f"cpg {preset}" if name == "cpg" else name, None, takes)
 
