@@ -201,9 +201,13 @@ def test_two_processes_do_not_collect_into_one_dataset():
     assert str(error.value) == f"dataset {ID!r} is being collected by another process"
 
 
-def test_a_damaged_part_is_named(root):
-    assert killed_at(10, settings=SETTINGS, episodes=6)
-    part = root / ID / "data" / "parts" / "00000.hdf5"
-    os.truncate(part, 50)
-    with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: {part}: "):
-        collect(ID, SETTINGS, 6)
+def test_a_damaged_part_is_named_and_overwrite_mends_it(root):
+    for place, overwrite in ((root / ID, False), (root / "arc_suite/test/.some-v0.new", True)):
+        assert killed_at(10, settings=SETTINGS, episodes=6, overwrite=overwrite)
+        part = place / "data" / "parts" / "00000.hdf5"
+        os.truncate(part, 50)
+        if not overwrite:
+            with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: {part}: "):
+                collect(ID, SETTINGS, 6)
+        collect(ID, SETTINGS, 6, overwrite=True)
+        assert len(digests()) == 6

@@ -11,6 +11,7 @@ import pytest
 import arc_suite
 from arc_suite import policies
 from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
@@ -19,6 +20,7 @@ ZEROS = np.zeros(12)
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 DOMAINS = "(there are: queen, bastion, tick, leaper)"
+PRESETS = ", ".join(TUNINGS["bastion"])
 CAMERAS = "['tracking', 'portrait', 'profile']"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
@@ -134,10 +136,10 @@ CASES = [
     # Presets and policies.
     (
         lambda w: Demonstrator("bastion", "quick"),
-        "unknown preset 'quick'; did you mean 'medium'? (there are: slow, medium, fast)",
+        f"unknown preset 'quick'; did you mean 'medium'? (there are: {PRESETS})",
     ),
     (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
-    (lambda w: Demonstrator("bastion", froude=0.2), "froude: bastion has presets alone: slow, medium, fast"),
+    (lambda w: Demonstrator("bastion", froude=0.2), f"froude: bastion has presets alone: {PRESETS}"),
     (lambda w: Demonstrator("bastion", gait="trott"), f"unknown gait 'trott'; did you mean 'trot'? {GAITS}"),
     (lambda w: w.walker(np.zeros(5)), "observation: expected 151 numbers, got shape (5,)"),
     (lambda w: w.walker(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),

@@ -77,7 +77,14 @@ class Storage:
         _make_namespace(dataset_id)
         commands.folder(folder / "data")
         with _locked(folder, dataset_id):
-            storage = cls(dataset_id, folder, place, early=not overwrite)
+            try:
+                storage = cls(dataset_id, folder, place, early=not overwrite)
+            except ValueError:
+                if not overwrite:
+                    raise
+                shutil.rmtree(folder / "data")  # an overwriting collection that was given up, and damaged since
+                commands.folder(folder / "data")
+                storage = cls(dataset_id, folder, place, early=False)
             try:
                 yield storage
             finally:
