@@ -184,5 +184,21 @@ TUNINGS = {
             duty_factor=0.60,
             bends={"knee": Bend(stance=0, swing=-60), "ankle": Bend(stance=(30, 0), swing=(80, -80))},
         ),
+        "tuned": Preset(
+            stiffness=0.644,
+            damping=0.126,
+            settle=0,
+            ramp=10.2,
+            ramp_start=0.89,
+            frequency=1.2,
+            duty_factor=0.619,
+            phase_offsets=(0.19, 0.69, 0.515, 0.015),
+            sweep=(29.8, 32.3),
+            centre={"hip": (-13.5, -10.5), "knee": (-2.4, 3.7), "ankle": (-2.0, -2.8)},
+            bends={
+                "knee": Bend(stance=(17.7, -4.9), swing=(-57.3, -39.3)),
+                "ankle": Bend(stance=(18.1, -3.2), swing=(70.1, -78.4)),
+            },
+        ),
     },
 }
