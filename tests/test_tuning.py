@@ -142,19 +142,27 @@ def test_journal_keeps_what_was_written_when_broken_off(tmp_path):
     for generation in GENERATIONS:
         journal.append(generation)
     whole = path.read_bytes()
-    assert Journal(path, SETTINGS).generations == GENERATIONS
+    with pytest.raises(ValueError, match="journal.jsonl: another process goes on with this search$"):
+        Journal(path, SETTINGS)
+    journal.close()
+    again = Journal(path, SETTINGS)
+    assert again.generations == GENERATIONS
+    again.close()
     for cut in range(len(whole)):
         path.write_bytes(whole[:cut])
         again = Journal(path, SETTINGS)
         assert again.generations == GENERATIONS[: max(whole[:cut].count(b"\n") - 1, 0)]
         for generation in GENERATIONS[len(again.generations) :]:
             again.append(generation)
+        again.close()
         assert path.read_bytes() == whole
 
 
 def test_a_journal_of_something_else_is_refused_and_left_alone(tmp_path):
     path = tmp_path / "journal.jsonl"
-    Journal(path, SETTINGS).append(GENERATIONS[0])
+    journal = Journal(path, SETTINGS)
+    journal.append(GENERATIONS[0])
+    journal.close()
     whole = path.read_bytes()
     with pytest.raises(ValueError, match=r"of a search with seed 3, not 4; delete it or write to another folder$"):
         Journal(path, SETTINGS | {"seed": 4})

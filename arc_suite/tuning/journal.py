@@ -1,5 +1,6 @@
 """What a search has found so far, in a file of JSON lines that survives being broken off."""
 
+import fcntl
 import json
 import os
 from collections.abc import Mapping
@@ -24,18 +25,25 @@ class Journal:
             settings: what determines the search; plain values.
 
         Raises:
-            ValueError: the file belongs to another search, or is no journal; one line.
-            OSError: the file cannot be read or written.
+            ValueError: the file belongs to another search, or is no journal, or another process
+                writes to it; one line.
+            OSError: the file cannot be read or written; one line.
         """
         path, header = Path(path), _line(settings)
-        text = path.read_bytes() if path.exists() else b""
+        try:
+            self._file = path.open("a+b")
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ValueError(f"{path}: another process goes on with this search") from None
+        except OSError as error:
+            raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+        text = path.read_bytes()
         # What has no end was being written when the search was broken off.
         if not header.startswith(text):
             text = text[: text.rfind(b"\n") + 1] or text
         elif text != header:
             text = b""
         self.generations = _generations(path, text, header) if text else []
-        self._file = path.open("ab")
         self._file.truncate(len(text))
         if not text:
             self._write(header)
