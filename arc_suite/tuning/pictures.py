@@ -32,8 +32,8 @@ def course(robot: str, reward: float, generations: Sequence[Generation], length:
     best = [length * generation.reward for generation in generations]
     returns.plot(counts, best, color=_GREEN, label="return of the fittest")
     returns.axhline(length * reward, color=_GREY, linestyle="--", label="return of medium")
-    # The first generations hold candidates that fall; they would flatten the rest.
-    returns.set_ylim(bottom=min(length * reward, np.percentile(fitness[0], 20)) - 100.0)
+    # Candidates that fall would flatten the rest.
+    returns.set_ylim(min(length * reward, np.percentile(fitness[0], 20)) - 100.0, max(best) + 100.0)
     returns.set_ylabel(f"return of {length} control steps")
     returns.set_title(robot, loc="left", fontweight="bold")
 
