@@ -100,7 +100,7 @@ def test_medium_earns_the_published_return(robot):
 
 
 # Mean return of 10 seeds, with the tolerance that their scatter asks for.
-TUNED = {"queen": (3830, 0.005), "bastion": (0, 0.005), "tick": (0, 0.005), "leaper": (0, 0.01)}
+TUNED = {"queen": (3830, 0.005), "bastion": (3796, 0.005), "tick": (3814, 0.005), "leaper": (3567, 0.01)}
 
 
 @pytest.mark.parametrize("robot", TUNED)
