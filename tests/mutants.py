@@ -128,6 +128,15 @@ MUTANTS = (
     Mutant("user's choice of OpenGL overwritten", "rendering.py", '"MUJOCO_GL" not in os.environ and ', ""),
     Mutant("two threads in one vector environment", "vector.py", "not self._busy.acquire(blocking=False)", "False"),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
+    Mutant("no crouch", "cpg/demonstrator.py", "steps < self.settle", "steps < 0"),
+    Mutant(
+        "a row walks by another's preset", "cpg/demonstrator.py", "for value in values]", "for value in values[::-1]]"
+    ),
+    Mutant("all legs lead alike", "tuning/space.py", "offset + leads[rank]", "offset + leads[0]"),
+    Mutant("the fallen go on earning", "tuning/judge.py", "totals += rewards * upright", "totals += rewards"),
+    Mutant("a search is told its worst", "tuning/search.py", "[-value for value in fitness]", "fitness"),
+    Mutant("the same noise in all episodes", "data/actors.py", "default_rng((seed, 1))", "default_rng(1)"),
+    Mutant("a damaged episode is read", "data/episodes.py", "!= value:", "is value:"),
 )
 
 

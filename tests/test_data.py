@@ -188,6 +188,16 @@ def test_every_setting_matters():
     assert len(seen) == len(changes)
 
 
+def test_noise_is_normal_and_differs_from_episode_to_episode():
+    settings = data.Settings(QUEEN, "zero", (), noise=0.1, steps=40)
+    collect(ID, settings, 2)
+    first, second = (episode.actions for episode in data.open(ID))
+    for noise in (first, second):
+        assert abs(noise.mean()) < 0.02
+        assert 0.09 < noise.std() < 0.11
+    assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 0.15
+
+
 def test_ids_by_default_are_minaris():
     named = {
         "arc_suite/queen/cpg-medium-v0": data.Settings(QUEEN),
