@@ -172,5 +172,9 @@ def test_wrong_observation_and_names_are_one_line_errors():
         Demonstrator("queen")(np.zeros(198))
     with pytest.raises(ValueError, match=r"^unknown preset 'meduim'; did you mean 'medium'\?"):
         Demonstrator("queen", "meduim")
+    with pytest.raises(ValueError, match=r"^preset: queen has 6 legs, and phase_offsets is for 4$"):
+        Demonstrator("queen", TUNINGS["leaper"]["medium"])
+    with pytest.raises(ValueError, match=r"^preset: does not fit queen: KeyError: 'knee'$"):
+        Demonstrator("queen", TUNINGS["bastion"]["tuned"])
     with pytest.raises(ValueError, match=r"^unknown robot 'quene'; did you mean 'queen'\?"):
         Demonstrator("quene")

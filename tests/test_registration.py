@@ -180,8 +180,11 @@ ROW = SETTINGS["tick"]
             {"body": OTHER, "walk": ROW | {"phase_offsets": (0.0, 1.0)}},
             "phase_offsets: expected one finite number or 6 of them, got (0.0, 1.0)",
         ),
-        ({"body": OTHER, "tuning": TUNINGS["leaper"]}, "tuning: other has 6 legs, and phase_offsets of slow is for 4"),
-        ({"body": OTHER, "tuning": TUNINGS["bastion"]}, "tuning: slow does not fit other: KeyError: 'knee'"),
+        (
+            {"body": OTHER, "tuning": TUNINGS["leaper"]},
+            "tuning 'slow': preset: other has 6 legs, and phase_offsets is for 4",
+        ),
+        ({"body": OTHER, "tuning": TUNINGS["bastion"]}, "tuning 'slow': preset: does not fit other: KeyError: 'knee'"),
         (
             {"body": OTHER, "tuning": {"medium": TUNINGS["queen"]["medium"]}},
             "tuning: other has no slow and no fast",

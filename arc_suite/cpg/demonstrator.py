@@ -159,8 +159,21 @@ class Prescribed(NamedTuple):
 
 
 def pattern(body: Body, preset: Preset) -> Pattern:
-    """Lays a preset out over a body's joints."""
+    """Lays a preset out over a body's joints.
 
+    Raises:
+        ValueError: it does not fit the body; one line.
+    """
+    legs, offsets = len(body.legs), len(preset.phase_offsets)
+    if legs != offsets:
+        raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
+    try:
+        return _pattern(body, preset)
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
+
+
+def _pattern(body: Body, preset: Preset) -> Pattern:
     def by_rank(angle: ByRank, rank: int) -> float:
         return math.radians(angle[rank] if isinstance(angle, tuple) else angle)
 
