@@ -135,8 +135,8 @@ CASES = [
     (lambda w: w.rows.render(["a"]), "rows: expected integers from 0 to 2, got 'a'"),
     # Presets and policies.
     (
-        lambda w: Demonstrator("bastion", "quick"),
-        f"unknown preset 'quick'; did you mean 'medium'? (there are: {PRESETS})",
+        lambda w: Demonstrator("bastion", "meduim"),
+        f"unknown preset 'meduim'; did you mean 'medium'? (there are: {PRESETS})",
     ),
     (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (lambda w: Demonstrator("bastion", froude=0.2), f"froude: bastion has presets alone: {PRESETS}"),
