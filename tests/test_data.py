@@ -1,6 +1,5 @@
 """Datasets: Minari opens them, they replay to the bit, and they depend on nothing but seeds and settings."""
 
-import functools
 import pathlib
 import subprocess
 import sys
@@ -9,22 +8,13 @@ import h5py
 import minari
 import numpy as np
 import pytest
-from tqdm import tqdm
+from datasets import ID, QUEEN, SHORT, TICK, collect, digests, quiet, verify
 
 from arc_suite import data, evaluation, policies, style, suite
-from arc_suite.robots import ROBOTS
 from arc_suite.spec_files import load_body
 
 ROOT = pathlib.Path(__file__).parents[1]
 SPIDER = load_body(ROOT / "examples" / "spider.json")
-QUEEN, TICK = ROBOTS["queen"], ROBOTS["tick"]
-ID = "arc_suite/test/some-v0"
-SHORT = {"seed": 5, "steps": 20}
-
-quiet = functools.partial(tqdm, disable=True)
-collect = functools.partial(data.collect, progress=quiet)
-verify = functools.partial(data.verify, progress=quiet)
-
 OWN = """
 import numpy as np
 def make(robot):
@@ -46,10 +36,6 @@ def root(tmp_path, monkeypatch):
     (tmp_path / "own.py").write_text(OWN)
     monkeypatch.delitem(sys.modules, "own", raising=False)
     return tmp_path / "datasets"
-
-
-def digests(dataset_id=ID):
-    return [summary["sha256"] for summary in data.open(dataset_id).summaries()]
 
 
 def replay(environment, seed, actions):

@@ -1,25 +1,15 @@
 """Datasets that are damaged, altered or missing: one line each, and nothing is lost."""
 
-import functools
 import json
 import os
 
 import h5py
 import minari
 import pytest
-from tqdm import tqdm
+from datasets import ID, QUEEN, SHORT, TICK, collect, digests, verify
 
 from arc_suite import data
 from arc_suite.data import episodes
-from arc_suite.robots import ROBOTS
-
-QUEEN, TICK = ROBOTS["queen"], ROBOTS["tick"]
-ID = "arc_suite/test/some-v0"
-SHORT = {"seed": 5, "steps": 20}
-
-quiet = functools.partial(tqdm, disable=True)
-collect = functools.partial(data.collect, progress=quiet)
-verify = functools.partial(data.verify, progress=quiet)
 
 
 @pytest.fixture(autouse=True)
@@ -27,10 +17,6 @@ def root(tmp_path, monkeypatch):
     """Where Minari keeps datasets."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     return tmp_path / "datasets"
-
-
-def digests():
-    return [summary["sha256"] for summary in data.open(ID).summaries()]
 
 
 @pytest.mark.parametrize("key", ["observations", "actions", "rewards", "terminations", "truncations", "contact"])

@@ -13,6 +13,7 @@ from arc_suite.cpg.stride import Stride
 from arc_suite.robots import ROBOTS
 from arc_suite.spec import Body
 from arc_suite.tasks.fitting import fitted_gait
+from arc_suite.tasks.walker import blocks
 
 CONTROL_TIMESTEP = 0.05  # s, of the four robots
 
@@ -97,16 +98,20 @@ class Demonstrator:
 
     def _felt(self, observation):
         """The torso's quaternion, joint angles and joint velocities."""
-        n = self._joints
         if hasattr(observation, "keys"):
             if "posture" in observation:
-                posture, velocities = np.asarray(observation["posture"]), np.asarray(observation["velocities"])
-                return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
+                return felt(observation)
             observation = observation["observations"]
         vector = np.asarray(observation, dtype=float)
         if vector.shape[-1:] != (self._size,):
             raise ValueError(f"observation: expected {self._size} numbers, got shape {vector.shape}")
-        return vector[..., 1:5], vector[..., 5 : 5 + n], vector[..., 11 + n : 11 + 2 * n]
+        return felt(blocks(vector, self._joints))
+
+
+def felt(observation: Mapping) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities."""
+    posture, velocities = np.asarray(observation["posture"]), np.asarray(observation["velocities"])
+    return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
 
 
 def presets_of(body: Body) -> Mapping[str, Preset | float]:
@@ -136,8 +141,9 @@ class Prescribed(NamedTuple):
         """A preset, laid out over a body's joints, in its own gait or another."""
         if gait is not None:
             preset = preset._replace(phase_offsets=gait.offsets, duty_factor=gait.duty_factor)
-        crouch = pattern(body, preset._replace(centre=preset.crouch or preset.centre)).centre
-        return cls(pattern(body, preset), crouch, *(getattr(preset, name) for name in cls._fields[2:]))
+        laid = pattern(body, preset)
+        crouch = pattern(body, preset._replace(centre=preset.crouch)).centre if preset.crouch else laid.centre
+        return cls(laid, crouch, *(getattr(preset, name) for name in cls._fields[2:]))
 
     @classmethod
     def stacked(cls, controls: Sequence[Self]) -> Self:

@@ -13,7 +13,6 @@ import numpy as np
 from arc_suite import policies
 from arc_suite.cpg import Demonstrator
 from arc_suite.data.settings import Settings
-from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walker import blocks, checked_action
 
 
@@ -110,8 +109,6 @@ class Individuals:
     def __init__(self, settings: Settings, rows: int):
         """Takes what tells the policy."""
         self._settings = settings
-        body = settings.body
-        self._robot = body.name if ROBOTS.get(body.name) == body else body
         self._policies, self._seeds, self._clock = [None] * rows, [0] * rows, [0] * rows
 
     def begin(self, row: int, seed: int) -> None:
@@ -120,7 +117,7 @@ class Individuals:
         Raises:
             ValueError: there is no such policy; one line.
         """
-        self._policies[row] = policies.policy(self._settings.policy, self._robot)
+        self._policies[row] = policies.policy(self._settings.policy, self._settings.body)
         self._seeds[row], self._clock[row] = seed, 0
 
     def __call__(self, observations, rewards) -> np.ndarray:

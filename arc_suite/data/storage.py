@@ -4,8 +4,8 @@ No file is written where it is read. Finished episodes go to part files, `data/p
 written beside its place and moved there. `main_data.hdf5`, which Minari opens, is a small file of
 links to the episodes before the first that is missing, and is replaced after each part;
 `metadata.json`, which is there before the first part, follows and tells how many there are. In the
-end the parts are merged into one plain `main_data.hdf5`, whose bytes do not depend on how the
-episodes got there.
+end the parts are merged into one plain `main_data.hdf5`, whose episodes, but not all other bytes, do
+not depend on how they got there.
 
 A new dataset starts in a hidden folder beside its place, and moves there with its first episodes;
 one that replaces another moves when it is complete.

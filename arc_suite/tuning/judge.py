@@ -5,9 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.cpg.demonstrator import Prescribed
+from arc_suite.cpg.demonstrator import Prescribed, felt
 from arc_suite.cpg.presets import Preset
 from arc_suite.spec import Body
+from arc_suite.tasks.walker import blocks
 from arc_suite.vector import VectorEnv
 
 TERMS = ("posture", "smoothness")  # of the reward, unweighted
@@ -57,11 +58,8 @@ class Judge:
         totals, lengths, tipping = np.zeros((3, upright.size))
         style = dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
-            clock, felt = np.full(upright.size, step), observations.astype(float)
-            angles, velocities = felt[:, 5 : 5 + joints], felt[:, 11 + joints : 11 + 2 * joints]
-            observations, rewards, fallen, _, info = self._environment.step(
-                control(clock, felt[:, 1:5], angles, velocities)
-            )
+            actions = control(np.full(upright.size, step), *felt(blocks(observations.astype(float), joints)))
+            observations, rewards, fallen, _, info = self._environment.step(actions)
             totals += rewards * upright
             lengths += upright
             uprightness = _uprightness(observations)

@@ -2,8 +2,8 @@
 
 A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
 generation and the same for all of its candidates, less two penalties: for a style that is worse
-than that of the preset from which the search sets out, in the same episodes, and for tipping over in hard starts, those
-of many that throw this preset about most.
+than that of the preset from which the search sets out, in the same episodes, and for tipping over
+in hard starts, those of many that throw this preset about most.
 """
 
 from typing import NamedTuple
