@@ -7,14 +7,15 @@ import gymnasium
 env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
-from arc_suite import rendering, versions
+from arc_suite import versions
+from arc_suite.simulation import opengl
 
 with versions.explained():
-    rendering.select_backend()  # before anything imports dm_control
+    opengl.select_backend()  # before anything imports dm_control
 
-    from arc_suite import registration, suite
+    from arc_suite import registration, registry
     from arc_suite.registration import register
-    from arc_suite.suite import load
+    from arc_suite.registry import load
 
     registration.register_ids()
 
@@ -23,7 +24,7 @@ __all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load", "register"]
 
 def __getattr__(name):
     if name == "ALL_TASKS":
-        return suite.all_tasks()
+        return registry.all_tasks()
     if name == "TASKS_BY_DOMAIN":
-        return suite.tasks_by_domain()
+        return registry.tasks_by_domain()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

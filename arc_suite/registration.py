@@ -8,11 +8,11 @@ import gymnasium
 
 from arc_suite.cpg.demonstrator import pattern
 from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
+from arc_suite.models.looks import LOOKS
+from arc_suite.models.looks.look import Look
+from arc_suite.registry import all_tasks
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.looks import LOOKS
-from arc_suite.robots.looks.look import Look
-from arc_suite.spec import Body
-from arc_suite.suite import all_tasks
+from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, walk
 
 MAX_EPISODE_STEPS = 1000
@@ -113,8 +113,8 @@ def register_ids() -> None:
         if env_id not in gymnasium.registry:
             gymnasium.register(
                 env_id,
-                entry_point="arc_suite.gym:Env",
-                vector_entry_point="arc_suite.vector:VectorEnv",
+                entry_point="arc_suite.envs.gym:Env",
+                vector_entry_point="arc_suite.envs.vector:VectorEnv",
                 max_episode_steps=MAX_EPISODE_STEPS,
                 kwargs={"domain_name": _importable("domain", domain_name), "task_name": _importable("task", task_name)},
             )

@@ -17,6 +17,11 @@ def installed(package: str) -> str | None:
         return None
 
 
+def recorded() -> dict[str, str | None]:
+    """Return the versions of what results depend on, by package; None for one that is not installed."""
+    return {name: installed(name) for name in ("arc_suite", "mujoco", "dm_control", "numpy")}
+
+
 def problems() -> list[str]:
     """One line with the remedy for every package that is missing or has a version for which the suite was not made."""
     lines = []

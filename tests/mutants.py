@@ -41,7 +41,7 @@ MUTANTS = (
     Mutant(
         "ignored seed",
         "tasks/walk.py",
-        "RandomState(None if random is None else seeding.check(random))",
+        "RandomState(None if random is None else checks.seed(random))",
         "RandomState()",
     ),
     Mutant("wrong number of substeps", "robots/sizing.py", "SUBSTEPS = 25", "SUBSTEPS = 24"),
@@ -96,7 +96,7 @@ MUTANTS = (
         "np.array_equal(track.rewards, episode.rewards)",
         "len(track.rewards) == episode.length",
     ),
-    Mutant("rows share a seed", "vector.py", "seeding.check(first + row)", "seeding.check(first)"),
+    Mutant("rows share a seed", "vector.py", "checks.seed(first + row)", "checks.seed(first)"),
     Mutant(
         "observations of a batch handed out live",
         "vector.py",

@@ -13,10 +13,11 @@ import json
 import os
 
 from absl import flags
+from benchmark import contestants, measurement, report
 from tqdm import tqdm
 
-from arc_suite import commands, names
-from arc_suite.benchmark import contestants, measurement, report
+from arc_suite import checks, files
+from arc_suite.cli import program
 from arc_suite.robots import ROBOTS
 
 FLAGS = flags.FLAGS
@@ -46,10 +47,10 @@ def numbers(flag: str) -> list[int]:
 
 def main():
     """Measures, prints and writes."""
-    robots = [names.check(robot, ROBOTS, "robot") for robot in FLAGS.robots]
+    robots = [checks.name(robot, ROBOTS, "robot") for robot in FLAGS.robots]
     if FLAGS.collect is not None:
         try:
-            from arc_suite.benchmark import collecting
+            from benchmark import collecting
         except ImportError as error:
             raise ValueError(str(error)) from None
         print(collecting.measure(robots, FLAGS.collect, FLAGS.rounds))
@@ -60,7 +61,7 @@ def main():
     document = FLAGS.document and report.document(FLAGS.document)
     for path in (FLAGS.json, FLAGS.plot):
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
-    with commands.writing(FLAGS.json) as json_path, commands.writing(FLAGS.plot) as plot_path:
+    with files.writing(FLAGS.json) as json_path, files.writing(FLAGS.plot) as plot_path:
         progress = functools.partial(tqdm, unit="round")
         results = measurement.measure(robots, rows, threads, workers, FLAGS.rounds, FLAGS.steps, progress)
         json_path.write_text(json.dumps(results, indent=1))
@@ -72,4 +73,4 @@ def main():
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

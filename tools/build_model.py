@@ -12,11 +12,12 @@ import contextlib
 import imageio.v3 as imageio
 from absl import flags
 
-from arc_suite import body_flags, commands, models, spec_files
-from arc_suite.physics import Physics
-from arc_suite.robots import ROBOTS, generator
-from arc_suite.spec import Body
-from arc_suite.summary import summary
+from arc_suite import files, models
+from arc_suite.cli import body_flags, program
+from arc_suite.cli.summary import summary
+from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.robots.spec import Body
+from arc_suite.simulation.physics import Physics
 
 _ROBOT = flags.DEFINE_enum("robot", None, list(ROBOTS), "A robot of the suite.")
 _SEED = flags.DEFINE_integer("seed", None, "A random body, of so many --legs if given.", lower_bound=0)
@@ -65,11 +66,11 @@ def main() -> None:
     body = _body()
     with contextlib.ExitStack() as stack:
         if _OUTPUT.value is not None:
-            stack.enter_context(commands.writing(_OUTPUT.value)).write_text(_text(body))
+            stack.enter_context(files.writing(_OUTPUT.value)).write_text(_text(body))
         elif not _SUMMARY.value and _RENDER.value is None:
             print(_text(body), end="")
         if _RENDER.value is not None:
-            path = stack.enter_context(commands.writing(_RENDER.value))
+            path = stack.enter_context(files.writing(_RENDER.value))
             physics = Physics.from_body(body)
             physics.forward()
             imageio.imwrite(path, physics.render(camera_id="portrait"))
@@ -78,4 +79,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

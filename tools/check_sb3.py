@@ -15,7 +15,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.env_checker import check_env
 
 import arc_suite
-from arc_suite import commands
+from arc_suite.cli import program
 
 _STEPS = flags.DEFINE_integer("steps", 500, "Environment steps of the SAC run.", lower_bound=200)
 _ROBOT = flags.DEFINE_enum("robot", "queen", list(arc_suite.TASKS_BY_DOMAIN), "Who learns in the SAC run.")
@@ -59,4 +59,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

@@ -13,7 +13,8 @@ Examples:
 import numpy as np
 from absl import flags
 
-from arc_suite import body_flags, commands, names, policies
+from arc_suite import checks, policies
+from arc_suite.cli import body_flags, program
 from arc_suite.cpg import PRESETS
 from arc_suite.tasks.walk import HORIZON
 
@@ -46,7 +47,7 @@ def main():
         return 0
     if FLAGS.id is not None and len(bodies) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(bodies)}")
-    presets = tuple(names.check(preset, PRESETS, "preset") for preset in FLAGS.preset)
+    presets = tuple(checks.name(preset, PRESETS, "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
     for body in bodies.values():
         settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
@@ -67,4 +68,4 @@ def main():
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

@@ -12,9 +12,10 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import body_flags, commands, evaluation, policies, seeding
+from arc_suite import checks, evaluation, files, policies, versions
+from arc_suite.cli import body_flags, program
 from arc_suite.robots import ROBOTS
-from arc_suite.spec import Body
+from arc_suite.robots.spec import Body
 
 FLAGS = flags.FLAGS
 _ROBOT = flags.DEFINE_string("robot", "all", f"{', '.join(ROBOTS)}, or all.")
@@ -71,9 +72,9 @@ def over_all(reports: dict) -> dict:
 def main():
     """Prints the table and writes the JSON."""
     bodies = body_flags.bodies(_ROBOT)
-    seeding.check(FLAGS.seed + FLAGS.episodes - 1)
+    checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     walkers = {name: policies.policy(FLAGS.policy, body, FLAGS.preset, FLAGS.seed) for name, body in bodies.items()}
-    with commands.writing_json(FLAGS.json) as file:
+    with files.writing_json(FLAGS.json) as file:
         header = COLUMNS.format(
             "robot", "return", "IQM [95 % interval]", "paper's cpg", "length", "speed", "compliance"
         )
@@ -87,7 +88,7 @@ def main():
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,
             robots=reports,
-            versions=evaluation.versions(),
+            versions=versions.recorded(),
         )
         if len(reports) > 1:
             file["return_over_expert"] = total = over_all(reports)
@@ -99,4 +100,4 @@ def main():
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

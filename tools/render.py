@@ -16,12 +16,13 @@ import numpy as np
 from absl import flags
 from tqdm import tqdm
 
-from arc_suite import body_flags, commands, names, pictures
+from arc_suite import checks, files
+from arc_suite.cli import body_flags, films, program
 from arc_suite.cpg import PRESETS
+from arc_suite.models.builder import CAMERAS
+from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.policies import POLICIES, PRESET_HELP
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.builder import CAMERAS
-from arc_suite.robots.looks.scene import MAX_HEIGHT, MAX_WIDTH
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80}
 _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
@@ -58,38 +59,38 @@ def main():
         (PRESET.value, PRESETS, "preset"),
         (camera, CAMERAS, "camera"),
     ):
-        names.check(value, valid, kind)
+        checks.name(value, valid, kind)
     if not OUTPUT.value:
         raise ValueError("no file to write; say --output=FILE.png, .mp4 or .gif")
-    extension = names.check(Path(OUTPUT.value).suffix.lower(), pictures.WRITERS, "extension")
+    extension = checks.name(Path(OUTPUT.value).suffix.lower(), films.WRITERS, "extension")
     steps = _STEPS[extension] if STEPS.value is None else STEPS.value
     size = (WIDTH.value or _SIZES[extension][0], HEIGHT.value or _SIZES[extension][1])
 
-    with commands.writing(OUTPUT.value) as temporary, contextlib.ExitStack() as stack:
-        takes = [pictures.Take(robot, POLICY.value, PRESET.value, SEED.value, camera, size) for robot in robots]
+    with files.writing(OUTPUT.value) as temporary, contextlib.ExitStack() as stack:
+        takes = [films.Take(robot, POLICY.value, PRESET.value, SEED.value, camera, size) for robot in robots]
         for take in takes:
             stack.callback(take.close)
         takes[0].view()  # finds out at once whether there is OpenGL
         frames = still(takes, steps) if extension == ".png" else film(takes, steps)
-        pictures.WRITERS[extension](temporary, frames)
+        films.WRITERS[extension](temporary, frames)
     for take in takes:
         print(f"{take.robot}: return {take.earned:.1f} in {take.steps} steps")
     print(f"wrote {OUTPUT.value}")
 
 
-def still(takes: list[pictures.Take], steps: int) -> Iterator[np.ndarray]:
+def still(takes: list[films.Take], steps: int) -> Iterator[np.ndarray]:
     """One picture after so many steps: a gait cycle of a lone demonstrator, else a moment."""
     for _ in tqdm(range(steps), "walking", leave=False):
         for take in takes:
             take.step()
     if len(takes) == 1 and POLICY.value == "cpg":
-        views = tqdm(pictures.cycle(takes[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
-        yield pictures.grid(list(views), _CYCLE_COLUMNS)
+        views = tqdm(films.cycle(takes[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
+        yield films.grid(list(views), _CYCLE_COLUMNS)
     else:
         yield panel(takes)
 
 
-def film(takes: list[pictures.Take], steps: int) -> Iterator[np.ndarray]:
+def film(takes: list[films.Take], steps: int) -> Iterator[np.ndarray]:
     """A frame for each control step, until all episodes have ended."""
     for _ in tqdm(range(steps), "rendering", leave=False):
         for take in takes:
@@ -99,12 +100,12 @@ def film(takes: list[pictures.Take], steps: int) -> Iterator[np.ndarray]:
             return
 
 
-def panel(takes: list[pictures.Take]) -> np.ndarray:
+def panel(takes: list[films.Take]) -> np.ndarray:
     """What all cameras see, two side by side, with names where there are several."""
     if len(takes) == 1:
         return takes[0].view()
-    return pictures.grid([pictures.captioned(take.view(), take.robot.capitalize()) for take in takes], 2)
+    return films.grid([films.captioned(take.view(), take.robot.capitalize()) for take in takes], 2)
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

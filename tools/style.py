@@ -18,9 +18,10 @@ import pathlib
 from absl import flags
 from tqdm import tqdm
 
-from arc_suite import body_flags, commands, evaluation, policies, style
+from arc_suite import evaluation, files, policies, style, versions
+from arc_suite.cli import body_flags, program
 from arc_suite.robots import ROBOTS
-from arc_suite.spec import Body
+from arc_suite.robots.spec import Body
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
@@ -109,14 +110,14 @@ def pictures(robots: list[str]):
         yield lambda robot, tracks: None
         return
     try:
-        from arc_suite.style.pictures import PICTURES
+        from arc_suite.style.plots import PICTURES
     except ImportError as error:
         raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
     with contextlib.ExitStack() as stack:
         files = {}
         for robot in robots:
-            folder = commands.folder(pathlib.Path(FLAGS.output, robot if len(robots) > 1 else ""))
-            files[robot] = {name: stack.enter_context(commands.writing(folder / f"{name}.png")) for name in PICTURES}
+            folder = files.folder(pathlib.Path(FLAGS.output, robot if len(robots) > 1 else ""))
+            files[robot] = {name: stack.enter_context(files.writing(folder / f"{name}.png")) for name in PICTURES}
 
         def draw(robot, tracks):
             for name, file in files[robot].items():
@@ -135,7 +136,7 @@ def saving(robots: list[str]):
         raise ValueError(f"--save={FLAGS.save}: expected a file that ends in .npz")
     if len(robots) > 1:
         raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")
-    with commands.writing(FLAGS.save) as file:
+    with files.writing(FLAGS.save) as file:
         yield lambda tracks: style.save(file, tracks)
 
 
@@ -148,7 +149,7 @@ def main():
         robot: {label: source.takes(body, seeds) for label, source in chosen.items()} for robot, body in bodies.items()
     }
     robots = list(bodies)
-    with commands.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
+    with files.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
         reports = {}
         for robot, by_label in takes.items():
             tracks = {}
@@ -159,8 +160,8 @@ def main():
             reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
             print_report(robot, reports[robot])
             draw(robot, {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()})
-        file.update(episodes=FLAGS.episodes, seed=FLAGS.seed, robots=reports, versions=evaluation.versions())
+        file.update(episodes=FLAGS.episodes, seed=FLAGS.seed, robots=reports, versions=versions.recorded())
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

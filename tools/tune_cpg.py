@@ -13,7 +13,8 @@ import pathlib
 from absl import flags
 from tqdm import tqdm
 
-from arc_suite import commands, evaluation, names
+from arc_suite import checks, evaluation, files, versions
+from arc_suite.cli import program
 from arc_suite.cpg.presets import TUNINGS, Preset
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walk import HORIZON
@@ -35,9 +36,7 @@ flags.DEFINE_string("output", "out/tune", "Folder of the journal, the plot and t
 def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     """Searches behind a progress bar, or goes on."""
     settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps", "starts")}
-    with contextlib.closing(
-        Journal(folder / "journal.jsonl", settings | {"versions": evaluation.versions()})
-    ) as journal:
+    with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
         try:
             course = Search(**settings)
         except ImportError as error:
@@ -74,16 +73,16 @@ def violations(figures: dict) -> list[str]:
 
 def main():
     """Searches, judges, prints and writes."""
-    names.check(FLAGS.robot, TUNINGS, "robot")
+    checks.name(FLAGS.robot, TUNINGS, "robot")
     try:
-        from arc_suite.tuning import pictures
+        from arc_suite.tuning import plots
     except ImportError as error:
         raise ValueError(f"the plot needs matplotlib: pip install 'arc_suite[plot]' ({error})") from None
-    folder = commands.folder(FLAGS.output)
-    with commands.writing_json(folder / "result.json") as file, commands.writing(folder / "course.png") as picture:
+    folder = files.folder(FLAGS.output)
+    with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
         course, journal = search(folder)
         preset = course.result()
-        pictures.course(FLAGS.robot, course.reward, journal.generations, HORIZON).savefig(picture)
+        plots.course(FLAGS.robot, course.reward, journal.generations, HORIZON).savefig(picture)
         figures = judge(preset)
         file.update(
             robot=FLAGS.robot,
@@ -92,7 +91,7 @@ def main():
             resets=FLAGS.resets,
             preset=preset,
             figures=figures,
-            versions=evaluation.versions(),
+            versions=versions.recorded(),
         )
     columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
     header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
@@ -106,4 +105,4 @@ def main():
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

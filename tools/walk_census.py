@@ -10,9 +10,12 @@ gets more than one body length and 0.02 sqrt(g h) forward, and drifts sideways l
 import contextlib
 
 import imageio.v3 as imageio
+import numpy as np
 from absl import flags
 
-from arc_suite import census, commands
+from arc_suite import files
+from arc_suite.cli import films, program
+from arc_suite.evaluation import census
 from arc_suite.robots import generator
 
 _FIRST = flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
@@ -26,6 +29,19 @@ _PROCESSES = flags.DEFINE_integer("processes", None, "How many at a time. [defau
 _PICTURE = flags.DEFINE_string("picture", None, "Write a picture of up to twelve failures to this file.")
 
 
+def picture(outcomes: list[census.Outcome]) -> np.ndarray:
+    """How up to twelve bodies ended, each with its seed and what it failed by: (height, width, 3) uint8."""
+    views = []
+    for outcome in outcomes[:12]:
+        environment, _ = census.follow(outcome.trial)
+        caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
+        views.append(films.captioned(environment.physics.render(300, 400, "portrait"), caption))
+        environment.close()
+    columns = min(4, len(views))
+    views += [np.zeros_like(views[0])] * (-len(views) % columns)
+    return films.grid(views, columns)
+
+
 def main() -> None:
     """Runs the census and prints it."""
     trials = [
@@ -33,7 +49,7 @@ def main() -> None:
         for seed in range(_FIRST.value, _FIRST.value + _COUNT.value)
     ]
     with contextlib.ExitStack() as stack:
-        path = _PICTURE.value and stack.enter_context(commands.writing(_PICTURE.value))
+        path = _PICTURE.value and stack.enter_context(files.writing(_PICTURE.value))
         outcomes = list(census.census(trials, _PROCESSES.value))
         print(census.table(outcomes))
         print(census.summary(outcomes))
@@ -43,8 +59,8 @@ def main() -> None:
                 f"seed {outcome.trial.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
             )
         if path:
-            imageio.imwrite(path, census.picture(failed or outcomes))
+            imageio.imwrite(path, picture(failed or outcomes))
 
 
 if __name__ == "__main__":
-    commands.run(main)
+    program.run(main)

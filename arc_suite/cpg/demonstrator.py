@@ -6,12 +6,12 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import gaits, names
+from arc_suite import checks
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.stride import Stride
-from arc_suite.robots import ROBOTS
-from arc_suite.spec import Body
+from arc_suite.robots import ROBOTS, gaits
+from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import fitted_gait
 from arc_suite.tasks.walker import blocks
 
@@ -45,12 +45,12 @@ class Demonstrator:
             ValueError: an unknown name, or a value out of range; one line that names it and the
                 nearest valid one.
         """
-        body = robot if isinstance(robot, Body) else ROBOTS[names.check(robot, ROBOTS, "robot")]
+        body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
         if isinstance(gait, str):
             gait = gaits.gait(body, gait)
         if not isinstance(preset, Preset):
             presets = presets_of(body)
-            preset = presets[names.check(preset, presets, "preset")]
+            preset = presets[checks.name(preset, presets, "preset")]
         if isinstance(preset, float):
             self._control = Stride.fit(body, preset if froude is None else froude, gait or fitted_gait(body))
         elif froude is not None:

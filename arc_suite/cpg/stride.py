@@ -11,10 +11,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite.cpg.law import Pattern, joint_targets, torques
-from arc_suite.gaits import Gait
-from arc_suite.robots.sizing import GRAVITY, control_timestep, natural_frequency, sized
-from arc_suite.robots.stance import stance
-from arc_suite.spec import Body, Leg
+from arc_suite.models.sizing import GRAVITY, control_timestep, natural_frequency, sized
+from arc_suite.models.standing import stance
+from arc_suite.robots.gaits import Gait
+from arc_suite.robots.spec import Body, Leg
 from arc_suite.tasks.fitting import GAIT_FREQUENCY
 
 LIFT = 0.2  # of the standing height: how far a foot is lifted in mid-swing

@@ -10,14 +10,14 @@ from minari import __version__ as minari_version
 from minari.serialization import serialize_space
 from tqdm import tqdm
 
-from arc_suite import evaluation, names, seeding
+from arc_suite import checks, evaluation
 from arc_suite.cpg import PRESETS
 from arc_suite.data import rollouts
 from arc_suite.data.actors import actor
 from arc_suite.data.settings import Settings
 from arc_suite.data.storage import Storage
-from arc_suite.tasks import rewards, walk
-from arc_suite.vector import VectorEnv
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.tasks import terms, walk
 
 ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
 
@@ -84,11 +84,11 @@ def _check(settings: Settings, episodes: int) -> None:
     if settings.policy == "cpg" and not settings.presets:
         raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
     for preset in settings.presets:
-        names.check(preset, PRESETS, "preset")
+        checks.name(preset, PRESETS, "preset")
     if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
         raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
-    seeding.check(settings.seed)
-    seeding.check(settings.seed + episodes - 1)
+    checks.seed(settings.seed)
+    checks.seed(settings.seed + episodes - 1)
     actor(settings, rows=1).begin(0, settings.seed)  # finds out whether there is such a policy
 
 
@@ -167,7 +167,7 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
             f"episode k has seed {settings.seed} + k.",
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
             "ref_min_score": _mean_return(environment, Settings(settings.body, "zero", (), steps=settings.steps)),
-            "ref_max_score": rewards.greatest(weights) * settings.steps,
+            "ref_max_score": terms.greatest(weights) * settings.steps,
             "num_episodes_average_score": evaluation.EPISODES,
             "arc_suite": provenance,
         }

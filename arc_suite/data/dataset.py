@@ -8,10 +8,10 @@ from pathlib import Path
 
 import h5py
 
-from arc_suite import suite
+from arc_suite import registry
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
-from arc_suite.spec import Body
+from arc_suite.robots.spec import Body
 
 METADATA = "metadata.json"
 MAIN = "main_data.hdf5"
@@ -49,11 +49,11 @@ class Dataset:
             domain = specification["kwargs"]["domain_name"]
             self.steps = operator.index(specification["max_episode_steps"])
             self._length = operator.index(self.metadata["total_episodes"])
-        self.body: Body = suite.body_of(domain)
+        self.body: Body = registry.body_of(domain)
 
     def environment(self):
         """The dm_env in which the episodes play: `arc_suite.load(body, "walk")`."""
-        return suite.load(self.body, "walk")
+        return registry.load(self.body, "walk")
 
     def __len__(self) -> int:
         return self._length

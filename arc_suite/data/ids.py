@@ -6,7 +6,7 @@ from pathlib import Path
 from minari.dataset.minari_dataset import parse_dataset_id
 from minari.storage import get_dataset_path
 
-from arc_suite import names
+from arc_suite import checks
 
 _VERSIONED = re.compile(r"-v\d+$")
 
@@ -57,5 +57,5 @@ def find(dataset_id: str) -> Path:
         there = existing()
         if not there:
             raise ValueError(f"unknown dataset {dataset_id!r}: there are none in {get_dataset_path()}")
-        names.check(dataset_id, there, "dataset")
+        checks.name(dataset_id, there, "dataset")
     return folder(dataset_id)

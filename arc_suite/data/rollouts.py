@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.data.episodes import Episode
-from arc_suite.vector import VectorEnv
+from arc_suite.envs.vector import VectorEnv
 
 
 class Step(NamedTuple):

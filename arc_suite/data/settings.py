@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from arc_suite import evaluation, suite
+from arc_suite import registry, versions
 from arc_suite.robots import ROBOTS
-from arc_suite.spec import Body
-from arc_suite.spec_files import body_to_json
+from arc_suite.robots.spec import Body
+from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks.walk import HORIZON
 
 
@@ -59,8 +59,8 @@ class Settings(NamedTuple):
             return spec
         return EnvSpec(
             id=env_id,
-            entry_point="arc_suite.gym:Env",
-            vector_entry_point="arc_suite.vector:VectorEnv",
+            entry_point="arc_suite.envs.gym:Env",
+            vector_entry_point="arc_suite.envs.vector:VectorEnv",
             max_episode_steps=self.steps,
             kwargs={"domain_name": body_to_json(self.body), "task_name": "walk"},
         )
@@ -70,14 +70,14 @@ class Settings(NamedTuple):
         settings = self._asdict() | {"body": self.body.name, "presets": list(self.presets)}
         return {
             "settings": settings,
-            "versions": evaluation.versions(),
+            "versions": versions.recorded(),
             "model_sha256": model_sha256(self.body),
         }
 
 
 def model_sha256(body: Body) -> str:
     """Of the compiled model in which a body walks, as MuJoCo saves it."""
-    model = suite.load(body, "walk").physics.model.ptr
+    model = registry.load(body, "walk").physics.model.ptr
     buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
     return hashlib.sha256(buffer.data).hexdigest()

@@ -25,7 +25,7 @@ import h5py
 from minari.dataset.minari_dataset import parse_dataset_id
 from minari.namespace import create_namespace, list_local_namespaces
 
-from arc_suite import commands
+from arc_suite import files
 from arc_suite.data import episodes, ids
 from arc_suite.data.dataset import MAIN, METADATA, damages, read_metadata
 from arc_suite.data.episodes import Episode
@@ -75,7 +75,7 @@ class Storage:
             shutil.rmtree(old) if place.exists() else old.rename(place)
         folder = new if overwrite or not place.exists() else place
         _make_namespace(dataset_id)
-        commands.folder(folder / "data")
+        files.folder(folder / "data")
         with _locked(folder, dataset_id):
             try:
                 storage = cls(dataset_id, folder, place, early=not overwrite)
@@ -83,7 +83,7 @@ class Storage:
                 if not overwrite:
                     raise
                 shutil.rmtree(folder / "data")  # an overwriting collection that was given up, and damaged since
-                commands.folder(folder / "data")
+                files.folder(folder / "data")
                 storage = cls(dataset_id, folder, place, early=False)
             try:
                 yield storage
@@ -142,7 +142,7 @@ class Storage:
             needed, free = self._size(), shutil.disk_usage(data).free
             if free < needed:
                 raise OSError(f"cannot write {data / MAIN}: no space left on device: {needed} bytes are needed")
-            with commands.writing(data / MAIN) as temporary, _one_line(data / MAIN):
+            with files.writing(data / MAIN) as temporary, _one_line(data / MAIN):
                 with h5py.File(temporary, "w") as merged:
                     order = itertools.groupby(progress(range(count)), key=lambda index: self._where[index][0])
                     for part, indices in order:
@@ -191,7 +191,7 @@ class Storage:
             "dataset_size": round(self._size() / 1e6, 1),  # MB, as Minari counts
         }
         path = self._folder / "data" / METADATA
-        with commands.writing(path) as temporary, _one_line(path):
+        with files.writing(path) as temporary, _one_line(path):
             temporary.write_text(json.dumps(self.metadata | counts, indent=2) + "\n")
             _synchronise(temporary)
         _synchronise(path.parent)
@@ -200,7 +200,7 @@ class Storage:
         """Writes a file that was put together in memory, so that a full disk is Python's error and not HDF5's."""
         file.flush()
         path = self._folder / "data" / name
-        with commands.writing(path) as temporary, _one_line(path):
+        with files.writing(path) as temporary, _one_line(path):
             temporary.write_bytes(file.id.get_file_image())
             _synchronise(temporary)
         _synchronise(path.parent)

@@ -5,15 +5,15 @@ from collections.abc import Callable
 
 from tqdm import tqdm
 
-from arc_suite import evaluation
+from arc_suite import versions
 from arc_suite.data import rollouts
 from arc_suite.data.actors import Script
 from arc_suite.data.collection import ROWS
 from arc_suite.data.dataset import open
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import model_sha256
-from arc_suite.spec import Body
-from arc_suite.vector import VectorEnv
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots.spec import Body
 
 
 def verify(
@@ -43,7 +43,7 @@ def verify(
     if body not in (None, dataset.body):
         raise ValueError(f"dataset {dataset_id!r} holds walks of {dataset.body.name}, and not of {body.name}")
     was = dataset.metadata["arc_suite"]
-    for package, version in evaluation.versions().items():
+    for package, version in versions.recorded().items():
         if was["versions"].get(package) != version:
             there = f"{package} {was['versions'].get(package)}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")

@@ -1,6 +1,6 @@
 """Bastion: a low, armoured hexapod with two-link legs, 0.5 m at the torso."""
 
-from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
+from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import names
-from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, SpecError, Torso, Vector
+from arc_suite import checks
+from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, SpecError, Torso, Vector
 
 LEGS = (4, 12)  # fewest and most
 LINKS = (1, 4)
@@ -239,7 +239,7 @@ def _check_layout(layout: str | None, legs: int) -> str:
         return "radial" if legs % 2 else "pairs"
     if layout == "pairs" and legs % 2:
         raise SpecError(f"layout: expected radial for an odd number of legs, got 'pairs' for {legs}")
-    return names.check(layout, LAYOUTS, "layout")
+    return checks.name(layout, LAYOUTS, "layout")
 
 
 def _body(name: str, legs: int, layout: str, proportions: _Proportions) -> Body:

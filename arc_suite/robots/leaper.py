@@ -1,6 +1,6 @@
 """Leaper: a small, ball-bodied quadruped with three-link legs on rigid shoulders, 0.5 m."""
 
-from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
+from arc_suite.robots.spec import Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",

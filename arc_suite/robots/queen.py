@@ -1,6 +1,6 @@
 """Queen: a tall hexapod with three-link legs under a wide shell, 0.75 m at the torso."""
 
-from arc_suite.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
+from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",

@@ -1,6 +1,6 @@
 """Tick: a small insect with high knees, Queen's kinematics at a quarter of her height, 0.18 m."""
 
-from arc_suite.spec import Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
+from arc_suite.robots.spec import Body, Foot, Joint, Leg, Link, Motor, Simulation, Solid, Torso, TrackingCamera
 
 HIP = Joint(
     name="hip",

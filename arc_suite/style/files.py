@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from arc_suite import evaluation
-from arc_suite.spec_files import body_from_json, body_to_json
+from arc_suite import versions
+from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.style.tracks import Track
-from arc_suite.tasks import rewards
+from arc_suite.tasks import terms
 
 FORMAT = "arc_suite tracks 1"  # another number for every change of what a file holds
 
@@ -28,7 +28,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
     bodies = {track.body for track in tracks}
     if len(bodies) != 1:
         raise ValueError(f"tracks: expected those of one body, got {sorted(body.name for body in bodies)}")
-    arrays = {"format": FORMAT, "body": body_to_json(*bodies), "versions": json.dumps(evaluation.versions())}
+    arrays = {"format": FORMAT, "body": body_to_json(*bodies), "versions": json.dumps(versions.recorded())}
     for index, track in enumerate(tracks):
         fields = track._asdict()
         del fields["body"]
@@ -82,5 +82,5 @@ def _track(body, arrays, index) -> Track:
                 mapping = mapping.setdefault(key, {})
             mapping[path[-1]] = array if array.ndim else array.item()
     low, high = fields["parameters"]["healthy_range"].tolist()
-    fields["parameters"] = rewards.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
+    fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
     return Track(body=body, **fields | {"legs": tuple(fields["legs"].tolist())})

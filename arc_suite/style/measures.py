@@ -8,7 +8,7 @@ import numpy as np
 from arc_suite import evaluation
 from arc_suite.style import metrics
 from arc_suite.style.tracks import Track
-from arc_suite.tasks.rewards import Parameters
+from arc_suite.tasks.terms import Parameters
 
 
 def _stride_frequency(parameters: Parameters) -> float:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import names, policies, seeding, suite
+from arc_suite import checks, policies, registry
 from arc_suite.cpg import PRESETS
-from arc_suite.spec import Body
+from arc_suite.robots.spec import Body
 from arc_suite.style.files import load
 from arc_suite.style.tracks import Track, record
 
@@ -49,13 +49,13 @@ def source(name: str, preset: str = "medium") -> Source:
             rewards are not those recorded.
         OSError: a file cannot be read; one line.
     """
-    names.check(preset, PRESETS, "preset")
+    checks.name(preset, PRESETS, "preset")
     if name.endswith(".npz"):
         return _saved(name)
     if ":" not in name and re.search(r"/|-v\d+$", name):
         return _replayed(name)
     if ":" not in name:
-        names.check(name, policies.POLICIES, "policy")
+        checks.name(name, policies.POLICIES, "policy")
     return _played(name, preset)
 
 
@@ -67,8 +67,8 @@ def _played(name: str, preset: str) -> Source:
             raise ValueError(f"policy {name!r}: episode of seed {seed}: {error}") from None
 
     def takes(body, seeds):
-        seeds = [seeding.check(seed) for seed in seeds]
-        environment, policy = suite.load(body, "walk"), policies.policy(name, body, preset, seeds[0])
+        seeds = [checks.seed(seed) for seed in seeds]
+        environment, policy = registry.load(body, "walk"), policies.policy(name, body, preset, seeds[0])
         return [functools.partial(play, environment, policy, seed) for seed in seeds]
 
     return Source(f"cpg {preset}" if name == "cpg" else name, None, takes)

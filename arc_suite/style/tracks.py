@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 
 from arc_suite import evaluation
-from arc_suite.spec import Body
-from arc_suite.tasks import rewards
+from arc_suite.robots.spec import Body
+from arc_suite.tasks.terms import Parameters, stance_targets, total
 
 
 class Track(NamedTuple):
@@ -58,7 +58,7 @@ class Track(NamedTuple):
     phases: np.ndarray
     terms: Mapping[str, np.ndarray]
     weights: Mapping[str, float]
-    parameters: rewards.Parameters
+    parameters: Parameters
     mass: float
     gravity: float
     legs: tuple[str, ...]
@@ -79,12 +79,12 @@ class Track(NamedTuple):
     @property
     def schedule(self) -> np.ndarray:
         """(steps, feet) which feet the gait wants in stance (the paper's Section 4)."""
-        return rewards.stance_targets(self.phases, self.parameters)
+        return stance_targets(self.phases, self.parameters)
 
     @property
     def rewards(self) -> np.ndarray:
         """(steps,)"""
-        return rewards.total(self.terms, self.weights)
+        return total(self.terms, self.weights)
 
 
 def record(environment, policy, seed: int, max_steps: int | None = None) -> Track:

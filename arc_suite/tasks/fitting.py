@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from arc_suite import gaits
-from arc_suite.robots.sizing import GRAVITY
-from arc_suite.robots.stance import stability_margin, stance
-from arc_suite.spec import Body
+from arc_suite.models.sizing import GRAVITY
+from arc_suite.models.standing import stability_margin, stance
+from arc_suite.robots import gaits
+from arc_suite.robots.spec import Body
 
 TARGET_FROUDE = 0.2  # published robots: 0.18 to 0.27
 BAND = 0.75  # of the target velocity; published: 0.6 to 1

@@ -8,12 +8,12 @@ import numpy as np
 from dm_control import mujoco
 from dm_control.rl import control
 
-from arc_suite import gaits, names, seeding
-from arc_suite.physics import Physics
-from arc_suite.robots import ROBOTS
-from arc_suite.robots.sizing import SUBSTEPS, control_timestep
-from arc_suite.spec import Body
-from arc_suite.tasks import rewards
+from arc_suite import checks
+from arc_suite.models.sizing import SUBSTEPS, control_timestep
+from arc_suite.robots import ROBOTS, gaits
+from arc_suite.robots.spec import Body
+from arc_suite.simulation.physics import Physics
+from arc_suite.tasks import terms
 from arc_suite.tasks.fitting import fitted_settings
 from arc_suite.tasks.readings import layout
 from arc_suite.tasks.walker import Walker
@@ -40,7 +40,7 @@ COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1, "weight
 _TRIPOD = (math.pi, 0.0, math.pi, 0.0, math.pi, 0.0)  # of l1 l2 l3 r1 r2 r3
 _TROT = (0.0, math.pi, math.pi, 0.0)  # of fl fr rl rr
 
-# The numbers of task x robot: units as in `rewards.Parameters` and `Settings`.
+# The numbers of task x robot: units as in `terms.Parameters` and `Settings`.
 SETTINGS = {
     "queen": {
         "target_velocity": 0.5,
@@ -96,7 +96,7 @@ class Settings(NamedTuple):
         joint_noise: the same for joint angles (rad) and joint velocities (rad/s).
     """
 
-    parameters: rewards.Parameters
+    parameters: terms.Parameters
     weights: dict[str, float]
     base_noise: float
     joint_noise: float
@@ -107,7 +107,7 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
 
     Args:
         body: a robot of the table, or any other body, whose numbers are fitted to it.
-        overrides: fields of `rewards.Parameters`, "base_noise", "joint_noise", "weights", a
+        overrides: fields of `terms.Parameters`, "base_noise", "joint_noise", "weights", a
             mapping of the terms to change, and "gait", a name of `gaits.NAMES`, which sets the
             duty factor and the phase offsets that are not set themselves.
 
@@ -120,7 +120,7 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
     row = SETTINGS.get(body.name) if ROBOTS.get(body.name) == body else None
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
     for name in overrides:
-        names.check(name, [*table, "gait"], "setting of walk")
+        checks.name(name, [*table, "gait"], "setting of walk")
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(2.0 * math.pi * offset for offset in gait.offsets)
@@ -129,7 +129,7 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
     if not isinstance(changed, Mapping):
         raise ValueError(f"weights: expected a mapping of names to numbers, got {changed!r}")
     for name, weight in changed.items():
-        weights[names.check(name, WEIGHTS, "weight")] = _number(f"weights[{name!r}]", weight)
+        weights[checks.name(name, WEIGHTS, "weight")] = _number(f"weights[{name!r}]", weight)
     values = table | dict(overrides)
     numbers = {
         name: _number(name, values[name], low, high)
@@ -141,7 +141,7 @@ def settings(body: Body, overrides: Mapping[str, Any]) -> Settings:
             ("stance_threshold", -math.inf, math.inf),
         )
     }
-    parameters = rewards.Parameters(
+    parameters = terms.Parameters(
         **numbers,
         phase_offsets=_array("phase_offsets", values["phase_offsets"], len(body.legs)),
         healthy_range=_healthy_range(values["healthy_range"]),
@@ -220,10 +220,10 @@ class Walk(control.Task):
         self.settings = settings
         self.visualize_reward = False
         if not isinstance(random, np.random.RandomState):
-            random = np.random.RandomState(None if random is None else seeding.check(random))
+            random = np.random.RandomState(None if random is None else checks.seed(random))
         self._random = random
         self.layout = layout(physics.model.ptr, body.joint_names, body.part_names, body.foot_names)
-        self._on_divergence = names.check(on_divergence, ("raise", "terminate"), "on_divergence")
+        self._on_divergence = checks.name(on_divergence, ("raise", "terminate"), "on_divergence")
         self._walker = self.walker(physics)
 
     def walker(self, physics, rows: tuple[int, ...] = ()) -> Walker:
@@ -287,7 +287,7 @@ class Walk(control.Task):
         """The weighted sum of the ten terms, which stay in `terms`."""
         reward = self._walker.reward(physics.data.ptr, None if physics.divergence is None else True)
         if self.visualize_reward:
-            physics.shown_reward = reward / (rewards.greatest(self.settings.weights) or 1.0)
+            physics.shown_reward = reward / (terms.greatest(self.settings.weights) or 1.0)
         return reward
 
     def get_termination(self, physics):
@@ -326,7 +326,7 @@ def walk(
     elif time_limit != math.inf:
         time_limit = _number("time_limit", time_limit, 1e-9)
     for name in environment_kwargs or {}:
-        names.check(name, ["flat_observation"], "environment setting")
+        checks.name(name, ["flat_observation"], "environment setting")
     physics = Physics.from_body(body)
     task = Walk(body, chosen, physics, random, on_divergence)
     # legacy_step would move the contact forces and foot heights one substep on.

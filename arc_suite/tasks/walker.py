@@ -4,7 +4,7 @@ import collections
 
 import numpy as np
 
-from arc_suite.tasks import rewards
+from arc_suite.tasks import terms as rewards
 from arc_suite.tasks.readings import Layout, component, read
 
 

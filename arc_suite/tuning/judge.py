@@ -7,9 +7,9 @@ import numpy as np
 
 from arc_suite.cpg.demonstrator import Prescribed, felt
 from arc_suite.cpg.presets import Preset
-from arc_suite.spec import Body
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots.spec import Body
 from arc_suite.tasks.walker import blocks
-from arc_suite.vector import VectorEnv
 
 TERMS = ("posture", "smoothness")  # of the reward, unweighted
 STYLE = (*TERMS, "tilt")  # costs by which presets may not be worse than another

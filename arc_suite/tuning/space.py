@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.cpg.presets import Bend, ByRank, Preset
-from arc_suite.spec import Body
+from arc_suite.robots.spec import Body
 
 
 class Range(NamedTuple):

@@ -1,0 +1,1 @@
+"""Where creatures walk: the geometry of the ground and its height."""

@@ -1,0 +1,1 @@
+"""The faces of a task: dm_env, Gymnasium, many rows at once."""

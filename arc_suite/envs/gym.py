@@ -1,0 +1,189 @@
+"""The suite as Gymnasium environments: shimmy's adapter, with what Gymnasium's users rely on."""
+
+import weakref
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from shimmy.dm_control_compatibility import DmControlCompatibilityV0
+from shimmy.utils.dm_env import dm_env_step2gym_step
+
+from arc_suite import checks, registry
+from arc_suite.simulation import opengl
+
+_HEADLESS_MODES = ("rgb_array", "depth_array")
+
+
+class Env(DmControlCompatibilityV0):
+    """One task of the suite, made by `gymnasium.make("arc_suite/<robot>-<task>-v0", ...)`.
+
+    Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
+    [-1, 1]. A step's info holds `reward_terms`, the task's unweighted terms by name as plain
+    floats; a reset's info is empty, since nothing has been rewarded yet.
+
+    An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` says
+    otherwise, and terminated when the dm_env's discount is 0, which never happens at the time
+    limit. Longer episodes need both `task_kwargs={"time_limit": seconds}` and `max_episode_steps`.
+
+    `reset(seed=s)` starts the episode of `load(..., task_kwargs={"random": s})`; further resets
+    continue its stream of random numbers, of which `np_random` is a view.
+
+    Pickles and copies carry on bit for bit, without whatever was opened for rendering.
+    """
+
+    # What `gymnasium.make` may ask for; an instance's own metadata has what works here.
+    metadata = {"render_modes": [*_HEADLESS_MODES, "human"], "render_fps": 20}
+
+    _np_random_seed = -1  # Gymnasium's sign for a stream of unknown seed, here until a reset is given one
+
+    def __init__(
+        self,
+        domain_name: str,
+        task_name: str,
+        task_kwargs: Mapping[str, Any] | None = None,
+        visualize_reward: bool = False,
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+        camera_id: int | str = "tracking",
+    ):
+        """Loads the task.
+
+        Args:
+            domain_name: a robot; see `arc_suite.load`.
+            task_name: as in `arc_suite.load`.
+            task_kwargs: likewise.
+            visualize_reward: likewise.
+            render_mode: None, rgb_array, depth_array (m) or, where there is a display, human.
+            width: of a picture, pixels.
+            height: of a picture, pixels.
+            camera_id: a camera's name or index, -1 for a free one.
+
+        Raises:
+            ValueError: an unknown name, or a value that does not fit; one line that names it and the
+                nearest valid name.
+        """
+        modes = [*_HEADLESS_MODES, *(["human"] if opengl.has_display() else [])]
+        if render_mode == "human" and render_mode not in modes:
+            raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
+        if render_mode is not None:
+            checks.name(render_mode, modes, "render_mode")
+        environment = registry.load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
+        environment.physics.check_camera(camera_id)
+        self.metadata = {"render_modes": modes}  # before shimmy writes a rate into the class's
+        super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
+        self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
+        self.render_mode = render_mode
+        size = self.observation_space["observations"].shape
+        self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self.action_space.shape, np.float32)
+        self._window = None
+        self._stepping = False  # between a reset and the end of its episode
+        self._closed = False
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """Draws from the stream that resets draw from."""
+        return np.random.Generator(self._env.task.random._bit_generator)
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator):
+        self._env.task._random = np.random.RandomState(value.bit_generator)
+        self._np_random_seed = -1
+
+    def reset(self, *, seed: int | None = None, options: dict | None = None):
+        """Starts an episode.
+
+        Args:
+            seed: None to continue the stream of random numbers, or an integer to start a new one.
+            options: there are none; ignored.
+
+        Returns:
+            The observation and an empty info.
+
+        Raises:
+            ValueError: not a seed.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("reset")
+        if seed is not None:
+            seed = checks.seed(seed)
+            self._env.task._random = np.random.RandomState(seed)
+        gymnasium.Env.reset(self, seed=seed)
+        observation = self._env.reset().observation
+        self._stepping = True
+        self._show()
+        return _flat(observation), {}
+
+    def step(self, action):
+        """Advances by one control step of 0.05 s.
+
+        Args:
+            action: (motors,), clipped to [-1, 1].
+
+        Returns:
+            Observation, reward, terminated, truncated, and an info with `reward_terms`.
+
+        Raises:
+            ValueError: an action of another shape or with NaN; nothing has changed then.
+            ResetNeeded: before a reset, or after the episode's end.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("step")
+        if not self._stepping:
+            raise ResetNeeded("cannot step: the episode has ended or has not begun; call reset first")
+        timestep = self._env.step(action)
+        observation, reward, terminated, truncated, _ = dm_env_step2gym_step(timestep)
+        self._stepping = not timestep.last()
+        self._show()
+        terms = {name: float(term) for name, term in getattr(self._env.task, "terms", {}).items()}
+        return _flat(observation), float(reward), terminated, truncated, {"reward_terms": terms}
+
+    def render(self):
+        """A picture of the present state in the mode and size chosen at the start.
+
+        Returns:
+            rgb_array: (height, width, 3) uint8. depth_array: (height, width) float32, m. Else None.
+
+        Raises:
+            RenderingUnavailable: no OpenGL here.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("render")
+        return super().render()
+
+    def close(self):
+        """Frees the simulation and what it was rendered with; once more does nothing."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+        self._closed = True
+        super().close()
+
+    def _check_open(self, call: str) -> None:
+        if self._closed:
+            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
+
+    def _show(self) -> None:
+        """In human mode: brings the window up to date, at the pace of the simulated time."""
+        if self.render_mode != "human":
+            return
+        decorated = self._env.physics.decorated()
+        if self._window is None:
+            from arc_suite.envs.window import Window  # GLFW, which only a window needs
+
+            self._window = Window(decorated, **self.render_kwargs)
+            weakref.finalize(self, self._window.close)  # before the interpreter takes GLFW apart
+        self._window.show(self.dt)
+
+    def __getstate__(self):
+        return self.__dict__ | {"_window": None}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+
+
+def _flat(observation) -> np.ndarray:
+    return observation["observations"].astype(np.float32)

@@ -1,0 +1,328 @@
+"""Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
+
+import functools
+import operator
+import os
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from arc_suite import checks, registry
+from arc_suite.simulation.physics import Batch
+
+_AUTORESET_MODES = (AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value)
+_RENDER_MODES = ("rgb_array", "depth_array")
+
+
+def _one_at_a_time(method):
+    """Refuses a call once the environment is closed, and while another thread's call is at work."""
+
+    @functools.wraps(method)
+    def guarded(self, *args, **kwargs):
+        call = method.__name__
+        if self.closed:
+            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
+        if not self._busy.acquire(blocking=False):
+            raise RuntimeError(f"cannot {call}: another thread is using this environment; make one for each thread")
+        try:
+            return method(self, *args, **kwargs)
+        finally:
+            self._busy.release()
+
+    return guarded
+
+
+class VectorEnv(gymnasium.vector.VectorEnv):
+    """Rows of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
+
+    A row seeded s is bit-equal to `arc_suite.gym.Env` seeded s, from step to step and from episode
+    to episode, whatever the number of threads. Spaces, observations and `reward_terms` are that
+    environment's, batched as `SyncVectorEnv` does. Arrays handed out are the caller's own.
+
+    Where a row's physics diverges, the row's episode is terminated with reward 0 and `info` has
+    `diverged`; the other rows notice nothing.
+
+    Attributes:
+        batch: the simulations. Writing their state is for experiments.
+    """
+
+    def __init__(
+        self,
+        domain_name: str,
+        task_name: str,
+        num_envs: int = 1,
+        num_threads: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        task_kwargs: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+        camera_id: int | str = "tracking",
+    ):
+        """Loads the task and allocates the rows.
+
+        Args:
+            domain_name: a robot; see `arc_suite.load`.
+            task_name: as in `arc_suite.load`.
+            num_envs: number of rows.
+            num_threads: on which to simulate; None for as many as this process has cores.
+            autoreset_mode: NextStep or SameStep: whether a row whose episode has ended starts the
+                next one in the step after or at once.
+            max_episode_steps: truncates episodes, as `gymnasium.make` does, beside the task's time limit.
+            task_kwargs: as in `arc_suite.load`; `random=s` seeds row i with s + i, and
+                `on_divergence` can only be "terminate".
+            render_mode: None, rgb_array or depth_array (m).
+            width: of a picture, pixels.
+            height: of a picture, pixels.
+            camera_id: a camera's name or index, -1 for a free one.
+
+        Raises:
+            ValueError: an unknown name, or a value that does not fit; one line that names it and the
+                nearest valid name.
+        """
+        task_kwargs = dict(task_kwargs or {})
+        seed = task_kwargs.pop("random", None)
+        checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
+        mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
+        self._same_step = checks.name(mode, _AUTORESET_MODES, "autoreset_mode") == AutoresetMode.SAME_STEP.value
+        if render_mode is not None:
+            checks.name(render_mode, _RENDER_MODES, "render_mode")
+        self.num_envs = _count("num_envs", num_envs)
+        threads = usable_cores() if num_threads is None else _count("num_threads", num_threads)
+
+        # One ordinary environment lends the rows its settings, its model and its decorated body.
+        environment = registry.load(domain_name, task_name, task_kwargs)
+        self._physics, self._task = environment.physics, environment.task
+        if not hasattr(self._task, "walker"):
+            raise ValueError(f"task {task_name!r} has no batched form; use vectorization_mode 'sync' or 'async'")
+        self._physics.check_camera(camera_id)
+        self._substeps = round(environment.control_timestep() / self._physics.timestep())
+        self._time_limit = environment._step_limit  # control steps; dm_control has no public name for it
+        self._step_limit = np.inf if max_episode_steps is None else _count("max_episode_steps", max_episode_steps)
+
+        self.batch = Batch(self._physics.model.ptr, self.num_envs, threads)
+        self._walker = self._task.walker(self._physics, (self.num_envs,))
+        self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
+        if seed is not None:
+            self._seed(self._seeds(seed), np.ones(self.num_envs, bool))
+        self._steps = np.zeros(self.num_envs, int)  # of the present episodes
+        self._ended = np.zeros(self.num_envs, bool)  # rows that start an episode in the next step
+        self._resting = np.zeros(self.num_envs, bool)
+        self._begun = False
+        self._busy = threading.Lock()
+
+        self.metadata = {
+            "render_modes": list(_RENDER_MODES),
+            "render_fps": round(1.0 / environment.control_timestep()),
+            "autoreset_mode": AutoresetMode(mode),
+        }
+        self.render_mode = render_mode
+        self._picture = {
+            "width": width,
+            "height": height,
+            "camera_id": camera_id,
+            "depth": render_mode == "depth_array",
+        }
+        self._observation = self._walker.observation_vector(self.batch.data, dtype=np.float32)  # the latest
+        size = self._observation.shape[-1]
+        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, environment.action_spec().shape, np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    @_one_at_a_time
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
+        """Starts an episode in every row, or in some.
+
+        Args:
+            seed: s to seed row i with s + i, one seed for each row, or None to continue the rows'
+                streams of random numbers; a row's seed may be None likewise.
+            options: `reset_mask`, (num_envs,) booleans, limits seeding and restart to some rows.
+
+        Returns:
+            Observations (num_envs, size) float32 of all rows, and an empty info.
+
+        Raises:
+            ValueError: a seed or mask that does not fit.
+            ResetNeeded: a mask before every row has been reset once.
+            ClosedEnvironmentError: after `close`.
+        """
+        rows = self._rows((options or {}).get("reset_mask"))
+        if not (self._begun or rows.all()):
+            raise ResetNeeded("cannot reset some rows: reset all of them first")
+        if seed is not None:
+            self._seed(self._seeds(seed), rows)
+        self._begun = True
+        self._begin(rows, self._observation)
+        return self._observation.copy(), {}
+
+    @_one_at_a_time
+    def step(self, actions):
+        """Advances every row by one control step of 0.05 s, but for rows that start an episode instead.
+
+        Args:
+            actions: (num_envs, motors), clipped to [-1, 1]; ignored for a row that starts an episode.
+
+        Returns:
+            Observations (num_envs, size) float32; rewards (num_envs,); terminated and truncated,
+            (num_envs,) booleans; and an info as Gymnasium defines it: `reward_terms`, of rows that
+            diverged also `diverged`, and in the mode SameStep `final_obs` and `final_info` of rows
+            whose episode ended.
+
+        Raises:
+            ValueError: actions of another shape, or NaN in one; nothing has moved then.
+            ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
+        """
+        if not self._begun:
+            raise ResetNeeded("cannot step: no episode has begun; call reset first")
+        data, stepping, restarting = self.batch.data, ~(self._ended | self._resting), self._ended & ~self._resting
+        self._walker.before_step(actions, data)
+        diverged = self.batch.step(self._substeps, stepping)
+        self._walker.after_step(data)
+        self._steps += 1
+
+        reward = np.where(stepping, self._walker.reward(data, diverged if diverged.any() else None), 0.0)
+        observation = self._walker.observation_vector(data, dtype=np.float32)
+        time_is_up = self._steps >= self._time_limit
+        terminated = stepping & (diverged | self._walker.fallen(data)) & ~time_is_up
+        truncated = stepping & (time_is_up | (self._steps >= self._step_limit))
+        self._ended = terminated | truncated
+
+        info = {}
+        if self._same_step and self._ended.any():
+            restarting, stepping = self._ended, stepping & ~self._ended
+            final = {"final_obs": _by_row(observation, restarting), "final_info": self._info(restarting, diverged)}
+            info |= _marked(final, restarting)
+        info |= self._info(stepping, diverged)
+        if restarting.any():
+            self._begin(restarting, observation)
+        self._observation = observation.copy()
+        return observation, reward, terminated, truncated, info
+
+    @_one_at_a_time
+    def rest(self, mask) -> None:
+        """Lets rows, and no others, stand still until they are reset; meanwhile they cost next to nothing.
+
+        Args:
+            mask: (num_envs,) booleans, at least one of them true.
+
+        Raises:
+            ValueError: a mask that does not fit.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._resting = self._rows(mask, "mask")
+
+    @_one_at_a_time
+    def render(self, rows: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
+        """Pictures of the rows' present states, in the mode and size chosen at the start.
+
+        Args:
+            rows: which rows; None for all.
+
+        Returns:
+            A picture for each row. rgb_array: (height, width, 3) uint8. depth_array: (height, width)
+            float32, m. None without a render mode.
+
+        Raises:
+            ValueError: no such row.
+            RenderingUnavailable: no OpenGL here.
+            ClosedEnvironmentError: after `close`.
+        """
+        if self.render_mode is None:
+            return None
+        every = range(self.num_envs)
+        rows = every if rows is None else list(rows)
+        for row in rows:
+            if row not in every:
+                raise ValueError(f"rows: expected integers from 0 to {self.num_envs - 1}, got {row!r}")
+        return tuple(self._render_row(row) for row in rows)
+
+    def close_extras(self) -> None:
+        """Frees the simulations and what they were rendered with."""
+        self._physics.free()
+        del self.batch
+
+    def _render_row(self, row: int) -> np.ndarray:
+        data = self._physics.data.ptr
+        data.qpos[:], data.qvel[:] = self.batch.data.qpos[row], self.batch.data.qvel[row]
+        return self._physics.render(**self._picture)
+
+    def _begin(self, rows: np.ndarray, observation: np.ndarray) -> None:
+        """Starts episodes in some rows, (num_envs,) booleans, and puts their observations among the others."""
+        states = [self._task.initial_state(self._physics, self._randoms[row]) for row in np.flatnonzero(rows)]
+        self.batch.reset(rows, *map(np.stack, zip(*states, strict=True)))
+        self._walker.restart(rows)
+        self._steps[rows] = 0
+        self._ended, self._resting = self._ended & ~rows, self._resting & ~rows
+        observation[rows] = self._walker.observation_vector(self.batch.part(rows), rows)
+
+    def _info(self, rows: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
+        """What the latest step tells of some rows."""
+        info = {}
+        if rows.any():
+            terms = {name: np.where(rows, term, 0.0) for name, term in self._walker.terms.items()}
+            info |= _marked({"reward_terms": _marked(terms, rows)}, rows)
+        diverged = diverged & rows
+        if diverged.any():
+            info |= _marked({"diverged": diverged}, diverged)
+        return info
+
+    def _seeds(self, seed) -> list[int | None]:
+        """A seed for each row."""
+        if np.ndim(seed) == 1:
+            if len(seed) != self.num_envs:
+                raise ValueError(f"seed: expected one for each of {self.num_envs} rows, got {len(seed)}")
+            return [None if row is None else checks.seed(row) for row in seed]
+        first = checks.seed(seed)
+        return [checks.seed(first + row) for row in range(self.num_envs)]
+
+    def _seed(self, seeds: Sequence[int | None], rows: np.ndarray) -> None:
+        """Starts new streams of random numbers in some rows, but for rows whose seed is None."""
+        for row in np.flatnonzero(rows):
+            if seeds[row] is not None:
+                self._randoms[row] = np.random.RandomState(seeds[row])
+
+    def _rows(self, mask, name: str = "reset_mask") -> np.ndarray:
+        """The rows of a mask; all of them for None."""
+        if mask is None:
+            return np.ones(self.num_envs, bool)
+        mask = np.asarray(mask)
+        if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
+            raise ValueError(f"{name}: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
+        return mask.copy()
+
+
+def usable_cores() -> int:
+    """How many cores this process may use, where the system tells; else how many there are."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+def _count(name: str, value: Any) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = 0
+    if number < 1:
+        raise ValueError(f"{name}: expected an integer from 1, got {value!r}")
+    return number
+
+
+def _marked(values: Mapping[str, Any], rows: np.ndarray) -> dict[str, Any]:
+    """Values by name, and by `_name` the rows that have them, as Gymnasium's infos are."""
+    return {key: item for name, value in values.items() for key, item in ((name, value), (f"_{name}", rows.copy()))}
+
+
+def _by_row(observations: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Some rows' observations in an array of objects, with None for the other rows."""
+    objects = np.full(len(observations), None, dtype=object)
+    for row in np.flatnonzero(rows):
+        objects[row] = observations[row].copy()
+    return objects

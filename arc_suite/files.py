@@ -1,0 +1,86 @@
+"""Files that are whole or not there, and folders made where need be."""
+
+import contextlib
+import errno
+import json
+import math
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+
+def folder(path: str | os.PathLike) -> Path:
+    """A folder, made if need be.
+
+    Raises:
+        OSError: it cannot be made; one line that names it.
+    """
+    path = Path(path)
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OSError(f"cannot make folder {path}: {error.strerror.lower()}") from None
+    return path
+
+
+@contextlib.contextmanager
+def writing(path: str | os.PathLike) -> Iterator[Path]:
+    """Writes a file atomically: `with writing("a.png") as temporary: save(temporary)`.
+
+    The temporary file lies beside the target and has its extension; it takes the target's place
+    when the block ends and is deleted if the block raises. Open the block before any long work:
+    what cannot be written is found out at once.
+
+    Args:
+        path: the target; a file that is there is replaced.
+
+    Yields:
+        The path to write to.
+
+    Raises:
+        OSError: the target cannot be written; one line that names it.
+    """
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{target.stem[:32]}.{os.getpid()}{target.suffix}")
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        temporary.touch()
+    except OSError as error:
+        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+    try:
+        yield temporary
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
+    """Writes a file of JSON as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
+
+    Args:
+        path: the target; with None nothing is written.
+
+    Yields:
+        A dictionary to fill. NaN and infinities in it become null, as JSON has none.
+
+    Raises:
+        OSError: the target cannot be written; one line that names it.
+    """
+    report = {}
+    with contextlib.nullcontext() if path is None else writing(path) as temporary:
+        yield report
+        if temporary:
+            temporary.write_text(json.dumps(_plain(report), indent=2, allow_nan=False) + "\n")
+
+
+def _plain(value):
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        fields = getattr(value, "_asdict", None)  # of a NamedTuple
+        return _plain(fields()) if fields else [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,148 @@
+"""Turns a `Body` into one PyMJCF root element: the dynamics, and nothing that is only for show."""
+
+import math
+
+import numpy as np
+from dm_control import mjcf
+
+from arc_suite.models.outline import outline
+from arc_suite.robots.spec import Body, Joint, Leg, Simulation, Solid
+
+SOLVER_ITERATIONS = 200
+
+_TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
+
+# Cameras that ride along: azimuth from straight ahead and elevation, rad.
+_VIEWS = (("portrait", math.radians(-35.0), math.radians(13.0)), ("profile", math.radians(-65.0), math.radians(12.0)))
+CAMERAS = ("tracking", *(name for name, *_ in _VIEWS))
+_FOVY = 30.0  # degrees, as MJCF wants it whatever the compiler's angle
+_ASPECT, _MARGIN = 4.0 / 3.0, 1.3  # of the picture; room for legs that swing
+
+
+def build(body: Body) -> mjcf.RootElement:
+    """Assembles the body in an empty world: no floor, no decorations.
+
+    Every element is named: bodies, geoms and sites after the part, joints and motors
+    `<leg>_<joint>`. The legs are written into the one root, since PyMJCF's `attach` would add a
+    body for each and so change the observation.
+
+    Args:
+        body: the spec, with nothing left to be sized.
+
+    Returns:
+        The model, in radians, with the torso as a free body at its standing height.
+    """
+    # Robot geoms meet only the floor (conaffinity 1), never one another.
+    touches_floor = {"contype": 1, "conaffinity": 0, "density": body.density, **contact(body.simulation)}
+    root = mjcf.RootElement(model=body.name)
+    root.compiler.angle = "radian"
+    root.option.timestep = body.simulation.timestep
+    root.option.integrator = "implicitfast"
+    root.option.solver = "Newton"
+    root.option.iterations = SOLVER_ITERATIONS
+    root.option.flag.filterparent = "enable"
+    root.option.flag.island = "disable"  # a single creature is one island: finding it only costs time
+
+    torso = root.worldbody.add("body", name="torso", pos=(0.0, 0.0, body.torso.standing_height))
+    torso.add("freejoint", name="root")
+    for solid in body.torso.solids:
+        _add_solid(torso, solid, **touches_floor)
+    for ballast in body.ballast:
+        _add_solid(torso, ballast, mass=ballast.mass, **_TOUCHES_NOTHING)
+    for leg in body.legs:
+        _add_leg(root, torso, leg, touches_floor, body.simulation)
+    _add_cameras(torso, body)
+
+    # The accelerometer is what makes every mj_step fill cfrc_ext, which the task observes: MuJoCo
+    # computes contact forces on bodies only where a sensor needs them.
+    site = torso.add("site", name="torso", size=(0.01,), group=4)
+    root.sensor.add("accelerometer", name="torso_acceleration", site=site)
+    return root
+
+
+def contact(simulation: Simulation) -> dict:
+    """How floor and robot touch, as attributes of a geom; what has no dimension is the same for all."""
+    return {
+        "condim": 3,
+        "friction": (1.0, 0.5, 0.5),
+        "margin": simulation.contact_margin,
+        "solref": (simulation.contact_time, 1.0),
+        "solimp": (0.9, 0.95, simulation.contact_width, 0.5, 2.0),
+    }
+
+
+def _add_solid(torso, solid: Solid, **attributes) -> None:
+    torso.add(
+        "geom",
+        name=solid.name,
+        type=solid.shape,
+        size=solid.size,
+        pos=solid.position,
+        euler=[math.radians(angle) for angle in solid.euler_deg],
+        **attributes,
+    )
+
+
+def _add_leg(root, torso, leg: Leg, geom, simulation: Simulation) -> None:
+    parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
+    for link in leg.links:
+        name = leg.full_name(link)
+        parent = parent.add("body", name=name, pos=pos, euler=(0.0, 0.0, yaw))
+        if link.joint:
+            _add_joint(root, parent, leg, link.joint, simulation)
+        parent.add("geom", name=name, type="capsule", fromto=(0.0, 0.0, 0.0, *link.end), size=(link.radius,), **geom)
+        pos, yaw = link.end, 0.0
+    name = leg.full_name(leg.foot)
+    foot = parent.add("body", name=name, pos=pos)
+    foot.add("geom", name=name, type="sphere", size=(leg.foot.radius,), **geom)
+    foot.add("site", name=name, size=(leg.foot.radius,), group=4)
+
+
+def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> None:
+    element = link.add(
+        "joint",
+        name=leg.full_name(joint),
+        type="hinge",
+        axis=joint.axis,
+        limited=True,
+        range=[math.radians(angle) for angle in joint.range_deg],
+        armature=joint.armature,
+        damping=joint.damping,
+        solreflimit=(simulation.contact_time, 1.0),
+    )
+    root.actuator.add(
+        "motor",
+        name=leg.full_name(joint),
+        joint=element,
+        gear=(joint.motor.gear,),
+        ctrllimited=True,
+        ctrlrange=(-1.0, 1.0),
+    )
+
+
+def _add_cameras(torso, body: Body) -> None:
+    """Adds `tracking`, the side view of the spec, and two that the body fills: `portrait` and `profile`."""
+    camera = body.camera
+    torso.add("camera", name="tracking", mode="trackcom", pos=camera.position, xyaxes=camera.xyaxes)
+    for name, azimuth, elevation in _VIEWS:
+        torso.add("camera", name=name, mode="trackcom", fovy=_FOVY, **_framing(body, azimuth, elevation))
+
+
+def _framing(body: Body, azimuth: float, elevation: float) -> dict:
+    """The nearest place from which a camera that looks in a direction sees the whole standing body.
+
+    With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
+    the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and
+    likewise for v: each side of the picture is a plane that touches the hull of the outline.
+    """
+    back = np.array(
+        (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))
+    )
+    right = np.array((-math.sin(azimuth), math.cos(azimuth), 0.0))
+    axes = np.stack((right, np.cross(back, right), back))
+    points = outline(body) @ axes.T
+    half_field = math.tan(math.radians(_FOVY / 2.0)) / _MARGIN * np.array((_ASPECT, 1.0))
+    depth = half_field * points[:, 2:]
+    high, low = (points[:, :2] + depth).max(axis=0), (points[:, :2] - depth).min(axis=0)
+    place = (*((high + low) / 2.0), ((high - low) / (2.0 * half_field)).max())
+    return {"pos": tuple(place @ axes), "xyaxes": tuple(axes[:2].ravel())}

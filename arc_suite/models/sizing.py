@@ -1,0 +1,111 @@
+"""Sizes what a body leaves open: motors, armature, damping, constants of the simulation, camera.
+
+Everything follows from the standing pose by rules without dimension, so that bodies of one shape
+and different size are dynamically similar: lengths scale with the height h, times with
+sqrt(h / g), and a mite and a giant walk alike.
+"""
+
+import functools
+import math
+
+from arc_suite.models.standing import Stance, stance
+from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
+
+GRAVITY = 9.81  # m/s^2
+SUBSTEPS = 25  # of a control step
+
+# A body of this height has MuJoCo's own constants; others are scaled from it.
+_REFERENCE_HEIGHT = 0.3  # m
+
+# Motors hold ten times their share of the standing body: few legs carry it at times, and only what
+# is left moves it. A joint without load still gets a quarter of its leg's strongest motor, to swing
+# the leg, and a leg in which no joint carries is sized as if its share pulled at a short lever.
+_STRENGTH = 10.0
+_LEAST_SHARE = 0.25
+_LEAST_LEVER = 0.1  # of the standing height
+
+# Position control closes its loop every control step T: its natural frequency w is a fixed share
+# of 1 / T, below which a critically damped loop on sampled states settles without ringing.
+_STIFFNESS = 0.5  # w T
+
+# An error of this angle calls for a motor's whole torque. It fixes the inertia to be moved, and so
+# the armature: (I + armature) w^2 = torque / angle.
+_FULL_TORQUE_ERROR = 0.35  # rad
+
+# Armature is never less than this share of the link's own inertia.
+_LEAST_ARMATURE = 0.3
+
+
+def control_timestep(body: Body) -> float:
+    """Seconds between two actions."""
+    return SUBSTEPS * simulation(body).timestep
+
+
+def simulation(body: Body) -> Simulation:
+    """The body's constants, or those of its size: times scale with sqrt(h), lengths with h."""
+    if body.simulation:
+        return body.simulation
+    scale = body.torso.standing_height / _REFERENCE_HEIGHT
+    default = Simulation()
+    return Simulation(
+        timestep=default.timestep * math.sqrt(scale),
+        contact_time=default.contact_time * math.sqrt(scale),
+        contact_width=default.contact_width * scale,
+        contact_margin=default.contact_margin * scale,
+    )
+
+
+def natural_frequency(body: Body) -> float:
+    """Of the position control of the body's joints, rad/s."""
+    return _STIFFNESS / control_timestep(body)
+
+
+@functools.lru_cache(maxsize=256)
+def sized(body: Body) -> Body:
+    """The body with everything filled in that it leaves open; a body that leaves nothing open is returned as it is.
+
+    Args:
+        body: the spec.
+
+    Returns:
+        A body without None among armatures, dampings, motors, simulation and camera.
+    """
+    complete = all(None not in (j.armature, j.damping, j.motor) for leg in body.legs for j in leg.joints)
+    if complete and body.simulation and body.camera:
+        return body
+    standing = stance(body)
+    frequency = natural_frequency(body)
+    least_load = _LEAST_LEVER * standing.height * standing.mass * GRAVITY / len(body.legs)
+    legs, first = [], 0
+    for leg in body.legs:
+        last = first + len(leg.joints)
+        legs.append(_sized_leg(leg, standing.inertias[first:last], standing.loads[first:last], least_load, frequency))
+        first = last
+    return body.replace(
+        legs=tuple(legs),
+        simulation=simulation(body),
+        camera=body.camera or _camera(standing),
+    )
+
+
+def _sized_leg(leg: Leg, inertias, loads, least_load: float, frequency: float) -> Leg:
+    torques = _STRENGTH * loads.clip(min=_LEAST_SHARE * max(*loads, least_load))
+    sized_joints = iter(
+        _sized_joint(joint, float(inertia), float(torque), frequency)
+        for joint, inertia, torque in zip(leg.joints, inertias, torques, strict=True)
+    )
+    return leg.replace(links=tuple(link.joint and link.replace(joint=next(sized_joints)) or link for link in leg.links))
+
+
+def _sized_joint(joint: Joint, inertia: float, torque: float, frequency: float) -> Joint:
+    motor = joint.motor or Motor(gear=torque)
+    wanted = motor.gear / (_FULL_TORQUE_ERROR * frequency**2)
+    armature = max(_LEAST_ARMATURE * inertia, wanted - inertia) if joint.armature is None else joint.armature
+    # The control damps the joint; a little friction of its own calms one that nobody controls.
+    damping = 0.1 * frequency * (inertia + armature) if joint.damping is None else joint.damping
+    return joint.replace(motor=motor, armature=armature, damping=damping)
+
+
+def _camera(standing: Stance) -> TrackingCamera:
+    size = max(abs(standing.soles[:, :2]).max(), standing.height)
+    return TrackingCamera(position=(0.0, -4.0 * float(size), 1.6 * float(size)))

@@ -1,0 +1,116 @@
+"""How a body stands with all joints at zero: what its proportions, motors and gait are derived from."""
+
+import functools
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from arc_suite.models import builder
+from arc_suite.robots.spec import Body, Joint, Motor, Simulation, TrackingCamera
+
+
+class Stance(NamedTuple):
+    """Mechanics of the standing pose, in the torso's frame and SI units; joints are the actuated ones.
+
+    Attributes:
+        height: of the torso's origin above the floor.
+        mass: of the whole body.
+        centre: (3,) of mass.
+        soles: (legs, 3) the lowest points of the feet.
+        jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
+        inertias: (joints,) diagonal of the mass matrix without armature.
+        loads: (joints,) torques, unsigned, that hold the pose while all feet carry.
+        margin: static stability: distance of the centre of mass, on the floor, from the nearest
+            edge of the polygon of the soles; negative outside.
+    """
+
+    height: float
+    mass: float
+    centre: np.ndarray
+    soles: np.ndarray
+    jacobians: tuple[np.ndarray, ...]
+    inertias: np.ndarray
+    loads: np.ndarray
+    margin: float
+
+
+@functools.lru_cache(maxsize=256)
+def stance(body: Body) -> Stance:
+    """Compiles the body and measures its stance; armature, damping, motors and constants play no part."""
+    model = mujoco.MjModel.from_xml_string(builder.build(_unpowered(body)).to_xml_string())
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    origin = data.xpos[1]
+    soles, jacobians = [], []
+    for leg, name in zip(body.legs, body.foot_names, strict=True):
+        sole = data.body(name).xpos - (0.0, 0.0, leg.foot.radius)
+        jacobian = np.empty((3, model.nv))
+        mujoco.mj_jac(model, data, jacobian, None, sole, model.body(name).id)
+        start = model.joint(leg.full_name(leg.joints[0])).dofadr[0]
+        soles.append(sole - origin)
+        jacobians.append(jacobian[:, start : start + len(leg.joints)])
+    soles = np.array(soles)
+    centre = data.subtree_com[1] - origin
+    mass = float(model.body_mass.sum())
+    matrix = np.empty((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, matrix)
+    loads = _foot_loads(mass * -model.opt.gravity[2], soles[:, :2] - centre[:2])
+    held = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
+    return Stance(
+        height=body.torso.standing_height,
+        mass=mass,
+        centre=centre,
+        soles=soles,
+        jacobians=tuple(jacobians),
+        inertias=np.diag(matrix)[6:].copy(),
+        loads=abs(data.qfrc_bias[6:] - held),
+        margin=stability_margin(centre, soles),
+    )
+
+
+def _unpowered(body: Body) -> Body:
+    """The body with everything that is left to be sized set to what does not matter to its stance."""
+
+    def plain(joint: Joint | None) -> Joint | None:
+        return joint and joint.replace(armature=0.0, damping=0.0, motor=Motor(gear=1.0))
+
+    legs = tuple(
+        leg.replace(links=tuple(link.replace(joint=plain(link.joint)) for link in leg.links)) for leg in body.legs
+    )
+    return body.replace(legs=legs, simulation=Simulation(), camera=TrackingCamera(position=(0.0, -1.0, 0.0)))
+
+
+def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
+    """Vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the centre of mass.
+
+    The least-norm solution of the balance of force and moments; no foot is taken to carry less
+    than a quarter of its equal share, since in walking every foot has its turn.
+    """
+    balance = np.stack([np.ones(len(soles)), *soles.T])
+    forces = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
+    return forces.clip(min=0.25 * weight / len(soles))
+
+
+def stability_margin(centre, soles) -> float:
+    """Signed distance, seen from above, of a point from the edge of the convex hull of others, > 0 inside.
+
+    Args:
+        centre: (2,) or more, the point.
+        soles: (n, 2) or more.
+
+    Returns:
+        Inside, the distance to the nearest edge; outside, minus one no larger than that to the hull;
+        -inf if there are no others.
+    """
+    points = np.asarray(soles)[:, :2] - np.asarray(centre)[:2]
+    # It is the least, over all directions, of how far the hull reaches beyond the point. That
+    # direction is normal to an edge, and so to a line through two points.
+    first, second = np.triu_indices(len(points), k=1)
+    along = points[second] - points[first]
+    length = np.hypot(*along.T)
+    along = along[length > 1e-12] / length[length > 1e-12, None]
+    normals = np.concatenate([along @ [[0.0, 1.0], [-1.0, 0.0]], along @ [[0.0, -1.0], [1.0, 0.0]]])
+    if not len(normals):
+        return -float(np.hypot(*points.T).min(initial=np.inf)) if len(points) else -np.inf
+    return float((points @ normals.T).max(axis=0).min())

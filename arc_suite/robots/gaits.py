@@ -1,0 +1,98 @@
+"""Gaits as data: when each leg stands and when it swings.
+
+A gait is a duty factor, the share of a cycle that a foot spends on the ground, and a phase offset
+for each leg. A leg of offset p stands while (t + p) mod 1 < duty factor, t being cycles.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from arc_suite import checks
+from arc_suite.robots.spec import Body
+
+
+class Gait(NamedTuple):
+    """When legs stand.
+
+    Attributes:
+        duty_factor: share of a cycle in stance.
+        offsets: of the legs, cycles in [0, 1).
+    """
+
+    duty_factor: float
+    offsets: tuple[float, ...]
+
+
+def metachronal(body: Body, duty_factor: float) -> Gait:
+    """The one rule behind most gaits of animals: waves of swinging legs from the rear to the front.
+
+    On each side a leg takes off when the one behind it touches down, 1 - duty factor of a cycle
+    later; the two sides are half a cycle apart (Wilson, "Insect walking", 1966). Six legs make a
+    tripod gait at 1/2, a tetrapod at 2/3, a ripple at 3/4 and a wave at 5/6.
+    """
+    offsets = []
+    for leg, rank in zip(body.legs, body.ranks, strict=True):
+        from_rear = max(r for other, r in zip(body.legs, body.ranks, strict=True) if other.side == leg.side) - rank
+        offsets.append((0.5 * (leg.side == "right") - from_rear * (1.0 - duty_factor)) % 1.0)
+    return Gait(duty_factor, tuple(offsets))
+
+
+def _alternating(body: Body, duty_factor: float) -> Gait:
+    """Every leg half a cycle from its neighbours, in front, behind and across."""
+    return _of_groups(body, duty_factor, lambda rank, right: 0.5 * ((rank + right) % 2))
+
+
+def _of_groups(body: Body, duty_factor: float, offset: Callable[[int, bool], float]) -> Gait:
+    pairs = zip(body.legs, body.ranks, strict=True)
+    return Gait(duty_factor, tuple(offset(rank, leg.side == "right") for leg, rank in pairs))
+
+
+def _wave(body: Body) -> Gait:
+    longest = max(body.ranks) + 1
+    return metachronal(body, 1.0 - 0.5 / longest)
+
+
+class _Named(NamedTuple):
+    fits: Callable[[int, bool], bool]  # number of legs, whether both sides have as many
+    make: Callable[[Body], Gait]
+
+
+# By name. Duty factors are the classical ones, a little above where the legs of two groups would
+# swap at the same instant.
+_GAITS = {
+    "trot": _Named(lambda legs, even: even and legs == 4, lambda body: _alternating(body, 0.6)),
+    "pace": _Named(
+        lambda legs, even: even and legs == 4, lambda body: _of_groups(body, 0.6, lambda rank, right: 0.5 * right)
+    ),
+    "bound": _Named(
+        lambda legs, even: even and legs == 4, lambda body: _of_groups(body, 0.6, lambda rank, right: 0.5 * (rank % 2))
+    ),
+    "walk": _Named(lambda legs, even: even and legs == 4, lambda body: metachronal(body, 0.75)),
+    "tripod": _Named(lambda legs, even: even and legs >= 6, lambda body: _alternating(body, 0.6)),
+    "tetrapod": _Named(lambda legs, even: legs >= 6, lambda body: metachronal(body, 2.0 / 3.0)),
+    "ripple": _Named(lambda legs, even: legs >= 5, lambda body: metachronal(body, 0.75)),
+    "wave": _Named(lambda legs, even: True, _wave),
+}
+
+NAMES = tuple(_GAITS)
+
+
+def fitting(body: Body) -> tuple[str, ...]:
+    """Names of the gaits that a body has the legs for."""
+    sides = [leg.side for leg in body.legs]
+    even = sides.count("left") == sides.count("right")
+    return tuple(name for name, gait in _GAITS.items() if gait.fits(len(sides), even))
+
+
+def gait(body: Body, name: str) -> Gait:
+    """A gait by name.
+
+    Raises:
+        ValueError: no such gait, or none for these legs; one line that lists those that fit.
+    """
+    checks.name(name, NAMES, "gait")
+    if name not in fitting(body):
+        raise ValueError(
+            f"gait {name!r} does not fit {body.name} with its {len(body.legs)} legs (fit: {', '.join(fitting(body))})"
+        )
+    return _GAITS[name].make(body)

@@ -1,0 +1,131 @@
+"""Bodies as JSON: the fields of `arc_suite.spec` by name, tuples as lists, defaults left out.
+
+A file holds one object, the fields of a `Body`; wherever a field is a spec, its object stands
+there. Nothing else can be said in it: no includes, no paths, no markup.
+"""
+
+import dataclasses
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+
+from arc_suite import checks
+from arc_suite.robots.spec import Body, SpecError
+
+MAX_BYTES = 1 << 18  # of a file; a body of 64 legs with 16 links each has fewer
+
+_NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
+
+
+def load_body(path: str | os.PathLike) -> Body:
+    """Reads a body.
+
+    Raises:
+        SpecError: not JSON, or no body; one line that names the file and the field by its path
+            from the top, `legs[2].links[0].radius`.
+        OSError: the file cannot be read; one line that names it.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from None
+    try:
+        if len(data) > MAX_BYTES:
+            raise SpecError(f"expected at most {MAX_BYTES} bytes")
+        return body_from_json(data)
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from None
+
+
+def save_body(body: Body, path: str | os.PathLike) -> None:
+    """Writes a body, as it is: what it leaves open stays open.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    Path(path).write_text(body_to_json(body))
+
+
+def body_to_json(body: Body) -> str:
+    """The text of a file, ending in a newline; equal bodies give equal texts."""
+    text = json.dumps(_plain(body), indent=2, allow_nan=False)
+    return _NUMBERS.sub(lambda match: f"[{' '.join(match[1].split())}]", text) + "\n"
+
+
+def body_from_json(text: str | bytes) -> Body:
+    """The body that a text describes.
+
+    Raises:
+        SpecError: one line that names the field.
+    """
+    try:
+        # Integers of any length become floats, which the field's range then refuses.
+        value = json.loads(text, object_pairs_hook=_object, parse_int=_integer)
+    except SpecError:
+        raise
+    except RecursionError:
+        raise SpecError("expected a body in JSON, got too many brackets within brackets") from None
+    except ValueError as error:
+        raise SpecError(f"expected a body in JSON: {error}") from None
+    return _spec(Body, value, "")
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        seen = set()
+        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        raise SpecError(f"the key {twice[:40]!r} occurs twice in one object")
+    return result
+
+
+def _integer(digits: str) -> int | float:
+    return int(digits) if len(digits) < 20 else float(digits)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if dataclasses.is_dataclass(value):
+        fields = {field.name: (getattr(value, field.name), field.default) for field in dataclasses.fields(value)}
+        return {name: _plain(item) for name, (item, default) in fields.items() if item != default}
+    return value
+
+
+def _spec(kind: type, value: Any, path: str) -> Any:
+    """The spec of a kind that an object describes; `path` leads to it from the top."""
+    if not isinstance(value, dict):
+        raise SpecError(f"expected an object with the fields of a {kind.__name__}, got {_shown(value)}", None, path)
+    fields = {field.name: field for field in dataclasses.fields(kind)}
+    for name in value:
+        try:
+            checks.name(name[:40], fields, "field")
+        except ValueError as error:
+            raise SpecError(str(error), None, path) from None
+    for field in fields.values():
+        if field.default is dataclasses.MISSING and field.name not in value:
+            raise SpecError(f"missing; a {kind.__name__} needs it", field.name, path)
+    arguments = {name: _field(fields[name], item, f"{path}.{name}".lstrip(".")) for name, item in value.items()}
+    try:
+        return kind(**arguments)
+    except SpecError as error:
+        raise SpecError(error.reason, error.field, path) from None
+
+
+def _field(field: dataclasses.Field, value: Any, path: str) -> Any:
+    kind = field.metadata.get("kind")
+    if kind is None or (value is None and field.default is None):
+        return value
+    if not field.metadata["many"]:
+        return _spec(kind, value, path)
+    if not isinstance(value, list):
+        raise SpecError(f"expected a list of {kind.__name__}s, got {_shown(value)}", None, path)
+    return [_spec(kind, item, f"{path}[{i}]") for i, item in enumerate(value)]
+
+
+def _shown(value: Any) -> str:
+    plain = {dict: "an object", list: "a list", type(None): "null", bool: "true or false", str: "a string"}
+    return plain.get(type(value), "a number")

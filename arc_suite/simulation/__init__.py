@@ -1,0 +1,1 @@
+"""MuJoCo runs: one, a batch, and pictures of them."""

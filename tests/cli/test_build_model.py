@@ -1,0 +1,150 @@
+"""tools/build_model.py and the bodies it makes to order."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from dm_control import mjcf
+
+from arc_suite import models
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec_files import load_body
+from arc_suite.simulation.physics import Physics
+
+ROOT = Path(__file__).parents[2]
+TOOL = ROOT / "tools" / "build_model.py"
+EXAMPLES = ROOT / "examples"
+SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
+
+
+def build_model(*arguments):
+    return subprocess.run([sys.executable, TOOL, *map(str, arguments)], capture_output=True, text=True)
+
+
+def saved(model):
+    """Everything there is in a compiled model, names included, as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def compiled(body, decorated=False):
+    return mjcf.Physics.from_mjcf_model(models.assemble(body, decorated)).model.ptr
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
+    path = tmp_path / "robot.xml"
+    done = build_model("--robot", robot, "--output", path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    reloaded = mujoco.MjModel.from_xml_path(str(path))
+    assert saved(reloaded) == saved(compiled(ROBOTS[robot]))
+    assert saved(reloaded) == saved(Physics.from_body(ROBOTS[robot]).model.ptr)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["robot.xml"]
+
+
+def test_looks_dump_and_reload_bit_for_bit():
+    done = build_model("--robot", "queen", "--looks")
+    assert (done.returncode, done.stderr) == (0, "")
+    reloaded = mujoco.MjModel.from_xml_string(done.stdout)
+    assert saved(reloaded) == saved(compiled(ROBOTS["queen"], decorated=True))
+    assert saved(reloaded) != saved(compiled(ROBOTS["queen"]))
+
+
+def test_bit_equality_would_notice_one_bit():
+    model = compiled(ROBOTS["tick"])
+    before = saved(model)
+    model.dof_damping[7] = np.nextafter(model.dof_damping[7], 2.0)
+    assert saved(model) != before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "body"),
+    [
+        (["--legs=6", "--links=3"], generator.generate(6, 3)),
+        (["--legs=5", "--links=2"], generator.generate(5, 2)),
+        (["--legs=6", "--layout=radial", "--scale=2.5"], generator.scaled(generator.generate(6, 3, "radial"), 2.5)),
+        (["--seed=11"], generator.random_body(11)),
+        (["--seed=11", "--legs=4", "--links=1"], generator.random_body(11, 4, 1)),
+        (["--spec", EXAMPLES / "spider.json"], load_body(EXAMPLES / "spider.json")),
+    ],
+)
+def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):
+    done = build_model(*arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert saved(mujoco.MjModel.from_xml_string(done.stdout)) == saved(compiled(body))
+
+
+def test_json_is_the_spec_and_builds_the_same_model(tmp_path):
+    path = tmp_path / "body.json"
+    done = build_model("--seed=5", "--json", "--output", path)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert load_body(path) == generator.random_body(5)
+    assert build_model("--spec", path).stdout == build_model("--seed=5").stdout
+    assert build_model("--spec", path, "--json").stdout == path.read_text()
+
+
+def test_summary_prints_the_figures_alone():
+    lines = build_model("--robot=queen", "--summary").stdout.splitlines()
+    figures = dict(line.split("  ", 1) for line in lines)
+    assert {name: value.strip() for name, value in figures.items()} == {
+        "name": "queen",
+        "legs": "6",
+        "links": "3 actuated a leg",
+        "degrees of freedom": "18 + 6",
+        "mass": "12.09 kg",
+        "standing height": "0.75 m",
+        "observation": "199 numbers",
+        "stability margin": "0.67 m (0.89 of the height)",
+        "control step": "0.05 s",
+        "target velocity": "0.5 m/s",
+        "gait": "1.5 Hz, duty factor 0.60",
+    }
+
+
+def test_three_links_are_the_default():
+    assert build_model("--legs=4").stdout == build_model("--legs=4", "--links=3").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--legs=3"], "flag --legs=3: 3 is not an integer in the range [4, 12]"),
+        (["--legs=13"], "flag --legs=13: 13 is not an integer in the range [4, 12]"),
+        (["--legs=six"], "flag --legs=six: invalid literal for int() with base 10: 'six'"),
+        (["--legs=6", "--links=0"], "flag --links=0: 0 is not an integer in the range [1, 4]"),
+        (["--legs=6", "--links=5"], "flag --links=5: 5 is not an integer in the range [1, 4]"),
+        (["--robot=quen"], "flag --robot=quen: value should be one of <queen|bastion|tick|leaper>"),
+        (["--robot=queen", "--links=2"], "--links=2: goes with --legs or --seed, not with --robot"),
+        ([], f"{SOURCES}, got none"),
+        (["--robot=queen", "--legs=6"], f"{SOURCES}, got --robot and --legs"),
+        (["--robot=queen", "--spec=a.json"], f"{SOURCES}, got --robot and --spec"),
+        (["queen"], "unexpected argument 'queen'; see --help"),
+        (["--legs=6", "--scale=0"], "flag --scale=0: 0.0 is not a number in the range [0.01, 100.0]"),
+        (["--legs=6", "--scale=nan"], "scale: expected a number from 0.01 to 100, got nan"),
+        (["--seed=-1"], "flag --seed=-1: -1 is not a non-negative integer"),
+        (["--legs=5", "--layout=pairs"], "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
+        (["--legs=5", "--layout=row"], "flag --layout=row: value should be one of <pairs|radial>"),
+        (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),
+    ],
+)
+def test_bad_arguments_are_one_line(arguments, message):
+    done = build_model(*arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"build_model.py: {message}\n")
+
+
+def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
+    (tmp_path / "file").write_text("kept")
+    for path, reason in (
+        (tmp_path / "missing" / "a.xml", "no such file or directory"),
+        (tmp_path / "file" / "a.xml", "not a directory"),
+        (tmp_path, "is a directory"),
+    ):
+        done = build_model("--robot=tick", "--output", path)
+        assert (done.returncode, done.stdout) == (1, "")
+        assert done.stderr == f"build_model.py: cannot write {path}: {reason}\n"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "kept"

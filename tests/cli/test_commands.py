@@ -1,0 +1,163 @@
+"""Tools fail with one line, and leave whole files or none."""
+
+import collections
+import json
+import shlex
+import subprocess
+import sys
+
+import pytest
+
+from arc_suite.cli.program import writing, writing_json
+
+TOOL = '''"""Counts."""
+import signal, sys
+from absl import flags
+from arc_suite.cli import program
+from arc_suite import files
+from arc_suite.simulation.opengl import RenderingUnavailable
+
+COUNT = flags.DEFINE_integer("count", 1, "How many.", lower_bound=0)
+RAISES = flags.DEFINE_string("raises", None, "What goes wrong.")
+OUTPUT = flags.DEFINE_string("output", None, "File to write after many lines.")
+
+def main():
+    kinds = {"value": ValueError, "os": OSError, "gl": RenderingUnavailable, "key": KeyError, "int": KeyboardInterrupt}
+    if RAISES.value == "signal":
+        signal.raise_signal(signal.SIGINT)
+    if RAISES.value:
+        raise kinds[RAISES.value]("a\\n  b")
+    print("counted", COUNT.value)
+    with files.writing_json(OUTPUT.value) as file:
+        for number in range(10_000 if OUTPUT.value else 0):
+            print("counting", number)
+            print("still counting", number, file=sys.stderr)
+        file["counted"] = COUNT.value
+
+if __name__ == "__main__":
+    program.run(main)
+'''
+
+
+@pytest.fixture(scope="module")
+def tool(tmp_path_factory):
+    path = tmp_path_factory.mktemp("tool") / "count.py"
+    path.write_text(TOOL)
+    return lambda *arguments: subprocess.run([sys.executable, path, *arguments], capture_output=True, text=True)
+
+
+def test_run_calls_main_with_flags_parsed(tool):
+    done = tool("--count=3")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "counted 3\n", "")
+
+
+@pytest.mark.parametrize("kind", ["value", "os", "gl"])
+def test_expected_errors_are_one_line(tool, kind):
+    done = tool(f"--raises={kind}")
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "count.py: a b\n")
+
+
+def test_unexpected_errors_keep_their_traceback(tool):
+    done = tool("--raises=key")
+    assert done.returncode == 1
+    assert "Traceback" in done.stderr
+
+
+@pytest.mark.parametrize(("kind", "message"), [("signal", "interrupted"), ("int", "a b")])
+def test_an_interrupt_is_one_line_and_exit_status_130(tool, kind, message):
+    done = tool(f"--raises={kind}")
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", f"count.py: {message}\n")
+
+
+@pytest.mark.parametrize("redirection", ["", "2>&1"])
+def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
+    target = tmp_path / "a.json"
+    line = f"{shlex.join(map(str, tool().args))} --output={target} {redirection} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
+    assert (done.returncode, done.stdout.count("\n")) == (0, 1)
+    assert "Error" not in done.stderr
+    assert json.loads(target.read_text()) == {"counted": 1}
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ("--count=-1", "flag --count=-1: "),
+        ("--cuont=1", "Unknown command line flag 'cuont'. Did you mean: count ?"),
+        ("stray", "unexpected argument 'stray'; see --help"),
+    ],
+)
+def test_wrong_arguments_are_one_line(tool, argument, message):
+    done = tool(argument)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith(f"count.py: {message}")
+
+
+def test_help_shows_docstring_and_flags(tool):
+    done = tool("--help")
+    assert "Counts." in done.stdout
+    assert "How many." in done.stdout
+
+
+def test_writing_replaces_the_target_only_at_the_end(tmp_path):
+    target = tmp_path / "a.txt"
+    target.write_text("old")
+    with writing(target) as temporary:
+        temporary.write_text("new")
+        assert temporary.suffix == ".txt"
+        assert target.read_text() == "old"
+    assert target.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_writing_leaves_nothing_after_an_error(tmp_path):
+    with pytest.raises(KeyError), writing(tmp_path / "a.txt") as temporary:
+        temporary.write_text("half")
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_writing_follows_links(tmp_path):
+    target, link = tmp_path / "a.txt", tmp_path / "link.txt"
+    target.write_text("old")
+    link.symlink_to(target)
+    with writing(link) as temporary:
+        temporary.write_text("new")
+    assert link.is_symlink()
+    assert target.read_text() == "new"
+
+
+@pytest.mark.parametrize(
+    ("path", "reason"),
+    [
+        ("missing/a.txt", "no such file or directory"),
+        ("file/a.txt", "not a directory"),
+        ("folder", "is a directory"),
+        ("/dev/null", "permission denied"),
+        ("x" * 300, "file name too long"),
+    ],
+)
+def test_writing_refuses_before_the_work_starts(tmp_path, monkeypatch, path, reason):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
+    (tmp_path / "folder").mkdir()
+    with pytest.raises(OSError, match=f"^cannot write {path}: {reason}$"), writing(path):
+        pytest.fail("the block ran")
+
+
+def test_writing_json_is_strict_json(tmp_path):
+    pair = collections.namedtuple("pair", "left right")
+    with writing_json(tmp_path / "a.json") as report:
+        report["a"] = pair(1.5, (float("nan"), float("inf"), {"b": "c"}))
+    assert json.loads((tmp_path / "a.json").read_text(), parse_constant=pytest.fail) == {
+        "a": {"left": 1.5, "right": [None, None, {"b": "c"}]}
+    }
+
+
+def test_writing_json_writes_nothing_without_a_path_or_after_an_error(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with writing_json(None) as report:
+        report["a"] = 1
+    with pytest.raises(KeyError), writing_json("a.json") as report:
+        raise KeyError
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,95 @@
+"""tools/evaluate.py, run as a user runs it."""
+
+import importlib.metadata
+import json
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+TOOL = pathlib.Path(__file__).parents[2] / "tools" / "evaluate.py"
+
+
+def evaluate(*arguments):
+    return subprocess.run([sys.executable, TOOL, *arguments], capture_output=True, text=True)
+
+
+def test_table_of_all_robots():
+    result = evaluate("--robot=all", "--policy=random", "--episodes=2")
+    assert result.returncode == 0, result.stderr
+    rows = {line.split()[0]: line for line in result.stdout.splitlines()[2:]}
+    assert list(rows) == ["queen", "bastion", "tick", "leaper", "all"]
+    assert re.match(r"all +IQM of return / paper's cpg: 0\.\d{3} \[0\.\d{3}, 0\.\d{3}\]$", rows.pop("all"))
+    for robot, expert in {"queen": "2048", "bastion": "2311", "tick": "1971", "leaper": "2630"}.items():
+        assert rows[robot].split()[7] == expert
+
+
+def test_figures_of_a_demonstrator():
+    result = evaluate("--robot", "queen", "--policy", "cpg", "--preset", "medium", "--episodes", "2")
+    assert result.returncode == 0, result.stderr
+    fields = result.stdout.splitlines()[-1].split()
+    assert fields[0] == "queen"
+    assert float(fields[1]) == pytest.approx(2049, rel=0.015)
+    iqm, low, high = (float(field.strip("[],")) for field in fields[4:7])
+    assert low <= iqm <= high
+    assert iqm == pytest.approx(2049, rel=0.015)
+    assert fields[8] == "1000.0"
+    assert float(fields[10]) == pytest.approx(0.5, abs=0.05)
+    assert 0 < float(fields[12]) < 100
+
+
+def test_json_holds_every_episode_and_the_versions(tmp_path):
+    path = tmp_path / "evaluation.json"
+    result = evaluate("--robot=leaper", "--policy=random", "--episodes=3", "--seed=5", f"--json={path}")
+    assert result.returncode == 0, result.stderr
+    report = json.loads(path.read_text())
+    assert (report["policy"], report["preset"], report["seed"]) == ("random", None, 5)
+    figures = report["robots"]["leaper"]
+    totals = [episode["total"] for episode in figures["episodes"]]
+    assert len(totals) == 3
+    assert figures["return"]["mean"] == pytest.approx(sum(totals) / 3)
+    assert figures["length"]["episodes"] == 3
+    assert figures["expert_return"] == 2630
+    for package in ("mujoco", "dm_control", "numpy"):
+        assert report["versions"][package] == importlib.metadata.version(package)
+    assert "arc_suite" in report["versions"]
+
+
+def test_json_is_refused_before_the_work_starts():
+    result = evaluate("--json=/nowhere/a.json")
+    assert (result.returncode, result.stdout) == (1, "")
+    assert result.stderr == "evaluate.py: cannot write /nowhere/a.json: no such file or directory\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--robot=quen"],
+            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper, all)",
+        ),
+        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
+        (
+            ["--policy=zero", "--preset=fats"],
+            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast, tuned)",
+        ),
+        ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
+        (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
+        (["--episode=3"], "Unknown command line flag 'episode'. Did you mean: episodes ?"),
+        (["queen"], "unexpected argument 'queen'; see --help"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_1(arguments, message):
+    result = evaluate(*arguments)
+    assert result.returncode == 1
+    assert result.stderr == f"evaluate.py: {message}\n"
+    assert result.stdout == ""
+
+
+def test_help_shows_an_example_and_the_flags():
+    result = evaluate("--help")
+    assert "python tools/evaluate.py --robot all" in result.stdout
+    for flag in ("--robot", "--policy", "--preset", "--episodes", "--seed", "--json"):
+        assert flag in result.stdout

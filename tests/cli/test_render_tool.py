@@ -1,0 +1,144 @@
+"""tools/render.py writes pictures and films that other programs can read, or one line and nothing."""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import imageio.v2 as imageio
+import numpy as np
+import pytest
+from PIL import Image
+
+from arc_suite.cli import films
+from arc_suite.robots import ROBOTS
+
+TOOL = Path(__file__).parents[2] / "tools" / "render.py"
+
+
+def render(folder, *arguments, **environment):
+    return subprocess.run(
+        [sys.executable, TOOL, "--width=64", "--height=48", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=folder,
+        env=os.environ | environment,
+    )
+
+
+def views_of(path, columns, rows):
+    picture = np.asarray(Image.open(path))
+    assert picture.shape == (48 * rows, 64 * columns, 3)
+    return [view for row in np.split(picture, rows) for view in np.split(row, columns, axis=1)]
+
+
+def distinct(pictures):
+    return len({picture.tobytes() for picture in pictures})
+
+
+def test_png_of_the_demonstrator_is_a_gait_cycle(tmp_path):
+    done = render(tmp_path, "--robot=queen", "--policy=cpg", "--output=queen.png")
+    assert done.returncode == 0, done.stderr
+    assert "MUJOCO_GL" not in done.stderr  # nothing but progress
+    # 60 steps are 4.5 cycles of 1.5 Hz; the next starts with step 67, its last view is 5/6 of a cycle later.
+    assert re.fullmatch(r"queen: return 1[0-9]{2}\.[0-9] in 78 steps\nwrote queen.png\n", done.stdout)
+    assert distinct(views_of(tmp_path / "queen.png", 3, 2)) == 6
+    assert os.listdir(tmp_path) == ["queen.png"]
+
+
+def test_png_of_any_other_policy_is_one_view(tmp_path):
+    done = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=0", "--output=tick.PNG")
+    assert (done.returncode, done.stdout) == (0, "tick: return 0.0 in 0 steps\nwrote tick.PNG\n")
+    (view,) = views_of(tmp_path / "tick.PNG", 1, 1)
+    assert view.std() > 10.0
+
+
+def test_png_of_all_robots_is_a_panel(tmp_path):
+    done = render(tmp_path, "--robot=all", "--steps=3", "--output=robots.png")
+    assert done.returncode == 0, done.stderr
+    assert re.findall(r"(\w+): return", done.stdout) == ["queen", "bastion", "tick", "leaper"]
+    assert distinct(views_of(tmp_path / "robots.png", 2, 2)) == 4
+
+
+def test_gif_shows_every_control_step_in_real_time(tmp_path):
+    done = render(tmp_path, "--robot=bastion", "--steps=6", "--preset=fast", "--output=bastion.gif")
+    assert done.returncode == 0, done.stderr
+    with Image.open(tmp_path / "bastion.gif") as film:
+        assert (film.n_frames, film.size, film.info["duration"], film.info["loop"]) == (6, (64, 48), 50, 0)
+        frames = []
+        for i in range(6):
+            film.seek(i)
+            frames.append(np.asarray(film.convert("RGB")))
+    assert distinct(frames) == 6
+
+
+def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
+    """Under the random policy Leaper falls long before 200 steps; odd sizes become even, as yuv420p needs."""
+    done = render(
+        tmp_path, "--robot=leaper", "--policy=random", "--width=65", "--height=49", "--steps=200", "--output=leaper.mp4"
+    )
+    assert done.returncode == 0, done.stderr
+    steps = int(re.search(r"in ([0-9]+) steps", done.stdout)[1])
+    assert 10 < steps < 100
+    with imageio.get_reader(tmp_path / "leaper.mp4") as film:
+        about = film.get_meta_data()
+        frames = list(film.iter_data())
+    assert len(frames) == steps
+    assert about["codec"] == "h264"
+    assert about["pix_fmt"].startswith("yuv420p")
+    assert about["fps"] == 20
+    assert about["size"] == (66, 50)
+    assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 1.0
+
+
+def test_a_take_stays_at_its_end():
+    take = films.Take(ROBOTS["leaper"], "random", "medium", 0, "profile", (64, 48))
+    for _ in range(200):
+        if take.ended:
+            break
+        take.step()
+    before = take.steps, take.earned
+    take.step()
+    assert take.ended
+    assert (take.steps, take.earned) == before
+    take.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--robot=quen", "--output=a.png"],
+            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper, all)",
+        ),
+        (
+            ["--policy=cgp", "--output=a.png"],
+            "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)",
+        ),
+        (
+            ["--preset=fats", "--output=a.png"],
+            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast, tuned)",
+        ),
+        (
+            ["--camera=portait", "--output=a.png"],
+            "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
+        ),
+        (["--output=a.jpg"], "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif)"),
+        (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
+        ([], "no file to write; say --output=FILE.png, .mp4 or .gif"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):
+    done = render(tmp_path, *arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"render.py: {message}\n")
+    assert os.listdir(tmp_path) == []
+
+
+def test_without_opengl_it_says_what_to_install_and_leaves_the_old_file(tmp_path):
+    (tmp_path / "queen.png").write_text("old")
+    done = render(tmp_path, "--output=queen.png", MUJOCO_GL="vulkan")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("render.py: cannot render with MUJOCO_GL=vulkan: ")
+    assert "apt-get install libegl1 libgl1 libgl1-mesa-dri" in done.stderr
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["old"]

@@ -1,0 +1,113 @@
+"""tools/collect.py, run as a user runs it."""
+
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+from arc_suite import data
+
+ROOT = pathlib.Path(__file__).parents[2]
+ID = "arc_suite/queen/cpg-medium-20steps-v0"
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path, monkeypatch):
+    """Where Minari keeps datasets."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    monkeypatch.setenv("COLUMNS", "200")  # of the tables that Minari's command prints
+    return tmp_path / "datasets"
+
+
+def run(*arguments, path=None):
+    environment = os.environ | ({"PYTHONPATH": str(path)} if path else {})
+    command = [sys.executable, ROOT / "tools" / "collect.py", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, env=environment)
+
+
+def test_collect_continue_verify_and_minaris_own_command(root):
+    done = run("--steps=20", "--episodes=3")
+    assert done.returncode == 0, done.stderr
+    total = sum(summary["return"] for summary in data.open(ID).summaries()) / 3
+    assert done.stdout.startswith(f"{ID}: 3 episodes, return {total:.1f} +- ")
+    assert done.stdout.endswith(f", length 20.0, 0.1 MB in {root / ID}\n")
+    assert "queen:" in done.stderr  # the progress bar
+    again = run("--steps=20", "--episodes=3")
+    assert (again.returncode, again.stdout, again.stderr) == (0, f"{ID}: has its 3 episodes already\n", "")
+    verified = run(f"--verify={ID}")
+    assert (verified.returncode, verified.stdout) == (0, f"{ID}: 3 episodes replayed, equal to the bit\n")
+    minari = pathlib.Path(sys.executable).with_name("minari")
+    listed = subprocess.run([minari, "list", "local"], capture_output=True, text=True, check=True).stdout
+    assert ID in listed
+    shown = subprocess.run([minari, "show", ID], capture_output=True, text=True, check=True).stdout
+    assert "arc_suite/queen-walk-v0" in shown
+
+
+def test_a_mixture_with_noise_on_a_body_made_to_order():
+    done = run("--legs=4", "--links=2", "--preset=slow,fast", "--noise=0.1", "--steps=10", "--episodes=2")
+    assert done.returncode == 0, done.stderr
+    dataset_id = "arc_suite/walker_4x2/cpg-slow-fast-noise0_1-10steps-v0"
+    assert done.stdout.startswith(f"{dataset_id}: 2 episodes")
+    assert len(data.open(dataset_id).body.legs) == 4
+    done = run(f"--verify={dataset_id}", "--robot=queen")
+    assert done.stderr == f"collect.py: dataset {dataset_id!r} holds walks of walker_4x2, and not of queen\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--robot=quen"],
+            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper, all)",
+        ),
+        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
+        (
+            ["--policy=zero", "--preset=slow,fats"],
+            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast, tuned)",
+        ),
+        (["--robot=all", "--id=some-v0"], "--id=some-v0: names one dataset, and --robot=all makes 4"),
+        (
+            ["--id=arc_suite/queen/mine"],
+            "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between and a "
+            "version at the end alone, such as 'arc_suite/queen/mine-v0'",
+        ),
+        (["--noise=-1"], "flag --noise=-1: -1.0 is not a non-negative number"),
+        (["queen"], "unexpected argument 'queen'; see --help"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
+    done = run("--episodes=2", *arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"collect.py: {message}\n")
+    assert not root.exists()
+
+
+def test_an_unknown_dataset_is_one_line_with_the_nearest(root):
+    done = run("--verify=arc_suite/queen/cpg-v0")
+    assert done.returncode == 1
+    assert done.stderr == f"collect.py: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
+
+
+def test_without_minari_a_line_says_what_to_install(tmp_path):
+    (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
+    done = run("--episodes=1", path=tmp_path)
+    line = "collect.py: datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
+
+
+def test_help_shows_examples_and_the_flags():
+    done = run("--help")
+    assert "python tools/collect.py --robot queen --policy cpg --preset medium --episodes 1000" in done.stdout
+    for flag in (
+        "--preset",
+        "--noise",
+        "--episodes",
+        "--steps",
+        "--seed",
+        "--id",
+        "--[no]overwrite",
+        "--verify",
+        "--rows",
+    ):
+        assert flag in done.stdout

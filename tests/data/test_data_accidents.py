@@ -1,0 +1,213 @@
+"""Collecting a dataset and being killed, interrupted, misled, or short of space."""
+
+import functools
+import multiprocessing
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+
+import minari
+import pytest
+from tqdm import tqdm
+
+from arc_suite import data
+from arc_suite.robots import ROBOTS
+
+TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
+ID = "arc_suite/test/some-v0"
+SETTINGS = data.Settings(ROBOTS["tick"], "random", (), steps=4)
+
+collect = functools.partial(data.collect, progress=functools.partial(tqdm, disable=True))
+
+# Policies to which an accident happens in the episode of seed 5: the seventh that is made, as the first is for trial.
+OWN = """
+import os, signal
+import numpy as np
+made = []
+def accident(robot, happen):
+    made.append(robot)
+    number, steps = len(made), []
+    def policy(timestep):
+        steps.append(timestep)
+        return happen() if number == 7 and len(steps) == 3 else np.full(18, 0.1 * len(steps))
+    return policy
+def kill(robot): return accident(robot, lambda: os.kill(os.getpid(), signal.SIGKILL))
+def interrupt(robot): return accident(robot, lambda: signal.raise_signal(signal.SIGINT))
+def nan(robot): return accident(robot, lambda: np.full(18, np.nan))
+def short(robot): return accident(robot, lambda: np.zeros(3))
+"""
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path, monkeypatch):
+    """Where Minari keeps datasets, and policies are found."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    (tmp_path / "own.py").write_text(OWN)
+    return tmp_path / "datasets"
+
+
+def digests(dataset_id=ID):
+    """Of the episodes that Minari sees; all of them open."""
+    episodes = list(minari.load_dataset(dataset_id))
+    summaries = data.open(dataset_id).summaries()
+    assert len(episodes) == len(summaries)
+    return [summary["sha256"] for summary in summaries]
+
+
+def killed_at(count, **arguments):
+    """Whether a process of its own, gone just before it renames or deletes for the n-th time, did not complete."""
+
+    def work():
+        left = iter(range(count - 1))
+
+        def guard(function):
+            def guarded(*args, **kwargs):
+                if next(left, None) is None:
+                    os._exit(9)
+                return function(*args, **kwargs)
+
+            return guarded
+
+        pathlib.Path.replace, pathlib.Path.rename = guard(pathlib.Path.replace), guard(pathlib.Path.rename)
+        os.link, os.unlink, os.rmdir = guard(os.link), guard(os.unlink), guard(os.rmdir)
+        collect(ID, rows=2, threads=1, **arguments)
+        os._exit(0)
+
+    process = multiprocessing.get_context("fork").Process(target=work)
+    process.start()
+    process.join()
+    return process.exitcode == 9
+
+
+@pytest.mark.parametrize("scenario", ["new", "new after another", "more episodes", "overwrite", "overwrite twice"])
+def test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it(root, scenario):
+    old = SETTINGS._replace(seed=9)
+    collect("arc_suite/test/old-v0", old, 3)
+    collect("arc_suite/test/whole-v0", SETTINGS, 4)
+    whole, arguments = digests("arc_suite/test/whole-v0"), {"settings": SETTINGS, "episodes": 4}
+    before, leftover = [], root / "leftover"
+    if scenario == "more episodes":
+        collect("arc_suite/test/before-v0", SETTINGS, 3)
+        before = whole[:3]
+    elif scenario.startswith("overwrite"):
+        before = digests("arc_suite/test/old-v0")
+        collect("arc_suite/test/before-v0", old, 3)
+        arguments["overwrite"] = True
+    if scenario == "overwrite twice":
+        assert killed_at(8, settings=old, episodes=4, overwrite=True)
+        (root / "arc_suite/test/.some-v0.new").rename(leftover)
+    elif scenario == "new after another":
+        assert killed_at(2, settings=old, episodes=4)
+        (root / "arc_suite/test/.some-v0.new").rename(leftover)
+    for count in range(1, 100):
+        if before:
+            shutil.copytree(root / "arc_suite/test/before-v0", root / ID)
+            metadata = root / ID / "data" / "metadata.json"
+            metadata.write_text(metadata.read_text().replace("before-v0", "some-v0"))
+        if leftover.exists():
+            shutil.copytree(leftover, root / "arc_suite/test/.some-v0.new")
+        survived = not killed_at(count, **arguments)
+        if (root / ID).exists():
+            there = digests()
+            assert there in (before, whole[: len(there)])
+            assert len(there) >= len(before) or there == whole
+        else:  # nothing had been finished, or the kill fell between two renamings
+            assert not before or "overwrite" in arguments
+        collect(ID, **arguments)
+        assert digests() == whole
+        assert {path.name for path in (root / ID).rglob("*")} == {"data", "main_data.hdf5", "metadata.json"}
+        assert {path.name for path in root.glob("arc_suite/test/.*")} == set()
+        shutil.rmtree(root / ID)
+        if survived:
+            break
+    assert 8 < count < 99
+
+
+def run(*arguments, **kwargs):
+    command = [sys.executable, TOOL, "--robot=tick", f"--id={ID}", "--steps=20", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, **kwargs)
+
+
+def last_line(text):
+    return text.rstrip("\n").rpartition("\n")[2].rpartition("\r")[2].strip()
+
+
+@pytest.mark.parametrize(
+    ("accident", "status", "line"),
+    [
+        ("kill", -signal.SIGKILL, None),
+        ("interrupt", 130, f"collect.py: interrupted; 5 of 8 episodes of {ID!r} are kept"),
+        (
+            "nan",
+            1,
+            "collect.py: policy 'own:nan': episode of seed 5, step 2: action[0]: "
+            f"expected a number from -1 to 1, got nan; 5 of 8 episodes of {ID!r} are kept",
+        ),
+        (
+            "short",
+            1,
+            "collect.py: policy 'own:short': episode of seed 5, step 2: action: expected shape (18,), got (3,); "
+            f"5 of 8 episodes of {ID!r} are kept",
+        ),
+    ],
+)
+def test_finished_episodes_are_kept(accident, status, line):
+    done = run(f"--policy=own:{accident}", "--episodes=8", "--rows=1")
+    assert done.returncode == status
+    if line:
+        assert last_line(done.stderr) == line
+    if accident != "kill":
+        assert len(digests()) == 5
+        return
+    kept = 0
+    while done.returncode == -signal.SIGKILL:
+        assert len(digests()) > kept
+        kept = len(digests())
+        done = run(f"--policy=own:{accident}", "--episodes=8", "--rows=1")
+    assert (done.returncode, done.stdout.split(",")[0]) == (0, f"{ID}: 8 episodes"), done.stderr
+    run("--policy=own:nan", "--episodes=4", "--rows=1", f"--id={ID[:-3]}-b-v0")
+    assert digests()[:4] == digests(f"{ID[:-3]}-b-v0")
+
+
+def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
+    def full():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    few = ("--policy=random", "--episodes=8", "--rows=1")
+    done = run(*few, preexec_fn=full)
+    assert done.returncode == 1
+    line = last_line(done.stderr)
+    assert line.startswith("collect.py: cannot write ")
+    assert "file too large" in line
+    kept = len(digests())
+    assert line.endswith(f"; {kept} of 8 episodes of {ID!r} are kept")
+    assert kept
+    done = run(*few)
+    assert done.returncode == 0, done.stderr
+    assert len(digests()) == 8
+
+
+def test_two_processes_do_not_collect_into_one_dataset():
+    from arc_suite.data.storage import Storage
+
+    collect(ID, SETTINGS, 2)
+    with Storage.opened(ID, overwrite=False), pytest.raises(ValueError) as error:
+        collect(ID, SETTINGS, 3)
+    assert str(error.value) == f"dataset {ID!r} is being collected by another process"
+
+
+def test_a_damaged_part_is_named_and_overwrite_mends_it(root):
+    for place, overwrite in ((root / ID, False), (root / "arc_suite/test/.some-v0.new", True)):
+        assert killed_at(10, settings=SETTINGS, episodes=6, overwrite=overwrite)
+        part = place / "data" / "parts" / "00000.hdf5"
+        os.truncate(part, 50)
+        if not overwrite:
+            with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: {part}: "):
+                collect(ID, SETTINGS, 6)
+        collect(ID, SETTINGS, 6, overwrite=True)
+        assert len(digests()) == 6

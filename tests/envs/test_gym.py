@@ -1,0 +1,501 @@
+"""The suite through Gymnasium: its contract, its wrappers, and the same bits as the dm_env."""
+
+import copy
+import importlib
+import json
+import os
+import pathlib
+import pickle
+import subprocess
+import sys
+import warnings
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils.env_checker import check_env, data_equivalence
+from gymnasium.wrappers import (
+    AddWhiteNoise,
+    FlattenObservation,
+    NormalizeObservation,
+    RecordEpisodeStatistics,
+    RescaleAction,
+)
+
+import arc_suite
+from arc_suite.tasks.walk import WEIGHTS
+
+ROOT = pathlib.Path(__file__).parents[2]
+IDS = [f"arc_suite/{robot}-walk-v0" for robot in ("queen", "bastion", "tick", "leaper")]
+SIZES = {"queen": (199, 18), "bastion": (151, 12), "tick": (199, 18), "leaper": (163, 12)}
+EVERY_ID = pytest.mark.parametrize("env_id", IDS)
+
+
+def robot(env_id):
+    return env_id.removeprefix("arc_suite/").removesuffix("-walk-v0")
+
+
+def actions(env, count, seed=0):
+    size = env.action_space.shape[0]
+    return np.random.default_rng(seed).uniform(-1, 1, (count, size)).astype(np.float32)
+
+
+def fell(env):
+    """Puts the torso where no healthy one is."""
+    env.unwrapped.physics.data.qpos[2] = 9.0
+
+
+def assert_same(first, second):
+    assert data_equivalence(first, second, exact=True)
+
+
+def test_ids_are_those_of_the_suite():
+    registered = [env_id for env_id in gymnasium.registry if env_id.startswith("arc_suite/")]
+    assert registered == IDS == [f"arc_suite/{domain}-{task}-v0" for domain, task in arc_suite.ALL_TASKS]
+
+
+def test_import_registers_lazily_and_in_silence_however_often():
+    code = (
+        "import sys, importlib, arc_suite; importlib.reload(arc_suite); importlib.reload(arc_suite.registration);"
+        "arc_suite.registration.register_ids(); print('shimmy' in sys.modules)"
+    )
+    environ = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-W", "always", "-c", code], env=environ, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("False\n", "")
+
+
+@EVERY_ID
+@pytest.mark.parametrize("render_mode", [None, "rgb_array", "depth_array"])
+def test_check_env_warns_of_infinite_bounds_alone(env_id, render_mode):
+    env = gymnasium.make(env_id, render_mode=render_mode)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check_env(env.unwrapped)
+    messages = [str(warning.message) for warning in caught]
+    assert len(messages) == 2 and all("A Box observation space m" in m and "infinity" in m for m in messages)
+
+
+@EVERY_ID
+def test_spaces_and_metadata(env_id):
+    env = gymnasium.make(env_id)
+    observations, motors = SIZES[robot(env_id)]
+    assert env.observation_space == gymnasium.spaces.Box(-np.inf, np.inf, (observations,), np.float32)
+    assert env.action_space == gymnasium.spaces.Box(-1.0, 1.0, (motors,), np.float32)
+    assert env.metadata["render_fps"] == 20
+    assert env.unwrapped.dt == 0.05
+
+
+def test_metadata_is_nobody_elses():
+    from shimmy.dm_control_compatibility import DmControlCompatibilityV0
+
+    from arc_suite.envs.gym import Env
+
+    env = gymnasium.make(IDS[0])
+    env.unwrapped.metadata["render_fps"] = 7
+    assert Env.metadata["render_fps"] == 20
+    assert gymnasium.make(IDS[0]).metadata["render_fps"] == 20
+    assert env.metadata["render_fps"] == 7
+    assert DmControlCompatibilityV0.metadata["render_fps"] == 10  # shimmy's own default, untouched
+
+
+@EVERY_ID
+def test_types_of_a_reset_and_a_step(env_id):
+    env = gymnasium.make(env_id)
+    observation, info = env.reset(seed=0)
+    assert observation.dtype == np.float32 and info == {}
+    observation, reward, terminated, truncated, info = env.step(actions(env, 1)[0])
+    assert observation.dtype == np.float32 and observation in env.observation_space
+    assert [type(value) for value in (reward, terminated, truncated)] == [float, bool, bool]
+    assert list(info) == ["reward_terms"] and list(info["reward_terms"]) == list(WEIGHTS)
+    assert {type(term) for term in info["reward_terms"].values()} == {float}
+    assert json.loads(json.dumps(info)) == info
+    weights = env.unwrapped.task.settings.weights
+    assert reward == pytest.approx(sum(weights[name] * term for name, term in info["reward_terms"].items()), abs=1e-12)
+
+
+@EVERY_ID
+def test_every_call_returns_fresh_data(env_id):
+    env = gymnasium.make(env_id)
+    kept = [env.reset(seed=0)[0]] + [env.step(action)[0] for action in actions(env, 3)] + [env.reset()[0]]
+    before = [observation.copy() for observation in kept]
+    for action in actions(env, 3, seed=1):
+        env.step(action)
+    assert_same(kept, before)
+    assert not any(np.shares_memory(a, b) for i, a in enumerate(kept) for b in kept[:i])
+
+
+@EVERY_ID
+def test_bit_equal_to_the_dm_env(env_id):
+    env = gymnasium.make(env_id)
+    environment = arc_suite.load(robot(env_id), "walk", {"random": 11})
+    for seed in (11, None, None):  # the unseeded resets continue the stream
+        observation, _ = env.reset(seed=seed)
+        timestep = environment.reset()
+        for action in [None, *actions(env, 60)]:
+            if action is not None:
+                observation, reward, terminated, _, info = env.step(action)
+                timestep = environment.step(action)
+                assert reward == timestep.reward and terminated == (timestep.discount == 0.0)
+                assert info["reward_terms"] == environment.task.terms
+            assert_same(observation, np.concatenate(list(timestep.observation.values())).astype(np.float32))
+            if timestep.last():
+                break
+
+
+@pytest.mark.parametrize("seed", [np.int64(5), np.uint8(5), np.int32(5)])
+def test_numpy_seeds(seed):
+    env = gymnasium.make(IDS[3])
+    assert_same(env.reset(seed=seed)[0], env.reset(seed=5)[0])
+    assert env.unwrapped.np_random_seed == 5
+
+
+def test_largest_seed_works_and_resets_in_a_row_differ():
+    env = gymnasium.make(IDS[3])
+    first, second = env.reset(seed=2**32 - 1)[0], env.reset()[0]
+    assert not np.array_equal(first, second)
+    assert not np.array_equal(gymnasium.make(IDS[3]).reset()[0], gymnasium.make(IDS[3]).reset()[0])
+
+
+@pytest.mark.parametrize("seed", [-1, 2**32, 1.5, "7", np.float32(3)])
+def test_bad_seeds_are_one_line_and_change_nothing(seed):
+    env, same = gymnasium.make(IDS[3]), gymnasium.make(IDS[3])
+    for e in (env, same):
+        e.reset(seed=0)
+    with pytest.raises(ValueError) as caught:
+        env.reset(seed=seed)
+    assert str(caught.value) == f"seed: expected an integer from 0 to 4294967295, got {seed!r}"
+    assert_same(env.step(actions(env, 1)[0]), same.step(actions(env, 1)[0]))
+    assert_same(env.reset()[0], same.reset()[0])
+    with pytest.raises(ValueError) as caught:
+        arc_suite.load("leaper", "walk", {"random": seed})
+    assert str(caught.value) == f"seed: expected an integer from 0 to 4294967295, got {seed!r}"
+
+
+def test_np_random_is_the_stream_of_resets():
+    env, other = gymnasium.make(IDS[3]), gymnasium.make(IDS[3])
+    assert env.unwrapped.np_random_seed == -1  # Gymnasium's sign for an unknown seed
+    for e in (env, other):
+        e.reset(seed=3)
+    assert isinstance(env.np_random, np.random.Generator)
+    assert env.np_random.random() == other.np_random.random()
+    assert_same(env.reset()[0], other.reset()[0])
+    env.np_random.random()
+    assert not np.array_equal(env.reset()[0], other.reset()[0])
+    for e in (env, other):
+        e.unwrapped.np_random = np.random.default_rng(4)
+    assert env.unwrapped.np_random_seed == -1
+    assert_same(env.reset()[0], other.reset()[0])
+
+
+@EVERY_ID
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_copies_carry_on_bit_for_bit(env_id, duplicate):
+    env = gymnasium.make(env_id, task_kwargs={"healthy_range": [-9.0, 9.0]})
+    env.reset(seed=1)
+    for action in actions(env, 30):
+        env.step(action)
+    twin = duplicate(env)
+    environment, copied = env.unwrapped._env, twin.unwrapped._env
+    assert_same(environment.task.get_observation(environment.physics), copied.task.get_observation(copied.physics))
+    for field in ("qpos", "qvel", "qacc_warmstart", "cfrc_ext", "xpos", "sensordata", "ctrl"):
+        assert_same(getattr(environment.physics.data, field).copy(), getattr(copied.physics.data, field).copy())
+    for action in actions(env, 100, seed=2):
+        assert_same(env.step(action), twin.step(action))
+    assert_same(env.reset(), twin.reset())
+    assert_same(env.step(actions(env, 1)[0]), twin.step(actions(env, 1)[0]))
+
+
+@EVERY_ID
+def test_pickles_are_small_and_hold_no_picture(env_id):
+    env = gymnasium.make(env_id, render_mode="rgb_array", width=64, height=48)
+    env.reset(seed=1)
+    picture = env.render()
+    stored = pickle.dumps(env)
+    assert len(stored) < 1_000_000 and b"dm_control._render" not in stored
+    twin = pickle.loads(stored)
+    assert b"look-" not in stored
+    assert_same(twin.render(), picture)
+    env.close()
+    assert_same(twin.render(), picture)
+
+
+def test_physics_copies_stand_as_they_are():
+    environment = arc_suite.load("leaper", "walk", {"random": 0})
+    environment.reset()
+    for _ in range(20):
+        environment.step(np.full(12, 0.3))
+    physics, copied = environment.physics, environment.physics.copy()
+    for name in ("cfrc_ext", "xpos", "qacc_warmstart", "qpos"):
+        assert_same(getattr(physics.data, name).copy(), getattr(copied.data, name).copy())
+    physics.step(25)
+    copied.step(25)
+    assert_same(physics.data.qpos.copy(), copied.data.qpos.copy())
+
+
+@EVERY_ID
+def test_spec_survives_json(env_id):
+    kwargs = {"task_kwargs": {"weights": {"control": -0.2}, "healthy_range": [0.0, 2.0], "random": 5}, "width": 64}
+    env = gymnasium.make(env_id, **kwargs)
+    spec = gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json())
+    assert spec.max_episode_steps == 1000 and spec.entry_point == "arc_suite.envs.gym:Env"
+    again = gymnasium.make(spec)
+    assert again.spec.to_json() == env.spec.to_json()
+    assert_same(env.reset(), again.reset())
+    assert_same(env.step(actions(env, 1)[0]), again.step(actions(env, 1)[0]))
+    assert gymnasium.spec(env_id).to_json()
+
+
+def test_task_settings_reach_the_task():
+    env = gymnasium.make(IDS[0], task_kwargs={"weights": {"posture": 0.0}, "target_velocity": 1.0})
+    settings = env.unwrapped.task.settings
+    assert settings.weights["posture"] == 0.0 and settings.parameters.target_velocity == 1.0
+
+
+@EVERY_ID
+def test_both_time_limits_agree(env_id):
+    def last_step(env, before_last=lambda env: None):
+        env.reset(seed=0)
+        action = np.zeros(env.action_space.shape, np.float32)
+        for _ in range(999):
+            *_, terminated, truncated, _ = env.step(action)
+            assert (terminated, truncated) == (False, False)
+        before_last(env)
+        return env.step(action)[2:4]
+
+    own = gymnasium.make(env_id, max_episode_steps=-1)  # no TimeLimit: the dm_env's limit
+    wrapped = gymnasium.make(env_id, task_kwargs={"time_limit": 60.0})  # the TimeLimit's alone
+    assert last_step(own) == last_step(wrapped) == (False, True)
+    with pytest.raises(ResetNeeded):
+        own.step(np.zeros(own.action_space.shape))
+    both = gymnasium.make(env_id)
+    assert last_step(both, before_last=fell) == last_step(own, before_last=fell) == (False, True)
+
+
+@EVERY_ID
+def test_fall_terminates(env_id):
+    env = gymnasium.make(env_id)
+    env.reset(seed=0)
+    fell(env)
+    _, _, terminated, truncated, info = env.step(actions(env, 1)[0])
+    assert (terminated, truncated, info["reward_terms"]["healthy"]) == (True, False, 0.0)
+
+
+NEEDS_RESET = "cannot step: the episode has ended or has not begun; call reset first"
+
+
+@EVERY_ID
+def test_order_of_calls(env_id):
+    env = gymnasium.make(env_id)
+    action = np.zeros(env.action_space.shape, np.float32)
+    with pytest.raises(ResetNeeded, match=r"^Cannot call env.step\(\) before calling env.reset\(\)$"):
+        env.step(action)
+    with pytest.raises(ResetNeeded, match=f"^{NEEDS_RESET}$"):
+        env.unwrapped.step(action)
+    env.reset(seed=0)
+    fell(env)
+    assert env.step(action)[2]
+    state = env.unwrapped.physics.get_state()
+    for _ in range(2):
+        with pytest.raises(ResetNeeded, match=f"^{NEEDS_RESET}$"):
+            env.step(action)
+    assert_same(env.unwrapped.physics.get_state(), state)
+    env.reset()
+    assert not env.step(action)[2]
+
+
+@EVERY_ID
+def test_closed_environments_say_so(env_id):
+    env = gymnasium.make(env_id, render_mode="rgb_array", width=32, height=32)
+    env.reset()
+    env.render()
+    env.close()
+    env.close()
+    for call, use in (
+        ("reset", env.reset),
+        ("step", lambda: env.step(np.zeros(env.action_space.shape, np.float32))),
+        ("render", env.render),
+    ):
+        with pytest.raises(ClosedEnvironmentError) as caught:
+            use()
+        assert str(caught.value) == f"cannot {call}: the environment is closed; make a new one"
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.zeros(11), "action: expected shape (12,), got (11,)"),
+        (np.zeros((1, 12)), "action: expected shape (12,), got (1, 12)"),
+        (np.array([0.0] * 4 + [np.nan] + [0.0] * 7), "action[4]: expected a number from -1 to 1, got nan"),
+        ("walk", "action: expected 12 numbers, got str"),
+    ],
+)
+def test_bad_actions_change_nothing(action, message):
+    env, same = gymnasium.make(IDS[1]), gymnasium.make(IDS[1])
+    for e in (env, same):
+        e.reset(seed=0)
+    with pytest.raises(ValueError) as caught:
+        env.step(action)
+    assert str(caught.value) == message
+    assert_same(env.step(actions(env, 1)[0]), same.step(actions(env, 1)[0]))
+
+
+def test_actions_out_of_range_are_clipped():
+    env, same = gymnasium.make(IDS[1]), gymnasium.make(IDS[1])
+    for e in (env, same):
+        e.reset(seed=0)
+    assert_same(env.unwrapped.step(np.full(12, 3.0)), same.unwrapped.step(np.ones(12)))
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        (
+            {"camera_id": "trackin"},
+            "unknown camera 'trackin'; did you mean 'tracking'? (there are: tracking, portrait, profile)",
+        ),
+        ({"camera_id": 3}, "no camera 3: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
+        ({"camera_id": None}, "no camera None: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
+        (
+            {"task_kwargs": {"weights": {"controll": 1.0}}},
+            f"unknown weight 'controll'; did you mean 'control'? (there are: {', '.join(WEIGHTS)})",
+        ),
+        (
+            {"domain_name": "quen"},
+            "unknown domain 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
+        ),
+        ({"task_name": "wlak"}, "unknown task 'wlak'; did you mean 'walk'? (there are: walk)"),
+    ],
+)
+def test_bad_arguments_are_one_line(kwargs, message):
+    with pytest.raises(ValueError) as caught:
+        gymnasium.make(IDS[0], **kwargs)
+    assert str(caught.value) == message
+
+
+def test_unknown_render_modes_are_one_line(monkeypatch):
+    monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda: False)
+    with pytest.warns(UserWarning, match="rgb_aray"), pytest.raises(ValueError) as caught:  # Gymnasium's own warning
+        gymnasium.make(IDS[0], render_mode="rgb_aray")
+    expected = "unknown render_mode 'rgb_aray'; did you mean 'rgb_array'? (there are: rgb_array, depth_array)"
+    assert str(caught.value) == expected
+    with pytest.raises(ValueError) as caught:
+        gymnasium.make(IDS[0], render_mode="human")
+    expected = "render_mode 'human' needs a display, and there is none; use rgb_array or depth_array"
+    assert str(caught.value) == expected
+
+
+def test_human_is_offered_where_there_is_a_display(monkeypatch):
+    for display, modes in ((True, ["rgb_array", "depth_array", "human"]), (False, ["rgb_array", "depth_array"])):
+        monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda display=display: display)
+        assert gymnasium.make(IDS[0]).metadata["render_modes"] == modes
+
+
+def test_human_without_a_window_is_one_line():
+    code = (
+        "import gymnasium, arc_suite\n"
+        f"env = gymnasium.make({IDS[0]!r}, render_mode='human')\n"
+        "try: env.reset()\n"
+        "except arc_suite.simulation.opengl.RenderingUnavailable as error: print(error)\n"
+    )
+    environ = os.environ | {"PYTHONPATH": str(ROOT), "DISPLAY": ":9876"}
+    environ.pop("WAYLAND_DISPLAY", None)
+    done = subprocess.run([sys.executable, "-c", code], env=environ, capture_output=True, text=True)
+    expected = "cannot open a window: (65550) b'X11: Failed to open display :9876'; use render_mode 'rgb_array'\n"
+    assert (done.returncode, done.stdout, done.stderr) == (0, expected, "")
+
+
+@EVERY_ID
+def test_pictures(env_id):
+    def picture(**kwargs):
+        env = gymnasium.make(env_id, width=80, height=60, **kwargs)
+        env.reset(seed=0)
+        return env.render()
+
+    rgb, depth = picture(render_mode="rgb_array"), picture(render_mode="depth_array")
+    assert rgb.shape == (60, 80, 3) and rgb.dtype == np.uint8 and rgb.std() > 5
+    assert depth.shape == (60, 80) and depth.dtype == np.float32 and 0 < depth.min() < 10
+    assert (rgb != picture(render_mode="rgb_array", camera_id="portrait")).any()
+    assert picture() is None
+
+
+@pytest.mark.parametrize("size", [{"width": 0}, {"height": -3}, {"width": 100_000}, {"height": 2.5}])
+def test_impossible_sizes_are_one_line(size):
+    env = gymnasium.make(IDS[0], render_mode="rgb_array", **size)
+    env.reset()
+    ((name, value),) = size.items()
+    with pytest.raises(ValueError, match=rf"^{name}: expected an integer from 1 to \d+, got {value}$"):
+        env.render()
+
+
+def test_render_collection():
+    env = gymnasium.make(IDS[0], render_mode="rgb_array_list", width=32, height=32)
+    env.reset(seed=0)
+    for action in actions(env, 3):
+        env.step(action)
+    assert [frame.shape for frame in env.render()] == [(32, 32, 3)] * 4
+
+
+@EVERY_ID
+def test_wrappers(env_id):
+    env = gymnasium.make(env_id, task_kwargs={"time_limit": 0.5})
+    env = RecordEpisodeStatistics(
+        NormalizeObservation(RescaleAction(FlattenObservation(env), np.float32(-2), np.float32(2)))
+    )
+    observation, _ = env.reset(seed=0)
+    total, done = 0.0, False
+    while not done:
+        observation, reward, terminated, truncated, info = env.step(np.zeros(env.action_space.shape, np.float32))
+        total, done = total + reward, terminated or truncated
+    assert info["episode"]["l"] == 10 and info["episode"]["r"] == pytest.approx(total)
+    assert np.isfinite(observation).all() and observation.dtype == np.float32
+
+
+def test_wrappers_that_draw_random_numbers():
+    env = AddWhiteNoise(gymnasium.make(IDS[0], render_mode="rgb_array", width=32, height=32), 0.5)
+    env.reset(seed=0)
+    assert env.render().shape == (32, 32, 3)
+
+
+def rollout(envs, seed, steps=25):
+    """Observations, rewards and a reward term of a vector environment."""
+    collected = [envs.reset(seed=seed)[0]]
+    for action in np.random.default_rng(0).uniform(-1, 1, (steps, *envs.action_space.shape)).astype(np.float32):
+        observations, rewards, _, _, infos = envs.step(action)
+        collected += [observations.copy(), rewards, infos["reward_terms"]["forward"].copy()]
+    envs.close()
+    return collected
+
+
+@EVERY_ID
+def test_vector_env_is_its_rows(env_id):
+    envs = gymnasium.make_vec(env_id, num_envs=2, vectorization_mode="sync")
+    assert envs.observation_space.shape == (2, SIZES[robot(env_id)][0]) and envs.metadata["render_fps"] == 20
+    collected = rollout(envs, seed=[7, 8])
+    for row, seed in enumerate((7, 8)):
+        env = gymnasium.make(env_id)
+        observation, _ = env.reset(seed=seed)
+        assert_same(collected[0][row], observation)
+        drawn = np.random.default_rng(0).uniform(-1, 1, (25, 2, *env.action_space.shape)).astype(np.float32)
+        for step, action in enumerate(drawn[:, row]):
+            observation, reward, terminated, _, info = env.step(action)
+            assert_same(collected[3 * step + 1][row], observation)
+            assert collected[3 * step + 2][row] == reward
+            assert collected[3 * step + 3][row] == info["reward_terms"]["forward"]
+            if terminated:
+                break
+
+
+def test_vector_env_in_spawned_processes():
+    def make(mode, **kwargs):
+        return gymnasium.make_vec(IDS[0], num_envs=2, vectorization_mode=mode, vector_kwargs=kwargs)
+
+    assert_same(rollout(make("async", context="spawn"), seed=3), rollout(make("sync"), seed=3))
+
+
+def test_reload_keeps_what_is_registered():
+    spec = gymnasium.spec(IDS[0])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        importlib.reload(arc_suite)
+    assert gymnasium.spec(IDS[0]) is spec

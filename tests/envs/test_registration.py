@@ -1,0 +1,205 @@
+"""Robots and tasks of other packages: registered from outside, then like the suite's own."""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+import arc_suite
+from arc_suite.cpg.presets import TUNINGS
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
+from arc_suite.tasks.walk import SETTINGS, walk
+
+ROOT = pathlib.Path(__file__).parents[2]
+GUIDE = (ROOT / "docs" / "adding_a_robot.md").read_text()
+REGISTERING, USING = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+
+# The same from a package: a task of its own kind stands beside the guide's.
+STAND = """
+from dm_control.rl import control
+from dm_control.suite import base
+from arc_suite.simulation.physics import Physics
+
+class Stand(base.Task):
+    def initialize_episode(self, physics):
+        physics.data.qpos[7:] = self.random.uniform(-0.1, 0.1, physics.model.nq - 7)
+    def get_observation(self, physics):
+        return {"angles": physics.position()[7:]}
+    def get_reward(self, physics):
+        return 1.0
+
+def stand(body, random=None, environment_kwargs=None):
+    physics = Physics.from_body(body)
+    return control.Environment(physics, Stand(random), 1.0, control_timestep=0.05, **(environment_kwargs or {}))
+
+arc_suite.register(tasks={"stand": stand})
+"""
+
+
+@pytest.fixture
+def package(tmp_path):
+    """Writes the package `creatures` and returns a function that runs code beside it."""
+    (tmp_path / "creatures").mkdir()
+    (tmp_path / "creatures" / "__init__.py").write_text("")
+    (tmp_path / "creatures" / "hopper.py").write_text(REGISTERING + STAND)
+    (tmp_path / "hopper.py").write_text(REGISTERING)
+
+    def run(code):
+        environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+        script = tmp_path / "script.py"
+        script.write_text(code)
+        done = subprocess.run([sys.executable, script], env=environ, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, ""), done.stderr
+        return done.stdout.splitlines()
+
+    return run
+
+
+def test_guide(package):
+    checks = (
+        "assert picture.shape == (480, 640, 3) and picture.std() > 5 and environments.num_envs == 8\n"
+        "print(environment.reset()[0].shape, environment.unwrapped.task.settings.parameters.target_velocity)\n"
+    )
+    assert package(USING + checks) == ["(107,) 0.15"]
+
+
+def test_guides_robot_walks(package):
+    code = (
+        "import arc_suite, hopper\n"
+        "from arc_suite import evaluation\n"
+        "from arc_suite.cpg import Demonstrator\n"
+        "environment = arc_suite.load('hopper', 'walk')\n"
+        "for preset in ('slow', 'medium', 'fast'):\n"
+        "    episode = evaluation.run(environment, Demonstrator('hopper', preset), seed=0, max_steps=200)\n"
+        "    print(episode.length, episode.speed > 0.1)\n"
+    )
+    assert package(code) == ["200 True"] * 3
+
+
+def test_every_face(package):
+    code = """
+import arc_suite, gymnasium, numpy as np
+from creatures import hopper
+assert arc_suite.ALL_TASKS == tuple((d, t) for d in arc_suite.TASKS_BY_DOMAIN for t in ("walk", "stroll", "stand"))
+assert list(arc_suite.TASKS_BY_DOMAIN) == ["queen", "bastion", "tick", "leaper", "hopper"]
+for task in ("walk", "stroll", "stand"):
+    env_id = f"arc_suite/hopper-{task}-v0"
+    env = gymnasium.make(env_id, render_mode="rgb_array", width=32, height=24)
+    first, again = env.reset(seed=1)[0], env.reset(seed=1)[0]
+    assert np.array_equal(first, again) and not np.array_equal(first, env.reset(seed=2)[0])
+    action = np.full(8, 0.1, np.float32)
+    env.reset(seed=1)
+    stepped = env.step(action)
+    assert env.render().shape == (24, 32, 3)
+    modes = ["sync", "async"] if task == "stand" else ["vector_entry_point", "sync", "async"]
+    for mode in modes:
+        envs = gymnasium.make_vec(env_id, num_envs=2, vectorization_mode=mode)
+        assert np.array_equal(envs.reset(seed=1)[0][0], first), mode
+        observations, rewards, *_ = envs.step(np.stack([action, action]))
+        assert np.array_equal(observations[0], stepped[0]) and rewards[0] == stepped[1], mode
+        envs.close()
+for call in (
+    lambda: arc_suite.load("hoper", "walk"),
+    lambda: arc_suite.load("hopper", "stan"),
+    lambda: gymnasium.make_vec("arc_suite/hopper-stand-v0", num_envs=2),
+    lambda: arc_suite.load("nowhere:hopper", "walk"),
+):
+    try:
+        call()
+    except ValueError as error:
+        print(error)
+"""
+    assert package(code) == [
+        "unknown domain 'hoper'; did you mean 'hopper'? (there are: queen, bastion, tick, leaper, hopper)",
+        "unknown task 'stan'; did you mean 'stand'? (there are: walk, stroll, stand)",
+        "task 'creatures.hopper:stand' has no batched form; use vectorization_mode 'sync' or 'async'",
+        "domain 'hopper': cannot import nowhere: No module named 'nowhere'",
+    ]
+
+
+def test_processes_that_share_no_memory_import_it(package):
+    code = """
+import gymnasium, numpy as np
+if __name__ == "__main__":
+    from creatures import hopper
+    for context in ("spawn", "forkserver"):
+        envs = gymnasium.make_vec(
+            "arc_suite/hopper-walk-v0", num_envs=2, vectorization_mode="async", vector_kwargs={"context": context}
+        )
+        print(envs.reset(seed=0)[0].shape)
+        envs.close()
+"""
+    assert package(code) == ["(2, 107)"] * 2
+
+
+def test_names_import_what_they_name(package):
+    code = """
+import arc_suite, gymnasium
+print(arc_suite.load("creatures.hopper:hopper", "creatures.hopper:stand").reset().observation["angles"].shape)
+print(gymnasium.make("creatures.hopper:arc_suite/hopper-walk-v0").reset()[0].shape)
+"""
+    assert package(code) == ["(8,)", "(107,)"]
+
+
+TICK = ROBOTS["tick"]
+OTHER = TICK.replace(name="other")
+ROW = SETTINGS["tick"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "nothing to register: give a body, tasks or both"),
+        ({"walk": ROW}, "walk, tuning and look belong to a body, and none is given"),
+        ({"body": "other"}, "body: expected a spec.Body, got 'other'"),
+        ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),
+        (
+            {
+                "body": OTHER,
+                "walk": {"base_noise": 0.1, **{k: v for k, v in ROW.items() if k != "base_noise"}, "duty_factor": 2},
+            },
+            "duty_factor: expected a finite number from 0 to 1, got 2",
+        ),
+        (
+            {"body": OTHER, "walk": {k: v for k, v in ROW.items() if k not in ("base_noise", "healthy_range")}},
+            "walk: other has no base_noise and no healthy_range",
+        ),
+        (
+            {"body": OTHER, "walk": ROW | {"healthy_rang": (0, 1)}},
+            "unknown setting of walk 'healthy_rang'; did you mean 'healthy_range'?",
+        ),
+        (
+            {"body": OTHER, "walk": ROW | {"weights": {"contrl": 1.0}}},
+            "unknown weight 'contrl'; did you mean 'control'?",
+        ),
+        (
+            {"body": OTHER, "walk": ROW | {"phase_offsets": (0.0, 1.0)}},
+            "phase_offsets: expected one finite number or 6 of them, got (0.0, 1.0)",
+        ),
+        (
+            {"body": OTHER, "tuning": TUNINGS["leaper"]},
+            "tuning 'slow': preset: other has 6 legs, and phase_offsets is for 4",
+        ),
+        ({"body": OTHER, "tuning": TUNINGS["bastion"]}, "tuning 'slow': preset: does not fit other: KeyError: 'knee'"),
+        (
+            {"body": OTHER, "tuning": {"medium": TUNINGS["queen"]["medium"]}},
+            "tuning: other has no slow and no fast",
+        ),
+        ({"tasks": {"walk": walk}}, "task 'walk' is already registered"),
+        ({"tasks": {"walk-slowly": walk}}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
+        ({"tasks": {"stand": None}}, "task 'stand': expected a function that makes an environment, got None"),
+        ({"body": OTHER, "walk": ROW, "tasks": {"walk": walk}}, "task 'walk' is already registered"),
+    ],
+)
+def test_mistakes_are_one_line_and_register_nothing(arguments, message):
+    tables = (ROBOTS, SETTINGS, TUNINGS, TASKS)
+    before = [dict(table) for table in tables]
+    with pytest.raises(ValueError) as error:
+        arc_suite.register(**arguments)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+    assert [dict(table) for table in tables] == before

@@ -1,0 +1,345 @@
+"""The vector environment: its rows are single environments, to the last bit."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.utils.env_checker import data_equivalence
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers import vector as wrappers
+from numpy.testing import assert_array_equal
+
+import arc_suite  # noqa: F401 (registers)
+from arc_suite.envs.vector import VectorEnv
+
+ROBOTS = ("queen", "bastion", "tick", "leaper")
+MODES = ("NextStep", "SameStep")
+# Episodes of 20 steps, and torso heights that random actions leave now and then.
+SHORT = {
+    "queen": {"time_limit": 1.0, "healthy_range": (0.6, 1.2)},
+    "bastion": {"time_limit": 1.0, "healthy_range": (0.4, 1.0)},
+    "tick": {"time_limit": 1.0},
+    "leaper": {"time_limit": 1.0, "healthy_range": (0.35, 1.0)},
+}
+
+
+def make(robot="queen", num_envs=3, **kwargs):
+    return gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs=num_envs, **kwargs)
+
+
+def make_singles(robot, num_envs, mode="NextStep", **kwargs):
+    return make(robot, num_envs, vectorization_mode="sync", vector_kwargs={"autoreset_mode": mode}, **kwargs)
+
+
+def random_actions(envs, count, seed=0):
+    return np.random.RandomState(seed).uniform(-1, 1, (count, *envs.action_space.shape)).astype(np.float32)
+
+
+def same(one, two):
+    return data_equivalence(one, two, exact=True)
+
+
+def arrays(value):
+    """All arrays within a nested result."""
+    if isinstance(value, dict):
+        return [array for item in value.values() for array in arrays(item)]
+    if isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.dtype == object):
+        return [array for item in value for array in arrays(item)] + ([value] if isinstance(value, np.ndarray) else [])
+    return [value] if isinstance(value, np.ndarray) else []
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_rows_are_single_environments_whatever_the_threads(robot, mode):
+    singles = make_singles(robot, 5, mode, task_kwargs=SHORT[robot])
+    batches = [
+        make(robot, 5, num_threads=threads, autoreset_mode=mode, task_kwargs=SHORT[robot]) for threads in (1, 2, 3, 8)
+    ]
+    expected = singles.reset(seed=3)
+    for batch in batches:
+        assert same(batch.reset(seed=3), expected)
+    ends = np.zeros(2, int)
+    for actions in random_actions(singles, 70):
+        expected = singles.step(actions)
+        for batch in batches:
+            result = batch.step(actions)
+            for name, value, wanted in zip(
+                ("observation", "reward", "terminated", "truncated", "info"), result, expected, strict=True
+            ):
+                assert same(value, wanted), name
+        ends += expected[2].sum(), expected[3].sum()
+    assert (ends > 0).all(), f"{ends} episodes ended by termination and by truncation: nothing was tried"
+    if mode == "SameStep":
+        assert result[4].keys() >= {"reward_terms", "_reward_terms"}
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_gymnasiums_step_limit_truncates_too(mode):
+    limits = {"task_kwargs": SHORT["tick"], "max_episode_steps": 7}
+    singles, batch = make_singles("tick", 4, mode, **limits), make("tick", 4, autoreset_mode=mode, **limits)
+    assert same(batch.reset(seed=0), singles.reset(seed=0))
+    for actions in random_actions(batch, 30):
+        assert same(batch.step(actions), singles.step(actions))
+
+
+def test_make_vec_gives_the_native_environment():
+    batch, singles = make(num_envs=4), make_singles("queen", 4)
+    assert isinstance(batch, VectorEnv)
+    assert batch.spec.id == "arc_suite/queen-walk-v0"
+    assert batch.num_envs == 4
+    for space in ("single_observation_space", "single_action_space", "observation_space", "action_space"):
+        assert getattr(batch, space) == getattr(singles, space), space
+    assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert batch.metadata["render_fps"] == 20
+    assert make(autoreset_mode=AutoresetMode.SAME_STEP).metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    observation, info = batch.reset(seed=0)
+    assert observation in batch.observation_space and info == {}
+    observation, reward, terminated, truncated, info = batch.step(batch.action_space.sample())
+    assert observation in batch.observation_space
+    assert (reward.shape, reward.dtype) == ((4,), np.float64)
+    assert terminated.dtype == truncated.dtype == bool
+    assert_array_equal(info["_reward_terms"], [True] * 4)
+    assert info["reward_terms"]["forward"].shape == (4,)
+
+
+def test_episode_that_ends_starts_anew_in_the_next_step_or_at_once():
+    limits = {"task_kwargs": {"time_limit": 0.1}}
+    following, at_once = make(**limits), make(autoreset_mode="SameStep", **limits)
+    actions = random_actions(following, 4)
+    for envs in (following, at_once):
+        envs.reset(seed=0)
+        envs.step(actions[0])
+    last, *_, truncated, info = following.step(actions[1])
+    assert truncated.all() and "final_obs" not in info
+    first, reward, _, truncated, info = following.step(actions[2])
+    assert_array_equal(reward, 0.0)
+    assert not truncated.any() and info == {}
+    observation, reward, _, truncated, info = at_once.step(actions[1])
+    assert truncated.all() and (reward != 0.0).all()
+    assert_array_equal(observation, first)
+    assert_array_equal(np.stack(info["final_obs"]), last)
+    assert_array_equal(info["_final_obs"], [True] * 3)
+    assert (info["final_info"]["reward_terms"]["gait_bonus"] > 0.0).all()
+    assert "reward_terms" not in info
+    assert same(at_once.step(actions[3])[0], following.step(actions[3])[0])
+
+
+def test_seeds_of_all_kinds():
+    batch = make(num_envs=2)
+    observation, _ = batch.reset(seed=5)
+    for seed in (np.int64(5), [5, 6], np.array([5, 6])):
+        assert_array_equal(batch.reset(seed=seed)[0], observation)
+    assert_array_equal(make(num_envs=2, task_kwargs={"random": 5}).reset()[0], observation)
+    assert_array_equal(batch.reset(seed=[None, 6])[0][1], observation[1])
+    assert not np.array_equal(batch.reset()[0], observation)
+    assert not np.array_equal(make(num_envs=2).reset()[0], make(num_envs=2).reset()[0])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_rows_that_rest_stand_still_until_their_reset_and_the_others_notice_nothing(mode):
+    batch, awake = (make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"]) for _ in range(2))
+    batch.reset(seed=0), awake.reset(seed=0)
+    mask = np.array([True, False, True, False])
+    for count, actions in enumerate(random_actions(batch, 60)):
+        if count == 3:
+            batch.rest(mask)
+            still = batch.batch.data.qpos[mask].copy()
+        observations, rewards, terminated, truncated, info = batch.step(actions)
+        expected = awake.step(actions)
+        for here, there in zip((observations, rewards, terminated, truncated), expected[:4], strict=True):
+            assert_array_equal(here[~mask], there[~mask])
+        if count >= 3:
+            assert_array_equal(batch.batch.data.qpos[mask], still)
+            assert not (rewards[mask].any() or terminated[mask].any() or truncated[mask].any())
+            assert not info.get("_reward_terms", mask & False)[mask].any()
+    fresh = make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"])
+    fresh.reset(seed=7)
+    batch.reset(seed=7)  # wakes them
+    for actions in random_actions(batch, 20):
+        assert same(batch.step(actions), fresh.step(actions))
+    with pytest.raises(ValueError, match="^mask: expected 4 booleans, at least one of them true, got array"):
+        batch.rest(np.zeros(4, bool))
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_reset_mask_restarts_some_rows(mode):
+    singles = make_singles("tick", 4, mode, task_kwargs=SHORT["tick"])
+    batch = make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"])
+    assert same(batch.reset(seed=0), singles.reset(seed=0))
+    steps = random_actions(batch, 60)
+    for count, actions in enumerate(steps):
+        assert same(batch.step(actions), singles.step(actions))
+        if count % 7 == 0:
+            seed = 100 * count if count % 2 else None
+            mask = np.arange(4) % 2 == count % 2
+            before = batch.reset(seed=seed, options={"reset_mask": mask})
+            assert same(before, singles.reset(seed=seed, options={"reset_mask": mask.copy()}))
+    with pytest.raises(ValueError, match="^reset_mask: expected 4 booleans, at least one of them true, got array"):
+        batch.reset(options={"reset_mask": np.ones(3, bool)})
+    with pytest.raises(ValueError, match="^reset_mask"):
+        batch.reset(options={"reset_mask": np.zeros(4, bool)})
+    with pytest.raises(ValueError, match="^reset_mask"):
+        batch.reset(options={"reset_mask": np.arange(4)})
+    with pytest.raises(ResetNeeded, match="^cannot reset some rows: reset all of them first$"):
+        make(num_envs=4).reset(options={"reset_mask": mask})
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_what_is_handed_out_is_the_callers_own(mode):
+    batch, twin = (make("tick", 3, autoreset_mode=mode, task_kwargs=SHORT["tick"]) for _ in range(2))
+    first = batch.reset(seed=0)
+    assert same(twin.reset(seed=0), first)
+    mine = arrays(first)
+    for actions in random_actions(batch, 45):
+        given = actions.copy()
+        result = batch.step(given)
+        assert same(twin.step(actions), result)
+        inside = [*vars(batch.batch.data).values()]
+        for array in arrays(result):
+            assert not any(np.may_share_memory(array, other) for other in (*mine, *inside, given))
+            mine.append(array)
+        assert len({array.__array_interface__["data"] for array in arrays(result)}) == len(arrays(result))
+        for array in [*arrays(result), given]:  # the caller may do what he likes with them
+            array[...] = None if array.dtype == object else 7
+        mine = mine[-50:]
+
+
+def test_nan_is_refused_before_anything_moves():
+    batch, twin = make("leaper", 6), make("leaper", 6)
+    batch.reset(seed=0), twin.reset(seed=0)
+    for row, actions in enumerate(random_actions(batch, 6)):
+        poisoned = actions.copy()
+        poisoned[row, 2 * row] = np.nan
+        with pytest.raises(ValueError, match=rf"^action\[{row}, {2 * row}\]: expected a number from -1 to 1, got nan$"):
+            batch.step(poisoned)
+        assert same(batch.step(actions), twin.step(actions))
+    with pytest.raises(ValueError, match=r"^action: expected shape \(6, 12\), got \(12,\)$"):
+        batch.step(np.zeros(12))
+    with pytest.raises(ValueError, match=r"^action: expected 6 x 12 numbers, got list$"):
+        batch.step(["forward"] * 6)
+    assert same(batch.step(actions * 100), twin.step(np.sign(actions)))
+
+
+@pytest.mark.parametrize(
+    "wrap",
+    [
+        wrappers.NormalizeObservation,
+        wrappers.NormalizeReward,
+        wrappers.RecordEpisodeStatistics,
+        wrappers.DictInfoToList,
+        wrappers.FlattenObservation,
+        lambda envs: wrappers.RescaleAction(envs, np.float32(0.0), np.float32(2.0)),
+        wrappers.ClipAction,
+        lambda envs: wrappers.ClipReward(envs, 0.0, 1.0),
+        lambda envs: wrappers.DtypeObservation(envs, np.float64),
+        lambda envs: wrappers.TransformObservation(envs, lambda observation: observation * 2.0),
+    ],
+)
+def test_gymnasiums_wrappers_do_to_it_what_they_do_to_single_environments(wrap):
+    batch = wrap(make("tick", 3, task_kwargs=SHORT["tick"]))
+    singles = wrap(make_singles("tick", 3, task_kwargs=SHORT["tick"]))
+    assert same(batch.reset(seed=1), singles.reset(seed=1))
+    for actions in random_actions(batch, 45):
+        result, expected = batch.step(actions), singles.step(actions)
+        if "episode" in expected[4]:
+            for info in (result[4], expected[4]):
+                del info["episode"]["t"]  # seconds on the clock
+        assert same(result, expected)
+
+
+def test_statistics_are_recorded_in_both_modes():
+    for mode in MODES:
+        batch = wrappers.RecordEpisodeStatistics(make("tick", 3, autoreset_mode=mode, task_kwargs=SHORT["tick"]))
+        batch.reset(seed=0)
+        total, lengths = np.zeros(3), []
+        for actions in random_actions(batch, 45):
+            _, reward, terminated, truncated, info = batch.step(actions)
+            total += reward
+            for row in np.flatnonzero(terminated | truncated):
+                np.testing.assert_allclose(info["episode"]["r"][row], total[row], rtol=1e-6)
+                lengths.append(info["episode"]["l"][row])
+                total[row] = 0.0
+        assert len(lengths) > 3 and max(lengths) == 20
+
+
+def test_render_shows_each_row_and_disturbs_nothing():
+    size = {"width": 80, "height": 60}
+    batch, twin = make("queen", 2, render_mode="rgb_array", **size), make("queen", 2)
+    single = gymnasium.make("arc_suite/queen-walk-v0", render_mode="rgb_array", **size)
+    batch.reset(seed=4), twin.reset(seed=4), single.reset(seed=5)
+    for actions in random_actions(batch, 5):
+        assert same(batch.step(actions), twin.step(actions))
+        single.step(actions[1])
+        one, two = batch.render()
+        assert (one.shape, one.dtype) == ((60, 80, 3), np.uint8)
+        assert not np.array_equal(one, two)
+        assert_array_equal(two, single.render())
+        assert_array_equal(batch.render([1])[0], two)
+    assert twin.render() is None
+    depth = make("queen", 2, render_mode="depth_array", **size)
+    depth.reset(seed=4)
+    assert depth.render()[0].shape == (60, 80) and depth.render()[0].dtype == np.float32
+
+
+def test_calls_at_the_wrong_time():
+    batch = make()
+    with pytest.raises(ResetNeeded, match="^cannot step: no episode has begun; call reset first$"):
+        batch.step(np.zeros((3, 18)))
+    batch.reset()
+    batch.close()
+    batch.close()
+    for call in (batch.reset, batch.render, lambda: batch.step(np.zeros((3, 18)))):
+        with pytest.raises(ClosedEnvironmentError, match="the environment is closed; make a new one$"):
+            call()
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "message"),
+    [
+        ({"num_envs": 0}, "num_envs: expected an integer from 1, got 0"),
+        ({"num_threads": 1.5}, "num_threads: expected an integer from 1, got 1.5"),
+        (
+            {"autoreset_mode": "samestep"},
+            "unknown autoreset_mode 'samestep'; did you mean 'SameStep'? (there are: NextStep, SameStep)",
+        ),
+        ({"autoreset_mode": AutoresetMode.DISABLED}, "unknown autoreset_mode 'Disabled'; did you mean"),
+        ({"render_mode": "rgb"}, "unknown render_mode 'rgb'; did you mean 'rgb_array'?"),
+        ({"camera_id": "tracing"}, "unknown camera 'tracing'; did you mean 'tracking'?"),
+        ({"task_kwargs": {"weigths": {}}}, "unknown setting of walk 'weigths'; did you mean 'weights'?"),
+        ({"task_kwargs": {"random": -1}}, "seed: expected an integer from 0 to 4294967295, got -1"),
+        ({"task_kwargs": {"on_divergence": "raise"}}, "unknown on_divergence of rows 'raise'"),
+    ],
+)
+def test_bad_arguments_are_one_line_errors(kwargs, message):
+    with pytest.raises(ValueError) as error:
+        make(**kwargs)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("seed", "message"),
+    [
+        ([1, 2], "seed: expected one for each of 3 rows, got 2"),
+        (2**32 - 2, f"seed: expected an integer from 0 to 4294967295, got {2**32}"),
+        ("one", "seed: expected an integer from 0 to 4294967295, got 'one'"),
+        ([1, 2, 2.5], "seed: expected an integer from 0 to 4294967295, got 2.5"),
+    ],
+)
+def test_bad_seeds_are_one_line_errors(seed, message):
+    batch = make()
+    with pytest.raises(ValueError) as error:
+        batch.reset(seed=seed)
+    assert str(error.value) == message
+
+
+def test_reset_of_some_rows_leaves_handed_out_observations_alone():
+    environments = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=3)
+    environments.reset(seed=0)
+    observations, *_ = environments.step(np.zeros((3, 18), np.float32))
+    kept = observations.copy()
+    again, _ = environments.reset(options={"reset_mask": np.array([False, True, False])})
+    np.testing.assert_array_equal(observations, kept)
+    np.testing.assert_array_equal(again[[0, 2]], kept[[0, 2]])
+    assert not np.array_equal(again[1], kept[1])
+    environments.close()

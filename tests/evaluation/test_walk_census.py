@@ -1,0 +1,61 @@
+"""tools/walk_census.py lets random bodies walk and tells those that do from those that do not."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+TOOL = Path(__file__).parents[2] / "tools" / "walk_census.py"
+BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
+
+
+def census(*arguments):
+    command = [sys.executable, TOOL, "--processes=1", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def test_bodies_walk():
+    done = census(*BODIES, "--count=3")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].split() == ["legs", "3", "links", "all"]
+    assert lines[1].split()[:2] == ["6", "3/3"]
+    assert lines[3:5] == ["3 of 3 bodies walk (100.0 %)", "failures: none"]
+    assert float(lines[5].split()[2]) > 0.17
+
+
+def test_legs_in_phase_fail_and_their_bodies_are_named():
+    done = census(*BODIES, "--count=1", "--in_phase")
+    assert done.returncode == 0, done.stderr
+    assert "0 of 1 bodies walk (0.0 %)\nfailures: slow 1\n" in done.stdout
+    assert done.stdout.endswith("seed 40: 6 legs, 3 links: slow\n")
+
+
+def test_a_reversed_sweep_walks_backwards():
+    done = census(*BODIES, "--count=1", "--froude=-0.25")
+    assert float(done.stdout.split("median speed ")[1].split()[0]) < -0.1
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ("--count=0", "flag --count=0: 0 is not a positive integer"),
+        ("--legs=3", "flag --legs=3: 3 is not an integer in the range [4, 12]"),
+        ("--picture=missing/a.png", "cannot write missing/a.png: no such file or directory"),
+        ("--froude=2", "froude: expected a number from 0.001 to 1, or negative, got 2.0"),
+    ],
+)
+def test_bad_arguments_are_one_line(argument, message):
+    done = census(argument)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.splitlines()[-1] == f"walk_census.py: {message}"
+
+
+def test_failures_are_shown_in_a_picture(tmp_path):
+    path = tmp_path / "failures.png"
+    done = census(*BODIES, "--count=1", "--in_phase", "--picture", path)
+    if "cannot render" in done.stderr:
+        pytest.skip("no OpenGL here")
+    assert done.returncode == 0, done.stderr
+    assert path.read_bytes().startswith(b"\x89PNG")

@@ -1,0 +1,225 @@
+"""Bad input: the exact line it is answered with, and that nothing has changed then."""
+
+import os
+import pathlib
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+import arc_suite
+from arc_suite import policies
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.presets import TUNINGS
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
+
+ID = "arc_suite/bastion-walk-v0"
+ZEROS = np.zeros(12)
+NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
+PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
+DOMAINS = "(there are: queen, bastion, tick, leaper)"
+PRESETS = ", ".join(TUNINGS["bastion"])
+CAMERAS = "['tracking', 'portrait', 'profile']"
+GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
+SEED = "seed: expected an integer from 0 to 4294967295, got"
+FINITE = "expected a finite number from"
+
+
+class World:
+    """A dm_env, a Gymnasium environment and rows, all in mid-episode."""
+
+    def __init__(self):
+        self.dm = arc_suite.load("bastion", "walk", {"random": 0})
+        self.env = gymnasium.make(ID, **PICTURE).unwrapped
+        self.rows = gymnasium.make_vec(ID, num_envs=3, num_threads=1, **PICTURE)
+        self.dm.reset(), self.env.reset(seed=0), self.rows.reset(seed=0)
+        for _ in range(3):
+            self.dm.step(ZEROS), self.env.step(ZEROS), self.rows.step(np.zeros((3, 12)))
+        self.walker = Demonstrator("bastion")
+
+    def state(self):
+        """Everything that a call could have changed."""
+        rows = self.rows
+        streams = [stream.get_state() for stream in rows._randoms]
+        return (
+            pickle.dumps((self.dm, self.env, rows._walker, rows._steps, rows._ended, streams, self.walker._clock)),
+            rows.batch._simulations.state.tobytes(),
+            pickle.dumps(np.random.get_state()),
+            (dict(ROBOTS), dict(TASKS), set(gymnasium.registry), dict(os.environ), os.getcwd()),
+            sorted(pathlib.Path().rglob("*")),
+        )
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory):
+    folder, before = tmp_path_factory.mktemp("files"), os.getcwd()
+    os.chdir(folder)
+    pathlib.Path("folder.json").mkdir()
+    pathlib.Path("text.json").write_text("walk")
+    pathlib.Path("list.json").write_text("[1]")
+    pathlib.Path("empty.json").write_text("{}")
+    yield World()
+    os.chdir(before)
+
+
+def walk(**task_kwargs):
+    return lambda world: arc_suite.load("queen", "walk", task_kwargs)
+
+
+def make(**kwargs):
+    return lambda world: gymnasium.make(ID, **kwargs)
+
+
+def rows(**kwargs):
+    return lambda world: gymnasium.make_vec(ID, **{"num_envs": 2} | kwargs)
+
+
+CASES = [
+    # Actions.
+    (lambda w: w.dm.step(NAN), "action[7]: expected a number from -1 to 1, got nan"),
+    (lambda w: w.dm.step([]), "action: expected shape (12,), got (0,)"),
+    (lambda w: w.dm.step({"hip": 0.0}), "action: expected 12 numbers, got dict"),
+    (lambda w: w.dm.step([ZEROS, ZEROS[:3]]), "action: expected 12 numbers, got list"),
+    (lambda w: w.env.step(np.zeros(0)), "action: expected shape (12,), got (0,)"),
+    (lambda w: w.env.step(0.5), "action: expected shape (12,), got ()"),
+    (lambda w: w.env.step(["a"] * 12), "action: expected 12 numbers, got list"),
+    (lambda w: w.rows.step(ZEROS), "action: expected shape (3, 12), got (12,)"),
+    (lambda w: w.rows.step(np.zeros((2, 12))), "action: expected shape (3, 12), got (2, 12)"),
+    (lambda w: w.rows.step([ZEROS, ZEROS, NAN]), "action[2, 7]: expected a number from -1 to 1, got nan"),
+    (lambda w: w.rows.step("walk"), "action: expected 3 x 12 numbers, got str"),
+    (lambda w: w.rows.step(None), "action: expected shape (3, 12), got ()"),
+    (lambda w: w.dm.physics.step(0), "nstep: expected an integer from 1, got 0"),
+    # Seeds.
+    (lambda w: w.env.reset(seed=[1]), f"{SEED} [1]"),
+    (lambda w: w.env.reset(seed=np.array([1, 2])), f"{SEED} array([1, 2])"),
+    (lambda w: w.rows.reset(seed=-1), f"{SEED} -1"),
+    (lambda w: w.rows.reset(seed=2**32 - 1), f"{SEED} 4294967296"),
+    (lambda w: w.rows.reset(seed=1.5), f"{SEED} 1.5"),
+    (lambda w: w.rows.reset(seed=[1, 2]), "seed: expected one for each of 3 rows, got 2"),
+    (lambda w: w.rows.reset(seed=[1, 2, "x"]), f"{SEED} 'x'"),
+    (
+        lambda w: w.rows.reset(options={"reset_mask": np.zeros(3, bool)}),
+        "reset_mask: expected 3 booleans, at least one of them true, got array([False, False, False])",
+    ),
+    (
+        lambda w: w.rows.reset(seed=3, options={"reset_mask": np.array([1, 0, 1])}),
+        "reset_mask: expected 3 booleans, at least one of them true, got array([1, 0, 1])",
+    ),
+    (rows(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 rows, got 3"),
+    (lambda w: policies.policy("random", "queen", seed=-1), f"{SEED} -1"),
+    # Ids.
+    (lambda w: arc_suite.load("Queen", "walk"), f"unknown domain 'Queen'; did you mean 'queen'? {DOMAINS}"),
+    (lambda w: arc_suite.load(7, "walk"), f"unknown domain 7; did you mean 'tick'? {DOMAINS}"),
+    (lambda w: arc_suite.load(["queen"], "walk"), f"unknown domain ['queen']; did you mean 'queen'? {DOMAINS}"),
+    (lambda w: arc_suite.load("queen", None), "unknown task None; did you mean 'walk'? (there are: walk)"),
+    (
+        lambda w: arc_suite.load("creature:hopper", "walk"),
+        "domain 'hopper': cannot import creature: No module named 'creature'",
+    ),
+    (make(domain_name="bastoin"), f"unknown domain 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
+    (rows(task_name="wlak"), "unknown task 'wlak'; did you mean 'walk'? (there are: walk)"),
+    # Cameras and sizes.
+    (lambda w: w.dm.physics.render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (lambda w: w.dm.physics.render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (
+        make(camera_id="prtrait"),
+        "unknown camera 'prtrait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
+    ),
+    (rows(camera_id=9), f"no camera 9: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (lambda w: w.dm.physics.render(0, 32), "height: expected an integer from 1 to 960, got 0"),
+    (lambda w: w.dm.physics.render(24, 99999), "width: expected an integer from 1 to 1280, got 99999"),
+    (lambda w: w.dm.physics.render(24, "32"), "width: expected an integer from 1 to 1280, got '32'"),
+    (lambda w: w.rows.render([5]), "rows: expected integers from 0 to 2, got 5"),
+    (lambda w: w.rows.render(["a"]), "rows: expected integers from 0 to 2, got 'a'"),
+    # Presets and policies.
+    (
+        lambda w: Demonstrator("bastion", "meduim"),
+        f"unknown preset 'meduim'; did you mean 'medium'? (there are: {PRESETS})",
+    ),
+    (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
+    (lambda w: Demonstrator("bastion", froude=0.2), f"froude: bastion has presets alone: {PRESETS}"),
+    (lambda w: Demonstrator("bastion", gait="trott"), f"unknown gait 'trott'; did you mean 'trot'? {GAITS}"),
+    (lambda w: w.walker(np.zeros(5)), "observation: expected 151 numbers, got shape (5,)"),
+    (lambda w: w.walker(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
+    (
+        lambda w: policies.policy("cgp", "queen"),
+        "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)",
+    ),
+    (
+        lambda w: policies.policy(None, "queen"),
+        "unknown policy None; did you mean 'zero'? (there are: cpg, zero, random)",
+    ),
+    (lambda w: policies.policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
+    (lambda w: policies.policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),
+    # Paths.
+    (lambda w: arc_suite.load("missing.json", "walk"), "cannot read missing.json: no such file or directory"),
+    (lambda w: arc_suite.load("folder.json", "walk"), "cannot read folder.json: is a directory"),
+    (lambda w: arc_suite.load(pathlib.Path("nothing"), "walk"), "cannot read nothing: no such file or directory"),
+    (
+        lambda w: arc_suite.load("text.json", "walk"),
+        "text.json: expected a body in JSON: Expecting value: line 1 column 1 (char 0)",
+    ),
+    (
+        lambda w: arc_suite.load("list.json", "walk"),
+        "list.json: expected an object with the fields of a Body, got a list",
+    ),
+    (lambda w: arc_suite.load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
+    # Keyword arguments.
+    (walk(time_limit=0), f"time_limit: {FINITE} 1e-09 to inf, got 0"),
+    (walk(time_limit=float("nan")), f"time_limit: {FINITE} 1e-09 to inf, got nan"),
+    (walk(target_velocity=True), f"target_velocity: {FINITE} -inf to inf, got True"),
+    (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),
+    (walk(phase_offsets=None), "phase_offsets: expected one finite number or 6 of them, got None"),
+    (walk(joint_noise=float("inf")), f"joint_noise: {FINITE} 0 to inf, got inf"),
+    (walk(weights={"forward": None}), f"weights['forward']: {FINITE} -inf to inf, got None"),
+    (
+        walk(on_divergence="ignore"),
+        "unknown on_divergence 'ignore'; did you mean 'raise'? (there are: raise, terminate)",
+    ),
+    (walk(gait=7), f"unknown gait 7; did you mean 'wave'? {GAITS}"),
+    (lambda w: arc_suite.load("queen", "walk", [1]), "task_kwargs: expected a mapping of names to values, got [1]"),
+    (
+        lambda w: arc_suite.load("queen", "walk", None, "flat"),
+        "environment_kwargs: expected a mapping of names to values, got 'flat'",
+    ),
+    (rows(num_envs=2.5), "num_envs: expected an integer from 1, got 2.5"),
+    (rows(num_threads="all"), "num_threads: expected an integer from 1, got 'all'"),
+    (rows(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
+    (
+        rows(autoreset_mode="Disabled"),
+        "unknown autoreset_mode 'Disabled'; did you mean 'SameStep'? (there are: NextStep, SameStep)",
+    ),
+    (
+        rows(task_kwargs={"on_divergence": "raise"}),
+        "unknown on_divergence of rows 'raise'; did you mean 'terminate'? (there are: terminate)",
+    ),
+    (
+        make(render_mode="ansi"),
+        "unknown render_mode 'ansi'; did you mean 'rgb_array'? (there are: rgb_array, depth_array)",
+    ),
+]
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # Gymnasium has its own opinion of some
+@pytest.mark.parametrize(("use", "message"), CASES, ids=[f"{i} {message[:40]}" for i, (_, message) in enumerate(CASES)])
+def test_bad_input(world, use, message, monkeypatch):
+    monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda: False)
+    before = world.state()
+    with pytest.raises((ValueError, OSError)) as error:
+        use(world)
+    assert str(error.value) == message
+    assert world.state() == before
+
+
+def test_the_world_goes_on_as_one_that_met_nothing_bad(world):
+    fresh = World()
+    for _ in range(3):
+        assert world.dm.step(ZEROS).reward == fresh.dm.step(ZEROS).reward
+        np.testing.assert_array_equal(world.env.step(ZEROS)[0], fresh.env.step(ZEROS)[0])
+        np.testing.assert_array_equal(world.rows.step(np.zeros((3, 12)))[0], fresh.rows.step(np.zeros((3, 12)))[0])
+
+
+def test_there_are_enough():
+    assert len(CASES) >= 60

@@ -1,0 +1,62 @@
+"""The README's code runs as it stands, and its tables say what is so."""
+
+import pathlib
+import re
+
+import pytest
+
+import arc_suite
+from arc_suite import data
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import walk
+
+README = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
+BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+@pytest.fixture
+def dataset(tmp_path, monkeypatch):
+    """A little of what the README collects."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    settings = data.Settings(ROBOTS["queen"], "cpg", ("tuned",))
+    assert f"--verify {settings.dataset_id()}\n" in README
+    data.collect(settings.dataset_id(), settings._replace(steps=5), episodes=1)
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=range(len(BLOCKS)))
+def test_code(block, dataset):
+    exec(compile(block, "README.md", "exec"), {})
+
+
+def test_there_is_code():
+    assert len(BLOCKS) >= 2
+
+
+@pytest.mark.parametrize("robot", arc_suite.TASKS_BY_DOMAIN)
+def test_table_of_robots(robot):
+    row = [cell.strip() for cell in re.search(rf"^\| `{robot}` (.*)\|$", README, re.MULTILINE).group(1).split("|")]
+    environment = arc_suite.load(robot, "walk")
+    task, model = environment.task, environment.physics.model.ptr
+    size = sum(spec.shape[0] for spec in environment.observation_spec().values())
+    parameters = task.settings.parameters
+    assert row[2].split(" x ") == [str(len(task.body.legs)), str(len(task.body.legs[0].joints))]
+    assert row[3:5] == [str(model.nu), str(model.nbody - 1)]
+    mass = float(row[5].removesuffix(" kg"))
+    assert mass == pytest.approx(model.body_mass.sum(), rel=0.01)
+    assert row[6] == f"{task.body.torso.standing_height:.2f} m"
+    assert row[7] == f"{parameters.target_velocity:.2f} m/s"
+    assert row[8].split(", ")[1] == f"{parameters.gait_frequency} Hz"
+    assert row[9] == str(size)
+
+
+def test_table_of_terms():
+    for name, weight in walk.WEIGHTS.items():
+        rows = re.findall(rf"^\| `{name}` \| (-?[\d.]+)[ ;]", README, re.MULTILINE)
+        assert float(rows[-1]) == weight, name
+
+
+def test_ids_are_registered():
+    import gymnasium
+
+    for name in re.findall(r"`(arc_suite/[a-z]+-walk-v0)`", README):
+        assert name in gymnasium.registry

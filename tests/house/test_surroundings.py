@@ -1,0 +1,126 @@
+"""The suite keeps to itself: no files, no network, no side effects, nothing executed that a file holds."""
+
+import ast
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[2]
+
+# Uses everything, with an accident that MuJoCo warns of, while the network is cut off.
+SCRIPT = """
+import socket
+def refuse(*args, **kwargs):
+    raise AssertionError("the network was used")
+socket.socket.connect = socket.create_connection = socket.getaddrinfo = refuse
+import gymnasium
+import numpy as np
+import arc_suite
+for robot in arc_suite.TASKS_BY_DOMAIN:
+    environment = arc_suite.load(robot, "walk", {"on_divergence": "terminate"})
+    environment.reset()
+    environment.physics.data.qvel[:] = np.nan
+    assert environment.step(np.zeros(environment.action_spec().shape)).last()
+    environment.physics.forward()
+    environment.physics.render(32, 32)
+    env = gymnasium.make(f"arc_suite/{robot}-walk-v0", render_mode="rgb_array", width=32, height=32)
+    env.reset(); env.step(env.action_space.sample()); env.render(); env.close()
+    envs = gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs=2, render_mode="rgb_array")
+    envs.reset()
+    envs.batch.data.qpos[0, 0] = np.inf
+    envs.step(envs.action_space.sample()); envs.render(); envs.close()
+"""
+
+
+def test_no_file_appears_and_nothing_is_downloaded(tmp_path):
+    home, work = tmp_path / "home", tmp_path / "work"
+    home.mkdir(), work.mkdir()
+    environ = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(home), "PYTHONDONTWRITEBYTECODE": "1"}
+    for name in [name for name in environ if name.startswith("XDG_")]:
+        del environ[name]
+    done = subprocess.run([sys.executable, "-c", SCRIPT], cwd=work, env=environ, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert sorted(tmp_path.rglob("*")) == [home, work]
+
+
+# What an import may change: MUJOCO_GL, and what it registers with Gymnasium.
+IMPORT = """
+import locale, logging, os, random, signal, sys, threading, warnings
+import dm_control.suite, gymnasium, numpy
+def state():
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGCHLD)}
+    return {
+        "environ": dict(os.environ), "path": list(sys.path), "folder": os.getcwd(), "signals": handlers,
+        "filters": list(warnings.filters), "print": numpy.get_printoptions(), "errors": numpy.geterr(),
+        "random": random.getstate(), "numpy": str(numpy.random.get_state()), "locale": locale.setlocale(locale.LC_ALL),
+        "level": logging.getLogger().level, "handlers": list(logging.getLogger().handlers), "hook": sys.excepthook,
+        "threads": threading.active_count(), "recursion": sys.getrecursionlimit(),
+        "ids": sorted(name for name in gymnasium.registry if not name.startswith("arc_suite/")),
+    }
+before = state()
+import arc_suite
+print([name for name, value in state().items() if value != before[name]])
+"""
+
+
+def test_import_has_no_side_effect_but_registration():
+    environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
+    done = subprocess.run([sys.executable, "-c", IMPORT], env=environ, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
+
+
+# Calls that execute what they are given, or read what can execute: none in the package and its tools.
+FORBIDDEN = {
+    "eval",
+    "exec",
+    "compile",
+    "__import__",
+    "pickle",
+    "cPickle",
+    "dill",
+    "joblib",
+    "marshal",
+    "shelve",
+    "yaml",
+}
+FILES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").glob("*.py")])
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_files_are_read_as_data(path):
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            assert not FORBIDDEN & {alias.name.split(".")[0] for alias in node.names}, ast.unparse(node)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.module.split(".")[0] not in FORBIDDEN, ast.unparse(node)
+        elif isinstance(node, ast.Call):
+            call = ast.unparse(node.func)
+            assert call not in FORBIDDEN, ast.unparse(node)
+            if call in ("np.load", "numpy.load"):
+                given = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
+                assert given.get("allow_pickle") == "False", ast.unparse(node)
+            if call.split(".")[-1] in ("run", "Popen", "call", "check_output"):
+                assert "shell" not in {keyword.arg for keyword in node.keywords}, ast.unparse(node)
+        elif isinstance(node, (ast.Constant, ast.JoinedStr)):
+            # XML is built by PyMJCF, which escapes what a spec says; never by strings.
+            text = node.value if isinstance(node, ast.Constant) else ast.unparse(node)
+            assert not (isinstance(text, str) and any(tag in text for tag in ("<mujoco", "<body", "<geom", "</")))
+
+
+def test_the_check_of_files_finds_what_it_looks_for(tmp_path):
+    for text in (
+        "import pickle",
+        "from yaml import load",
+        "eval('1')",
+        "np.load('a')",
+        "np.load('a', allow_pickle=True)",
+        "subprocess.run('ls', shell=True)",
+        "x = f'<geom name={y}/>'",
+    ):
+        path = tmp_path / "bad.py"
+        path.write_text(text)
+        with pytest.raises(AssertionError):
+            test_files_are_read_as_data(path)

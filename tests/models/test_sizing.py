@@ -1,0 +1,135 @@
+"""What a body leaves open is sized by rules without dimension; the four robots leave nothing open."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite import models
+from arc_suite.models.sizing import control_timestep, natural_frequency, sized
+from arc_suite.models.standing import stability_margin, stance
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec import Motor, Simulation
+
+BODY = generator.generate(6, 3)
+
+
+def compiled(body):
+    return mujoco.MjModel.from_xml_string(models.assemble(body).to_xml_string())
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_published_robots_are_not_sized(robot):
+    assert sized(ROBOTS[robot]) is ROBOTS[robot]
+    assert ROBOTS[robot].simulation == Simulation(
+        timestep=0.002, contact_time=0.02, contact_width=0.001, contact_margin=0.005
+    )
+
+
+def test_constants_scale_with_the_height():
+    body = generator.scaled(BODY, 0.3 / 0.4 * 9.0)  # nine times the height at which MuJoCo's defaults hold
+    model = compiled(body)
+    assert model.opt.timestep == pytest.approx(0.006, rel=1e-12)
+    assert control_timestep(body) == pytest.approx(0.15, rel=1e-12)
+    for geom in [model.geom("floor"), *(model.geom(name) for name in body.foot_names)]:
+        assert geom.solref == pytest.approx([0.06, 1.0], rel=1e-12)
+        assert geom.solimp == pytest.approx([0.9, 0.95, 0.009, 0.5, 2.0], rel=1e-12)
+        assert geom.margin[0] == pytest.approx(0.045, rel=1e-12)
+    assert model.joint("l1_knee").solref == pytest.approx([0.06, 1.0], rel=1e-12)
+
+
+def test_motors_armature_and_damping_follow_the_rules():
+    model = compiled(BODY)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    # Torques by which six feet, each under a sixth of the weight, press on their own leg.
+    weight = 9.81 * model.body_mass.sum()
+    loads = []
+    for leg in BODY.legs:
+        jacobian = np.empty((3, model.nv))
+        mujoco.mj_jacBody(model, data, jacobian, None, model.body(f"{leg.name}_foot").id)
+        dofs = [model.joint(f"{leg.name}_{joint}").dofadr[0] for joint in ("hip", "knee", "ankle")]
+        loads.append(abs(data.qfrc_bias[dofs] - weight / 6.0 * jacobian[2, dofs]))
+    gears = model.actuator_gear[:, 0].reshape(6, 3)
+    for load, gear in zip(loads, gears, strict=True):
+        assert gear == pytest.approx(10.0 * np.maximum(load, 0.25 * load.max()), rel=1e-6)
+    frequency = natural_frequency(BODY)
+    assert frequency == pytest.approx(0.5 / control_timestep(BODY), rel=1e-12)
+    inertias = stance(BODY).inertias
+    armature = np.maximum(0.3 * inertias, gears.ravel() / (0.35 * frequency**2) - inertias)
+    assert model.dof_armature[6:] == pytest.approx(armature, rel=1e-9)
+    assert model.dof_damping[6:] == pytest.approx(0.1 * frequency * (inertias + armature), rel=1e-9)
+
+
+def test_what_a_body_says_is_kept():
+    knee = BODY.legs[0].links[1].joint.replace(motor=Motor(gear=7.0), armature=0.5, damping=0.0)
+    legs = list(BODY.legs)
+    legs[0] = legs[0].replace(links=(legs[0].links[0], legs[0].links[1].replace(joint=knee), legs[0].links[2]))
+    simulation = Simulation(timestep=0.001)
+    body = sized(BODY.replace(legs=tuple(legs), simulation=simulation))
+    assert body.legs[0].links[1].joint == knee
+    assert body.simulation == simulation
+    assert body.legs[1].links[1].joint.motor is not None
+    assert sized(body) is body
+
+
+def test_sizing_keeps_dimensionless_ratios_when_a_body_grows():
+    small, large = (sized(generator.scaled(BODY, scale)) for scale in (0.1, 10.0))
+    for leg, giant in zip(small.legs, large.legs, strict=True):
+        for joint, other in zip(leg.joints, giant.joints, strict=True):
+            # torque ~ mass x length, inertia ~ mass x length^2, time ~ sqrt(length); mass ~ length^3
+            assert other.motor.gear / joint.motor.gear == pytest.approx(100.0**4, rel=1e-6)
+            assert other.armature / joint.armature == pytest.approx(100.0**5, rel=1e-6)
+            assert other.damping / joint.damping == pytest.approx(100.0**4.5, rel=1e-6)
+
+
+def test_a_leg_in_which_nothing_carries_gets_motors_too():
+    body = sized(generator.generate(6, 1))
+    gears = {round(leg.joints[0].motor.gear / stance(body).mass, 6) for leg in body.legs}
+    assert len(gears) == 1
+    assert min(gears) > 0.01
+
+
+def test_stance_is_measured():
+    standing = stance(BODY)
+    model = compiled(BODY)
+    assert standing.mass == pytest.approx(model.body_mass.sum(), rel=1e-12)
+    assert standing.height == 0.4
+    for leg, sole in zip(BODY.legs, standing.soles, strict=True):
+        assert sole + (0.0, 0.0, leg.foot.radius) == pytest.approx(leg.foot_position, abs=1e-12)
+    # The Jacobian of a sole against a small turn of each joint.
+    data = mujoco.MjData(model)
+    for i, joint in enumerate(("hip", "knee", "ankle")):
+        data.qpos[:] = model.qpos0
+        data.joint(f"r2_{joint}").qpos = 1e-6
+        mujoco.mj_kinematics(model, data)
+        frame = data.body("r2_lower").xmat.reshape(3, 3)
+        mujoco.mj_kinematics(model, data)
+        moved = data.body("r2_foot").xpos - model.qpos0[:3]
+        turned = frame @ _frame(model, "r2_lower").T @ (0.0, 0.0, -BODY.legs[4].foot.radius)
+        numeric = (moved + turned - standing.soles[4]) / 1e-6
+        assert standing.jacobians[4][:, i] == pytest.approx(numeric, abs=1e-5)
+
+
+def _frame(model, body):
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data.body(body).xmat.reshape(3, 3)
+
+
+@pytest.mark.parametrize(
+    ("point", "margin"),
+    [((0.0, 0.0), 1.0), ((0.5, 0.0), 0.5), ((0.9, -0.8), 0.1), ((1.0, 0.3), 0.0), ((1.5, 0.0), -0.5)],
+)
+def test_stability_margin_is_the_distance_from_the_nearest_edge(point, margin):
+    square = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0), (0.2, 0.1)]
+    assert stability_margin(point, square) == pytest.approx(margin, abs=1e-12)
+
+
+def test_stability_margin_of_few_feet():
+    triangle = [(math.cos(angle), math.sin(angle)) for angle in (0.0, 2.0 * math.pi / 3.0, -2.0 * math.pi / 3.0)]
+    assert stability_margin((0.0, 0.0), triangle) == pytest.approx(0.5)
+    assert stability_margin((0.0, 0.3), [(-1.0, 0.0), (1.0, 0.0)]) == pytest.approx(-0.3)
+    assert stability_margin((0.0, 0.0), [(3.0, 4.0)]) == pytest.approx(-5.0)
+    assert stability_margin((0.0, 0.0), np.empty((0, 2))) == -math.inf

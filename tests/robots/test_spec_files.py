@@ -1,0 +1,205 @@
+"""Bodies as JSON: lossless both ways, and what is malformed gets one line that names the field."""
+
+import json
+import math
+import time
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from arc_suite.models.sizing import sized
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec import Body, SpecError
+from arc_suite.robots.spec_files import MAX_BYTES, body_from_json, body_to_json, load_body, save_body
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.json"))
+SOUND = json.loads(body_to_json(sized(generator.generate(4, 2))))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [*ROBOTS.values(), generator.generate(12, 4), generator.random_body(3), sized(generator.random_body(4))],
+    ids=lambda body: body.name,
+)
+def test_bodies_survive_the_way_there_and_back(body, tmp_path):
+    path = tmp_path / "body.json"
+    save_body(body, path)
+    assert load_body(path) == body
+    assert load_body(str(path)) == body
+    assert body_to_json(load_body(path)) == path.read_text()
+    assert body_from_json(json.dumps(json.loads(path.read_text()))) == body
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_are_written_as_saved(path):
+    body = load_body(path)
+    assert body.name == path.stem
+    assert body_to_json(body) == path.read_text()
+
+
+def test_there_are_examples_of_every_kind():
+    legs = {path.stem: len(load_body(path).legs) for path in EXAMPLES}
+    assert legs == {"crab": 8, "giant": 6, "hound": 4, "millipede": 12, "spider": 8, "starfish": 5}
+
+
+def test_a_few_lines_are_a_body():
+    text = """{
+      "name": "stool",
+      "torso": {"standing_height": 0.5, "solids": [{"name": "seat", "shape": "sphere", "size": [0.1]}]},
+      "legs": [{"name": "a", "mount": [0.1, 0, 0], "foot": {"radius": 0.02}, "links": [
+        {"name": "upper", "end": [0.2, 0, -0.48], "radius": 0.02,
+         "joint": {"name": "hip", "axis": [0, 0, 1], "range_deg": [-20, 20]}}]}]}"""
+    body = body_from_json(text)
+    assert body.legs[0].links[0].joint.motor is None
+    assert body.density == 10.0
+
+
+def changed(path, value):
+    """The sound spec with one thing changed, deleted (`...`) or added."""
+    spec = json.loads(json.dumps(SOUND))
+    *way, last = path
+    place = spec
+    for key in way:
+        place = place[key]
+    if value is ...:
+        del place[last]
+    else:
+        place[last] = value
+    return json.dumps(spec)
+
+
+HIP = ("legs", 1, "links", 0, "joint")
+AT_HIP = "legs[1].links[0].joint"
+SHAPES = "sphere, capsule, cylinder, ellipsoid, box"
+IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (("name",), "Großer Käfer", "name: expected 1 to 32 characters out of [a-z0-9_], got 'Großer Käfer'"),
+        (("name",), ..., "name: missing; a Body needs it"),
+        (("torso", "standing_height"), -0.4, "torso.standing_height: expected a number from 1e-06 to 100, got -0.4"),
+        (("torso", "solids"), {}, "torso.solids: expected a list of Solids, got an object"),
+        (("torso", "solids", 0, "shape"), "mesh", f"torso.solids[0].shape: expected one of {SHAPES}, got 'mesh'"),
+        (
+            ("torso", "solids", 0, "file"),
+            "a.stl",
+            "torso.solids[0]: unknown field 'file'; did you mean 'size'? "
+            "(there are: name, shape, size, position, euler_deg)",
+        ),
+        ((*HIP, "axis"), [0, math.nan, 1], f"{AT_HIP}.axis: expected a number from -1000 to 1000, got nan"),
+        ((*HIP, "damping"), -1, f"{AT_HIP}.damping: expected a number from 0 to 1e+09, got -1"),
+        ((*HIP, "motor"), 120, f"{AT_HIP}.motor: expected an object with the fields of a Motor, got a number"),
+        ((*HIP, "motor", "gear"), math.inf, f"{AT_HIP}.motor.gear: expected a number from 1e-09 to 1e+09, got inf"),
+        ((*HIP, "motor", "gear"), 1e300, f"{AT_HIP}.motor.gear: expected a number from 1e-09 to 1e+09, got 1e+300"),
+        (
+            (*HIP, "range_deg"),
+            [30, -30],
+            f"{AT_HIP}.range_deg: expected low <= 0 <= high and low < high, got (30.0, -30.0)",
+        ),
+        (("legs", 2, "mount"), "here", "legs[2].mount: expected 3 numbers, got 'here'"),
+        (("legs", 2, "mount", 1), 10**400, "legs[2].mount: expected a number from -100 to 100, got inf"),
+        (("legs", 2, "name"), "l1", "legs: the name 'l1' occurs twice"),
+        (("legs", 2, "links"), [], "legs[2].links: expected 1 to 16 Links, got 0"),
+        (("legs", 2, "links", 1), None, "legs[2].links[1]: expected an object with the fields of a Link, got null"),
+        (("legs", 3, "foot", "radius"), True, "legs[3].foot.radius: expected a number, got True"),
+        (("legs", 3, "foot", "radius"), 1e-5, "legs: r2_foot: expected a radius from 0.0009, got 1e-05"),
+        (("simulation", "timestep"), 0.05, "simulation.contact_time: expected at least two timesteps, got 0.023094"),
+        (("legs",), [], "legs: expected 1 to 64 Legs, got 0"),
+        (("legs",), None, "legs: expected a list of Legs, got null"),
+        (("include",), "a.xml", f"unknown field 'include'; did you mean 'name'? (there are: {IN_BODY})"),
+    ],
+)
+def test_a_malformed_field_is_named_by_its_path(path, value, message):
+    with pytest.raises(SpecError) as error:
+        body_from_json(changed(path, value))
+    assert str(error.value) == message
+
+
+def leaves(value, path=()):
+    """Paths to everything in a spec that is no object."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        yield from leaves(item, (*path, key))
+    if path and not isinstance(value, dict):
+        yield path
+
+
+BAD = [None, "1", [], {}, True, math.nan, math.inf, -math.inf, 1e300, -1e300, "ä" * 40]
+
+
+def test_every_field_refuses_what_it_cannot_be():
+    """All leaves of a spec x values that none of them may have: hundreds of errors, each quick and one line."""
+    count, slowest = 0, 0.0
+    tracemalloc.start()
+    for path in leaves(SOUND):
+        place = SOUND
+        for key in path:
+            place = place[key]
+        for value in BAD:
+            # what is left open, or a name that happens to be allowed, is no mistake
+            if (value is None and path[-1] in ("armature", "damping")) or (value == "1" and path[-1] == "name"):
+                continue
+            text = changed(path, value)
+            start = time.perf_counter()
+            with pytest.raises(SpecError) as error:
+                body_from_json(text)
+            slowest = max(slowest, time.perf_counter() - start)
+            message = str(error.value)
+            assert "\n" not in message
+            assert len(message) < 250
+            assert str(next(key for key in reversed(path) if isinstance(key, str))) in message
+            count += 1
+    assert tracemalloc.get_traced_memory()[0] < 5e6
+    tracemalloc.stop()
+    assert count > 300
+    assert slowest < 5.0  # hangs only; the aim is 0.05
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a body in JSON: Expecting value: line 1 column 1 (char 0)"),
+        (json.dumps(SOUND)[:-40], "expected a body in JSON: "),
+        ("[1, 2]", "expected an object with the fields of a Body, got a list"),
+        ("7", "expected an object with the fields of a Body, got a number"),
+        ("[" * 200_000, "expected a body in JSON, got too many brackets within brackets"),
+        ('{"name": "a", "name": "b"}', "the key 'name' occurs twice in one object"),
+        ('{"na\\nme": 1}', "unknown field 'na\\nme'; did you mean 'name'?"),
+        (b"\xff\xfe\x00", "expected a body in JSON: "),
+        ('{"legs": ' + "1" * 10_000 + "}", "name: missing; a Body needs it"),
+        ('{"' + "x" * 100_000 + '": 1}', f"unknown field '{'x' * 40}'; did you mean "),
+    ],
+)
+def test_what_is_no_body_is_one_line(text, message):
+    with pytest.raises(SpecError) as error:
+        body_from_json(text)
+    assert str(error.value).startswith(message)
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_hold_no_body_are_named(tmp_path):
+    path = tmp_path / "body.json"
+    path.write_text(changed(("density",), 0))
+    with pytest.raises(SpecError) as error:
+        load_body(path)
+    assert str(error.value) == f"{path}: density: expected a number from 1e-09 to 1e+09, got 0"
+    path.write_text(" " * (MAX_BYTES + 1))
+    with pytest.raises(SpecError) as error:
+        load_body(path)
+    assert str(error.value) == f"{path}: expected at most {MAX_BYTES} bytes"
+    for missing, reason in ((tmp_path / "none.json", "no such file or directory"), (tmp_path, "is a directory")):
+        with pytest.raises(OSError, match="cannot read") as error:
+            load_body(missing)
+        assert str(error.value) == f"cannot read {missing}: {reason}"
+
+
+def test_a_million_legs_are_counted_not_built():
+    with pytest.raises(SpecError, match=r"^legs\[0\]: expected an object with the fields of a Leg, got a number$"):
+        body_from_json('{"name": "a", "torso": ' + json.dumps(SOUND["torso"]) + ', "legs": [' + "1," * 999_999 + "1]}")
+    legs = ROBOTS["queen"].legs[:1] * 1_000_000
+    with pytest.raises(SpecError, match=r"^Body\(queen\).legs: expected 1 to 64 Legs, got 1000000$"):
+        ROBOTS["queen"].replace(legs=legs)
+    assert isinstance(body_from_json(json.dumps(SOUND)), Body)

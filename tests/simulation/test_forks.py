@@ -1,0 +1,180 @@
+"""Forks: what was made before one says so in the child, and lets it live and end in peace."""
+
+import copy
+import gc
+import multiprocessing
+import os
+import pathlib
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+
+import arc_suite
+
+ROOT = pathlib.Path(__file__).parents[2]
+WATCHDOG = 30  # s
+
+# Makes something, forks, and reports from the child, which then ends as any script does. The child's
+# seconds are appended to the file that the variable TIMES names.
+SCRIPT = """
+import gc, os, signal, sys, time
+import gymnasium
+import numpy as np
+import arc_suite
+
+what, then = sys.argv[1:]
+if what == "vector environment":
+    thing = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=4, num_threads=4)
+    uses = {
+        "reset": thing.reset,
+        "step": lambda: thing.step(np.zeros((4, 18))),
+        "close": thing.close,
+    }
+else:
+    thing = arc_suite.load("tick", "walk")
+    uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros(18)), "render": thing.physics.render}
+thing.reset()
+uses["step"]()
+if what == "renderer":
+    thing.physics.render(32, 32)
+    def picture_of_a_new_one():
+        environment = arc_suite.load("tick", "walk")
+        environment.reset()
+        environment.physics.render(32, 32)
+    uses["new"] = picture_of_a_new_one
+if os.fork():
+    status = os.wait()[1]
+    thing.reset()
+    uses["step"]()  # the parent notices nothing
+    if what == "renderer":
+        thing.physics.render(32, 32)
+    sys.exit(status != 0)
+signal.alarm(20)  # ends a child that hangs
+start = time.perf_counter()
+if then == "use":
+    for name, use in uses.items():
+        try:
+            print(name, "returned", use())
+        except Exception as error:
+            print(name, f"{type(error).__name__}: {error}")
+elif then == "collect":
+    del thing, uses
+    gc.collect()
+print(f"{time.perf_counter() - start:.3f} s", file=open(os.environ["TIMES"], "a"))
+print("ends")
+"""
+MADE_BEFORE = (
+    "ForkError: this {} was made before a fork and cannot be used in the child process: "
+    "make it after the fork, or start processes with multiprocessing's spawn"
+)
+OPENED_BEFORE = (
+    "new RenderingUnavailable: cannot render: OpenGL was opened before this process was forked; "
+    "make no picture before the fork, or start processes with multiprocessing's spawn"
+)
+REFUSED = {
+    "environment": [f"{call} {MADE_BEFORE.format('environment')}" for call in ("reset", "step", "render")],
+    "renderer": [f"{call} {MADE_BEFORE.format('environment')}" for call in ("reset", "step", "render")]
+    + [OPENED_BEFORE],
+    "vector environment": [f"{call} {MADE_BEFORE.format('vector environment')}" for call in ("reset", "step")]
+    + ["close returned None"],
+}
+
+forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+
+
+@forks
+@pytest.mark.parametrize("then", ["use", "collect", "exit"])
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_was_made_before_a_fork(what, then):
+    environ = {"TIMES": os.devnull} | os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", SCRIPT, what, then]
+    done = subprocess.run(command, env=environ, capture_output=True, text=True, timeout=WATCHDOG)
+    expected = [*(REFUSED[what] if then == "use" else []), "ends"]
+    assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, expected, "")
+
+
+def rollout(seed, picture, sender=None):
+    """Return of a short episode of an environment made here, and a picture's mean."""
+    environment = arc_suite.load("tick", "walk", {"random": seed})
+    environment.reset()
+    total = sum(environment.step(np.zeros(18)).reward for _ in range(10))
+    result = total, float(environment.physics.render(32, 32).mean()) if picture else 0.0
+    if sender is not None:
+        sender.send(result)
+    return result
+
+
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+def test_environments_made_in_the_child_work(method):
+    context = multiprocessing.get_context(method)
+    picture = method != "fork"  # this process may have opened OpenGL
+    receiver, sender = context.Pipe(duplex=False)
+    child = context.Process(target=rollout, args=(3, picture, sender))
+    child.start()
+    sender.close()
+    assert receiver.poll(WATCHDOG)
+    assert receiver.recv() == rollout(3, picture)
+    child.join(WATCHDOG)
+    assert child.exitcode == 0
+
+
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+def test_async_vector_environments_work(method):
+    kwargs = {"vectorization_mode": "async", "vector_kwargs": {"context": method}}
+    envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2, **kwargs)
+    observations, _ = envs.reset(seed=5)
+    rewards = [envs.step(np.zeros((2, 18), np.float32))[1] for _ in range(3)]
+    envs.close()
+    for row in range(2):
+        env = gymnasium.make("arc_suite/tick-walk-v0")
+        np.testing.assert_array_equal(observations[row], env.reset(seed=5 + row)[0])
+        assert [float(reward[row]) for reward in rewards] == [env.step(np.zeros(18, np.float32))[1] for _ in range(3)]
+
+
+@forks
+def test_pictures_in_forked_children_of_a_process_that_made_none():
+    code = (
+        "import os, signal, sys, arc_suite\n"
+        "child = os.fork() == 0\n"
+        "signal.alarm(25)\n"
+        "environment = arc_suite.load('tick', 'walk', {'random': 0}); environment.reset()\n"
+        "picture = environment.physics.render(32, 32)\n"
+        "if child: sys.exit(int(picture.std() < 5))\n"
+        "sys.exit(os.wait()[1])\n"
+    )
+    environ = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], env=environ, capture_output=True, text=True, timeout=WATCHDOG)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@forks
+def test_a_copy_made_in_the_child_works():
+    environment = arc_suite.load("tick", "walk", {"random": 0})
+    environment.reset()
+    expected = copy.deepcopy(environment).step(np.zeros(18)).reward
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    pid = os.fork()
+    if pid == 0:
+        try:
+            sender.send(copy.deepcopy(environment).step(np.zeros(18)).reward)
+        finally:
+            os._exit(0)
+    assert receiver.poll(WATCHDOG)
+    assert receiver.recv() == expected
+    os.waitpid(pid, 0)
+
+
+def test_batches_are_destroyed_where_they_were_made():
+    from arc_suite.simulation import forks
+
+    gc.collect()
+    before = len(forks._threaded)
+    envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2)
+    assert len(forks._threaded) == before + 1
+    envs.close()
+    del envs
+    gc.collect()
+    assert len(forks._threaded) == before

@@ -1,0 +1,256 @@
+"""Rendering: one context for all, beside others that draw, and one line where OpenGL is missing."""
+
+import concurrent.futures
+import os
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import arc_suite
+from arc_suite import models
+from arc_suite.robots import ROBOTS
+
+ROOT = pathlib.Path(__file__).parents[2]
+
+# Imports, simulates and renders, and prints what came of it.
+SCRIPT = """
+import os
+before = dict(os.environ)
+import arc_suite
+changed = {name: value for name, value in os.environ.items() if before.get(name) != value}
+print("changed", changed, "removed", sorted(set(before) - set(os.environ)))
+environment = arc_suite.load("tick", "walk", {"random": 0})
+environment.reset()
+print("reward", environment.step([0.0] * 18).reward > 0)
+for _ in range(2):
+    try:
+        print("picture", environment.physics.render(height=48, width=64).shape)
+    except arc_suite.simulation.opengl.RenderingUnavailable as error:
+        print(f"{type(error).__name__}: {error}")
+print("reward", environment.step([0.0] * 18).reward > 0)
+"""
+
+# Stands in for a machine on which no OpenGL library is installed: Python finds none of them.
+WITHOUT_LIBRARIES = """
+import ctypes
+load = ctypes.CDLL.__init__
+def refuse(self, name, *args, **kwargs):
+    if "GL" in str(name) or "OSMesa" in str(name):
+        raise OSError(f"{name}: cannot open shared object file: No such file or directory")
+    load(self, name, *args, **kwargs)
+ctypes.CDLL.__init__ = refuse
+"""
+
+REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
+NO_DRIVER = {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}  # libEGL loads, and finds nobody to draw
+
+
+def run(tmp_path, sitecustomize="", **variables):
+    """Runs the script without a display; returns its lines, none of them on standard error."""
+    unset = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL")
+    environ = {name: value for name, value in os.environ.items() if name not in unset}
+    (tmp_path / "sitecustomize.py").write_text(sitecustomize)
+    environ |= {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])} | variables
+    done = subprocess.run(
+        [sys.executable, "-W", "default::UserWarning", "-c", SCRIPT], env=environ, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    return done.stdout.splitlines()
+
+
+def lines(outcome, changed=None):
+    return [f"changed {changed or {}} removed []", "reward True", outcome, outcome, "reward True"]
+
+
+def test_chooses_egl_where_there_is_no_display(tmp_path):
+    assert run(tmp_path) == lines("picture (48, 64, 3)", {"MUJOCO_GL": "egl"})
+
+
+def test_users_choice_stays(tmp_path):
+    assert run(tmp_path, MUJOCO_GL="egl") == lines("picture (48, 64, 3)")
+
+
+def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
+    assert run(tmp_path, DISPLAY=":9876") == lines("picture (48, 64, 3)")
+
+
+@pytest.mark.parametrize(
+    ("sitecustomize", "variables", "changed", "message"),
+    [
+        (WITHOUT_LIBRARIES, {}, None, f"cannot render: the OpenGL library is missing; {REMEDY}"),
+        (
+            WITHOUT_LIBRARIES,
+            {"MUJOCO_GL": "egl"},
+            None,
+            f"cannot render with MUJOCO_GL=egl: the OpenGL library is missing; {REMEDY}",
+        ),
+        (
+            "",
+            NO_DRIVER,
+            {"MUJOCO_GL": "egl"},
+            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
+        ),
+        (
+            "",
+            NO_DRIVER | {"MUJOCO_GL": "egl"},
+            None,
+            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
+        ),
+        (
+            "",
+            {"MUJOCO_GL": "disable"},
+            None,
+            "cannot render: MUJOCO_GL=disable turns it off; unset it, or set MUJOCO_GL=egl",
+        ),
+        (
+            "",
+            {"MUJOCO_GL": "glfw"},
+            None,
+            "cannot render with MUJOCO_GL=glfw: (65550) b'X11: The DISPLAY environment variable is missing'; " + REMEDY,
+        ),
+        (
+            "",
+            {"MUJOCO_GL": "vulkan"},
+            None,
+            "cannot render with MUJOCO_GL=vulkan: Environment variable MUJOCO_GL must be one of ['', '0', '1', "
+            "'disable', 'disabled', 'egl', 'enable', 'enabled', 'false', 'glfw', 'off', 'on', 'osmesa', 'true']: "
+            f"got 'vulkan'; {REMEDY}",
+        ),
+    ],
+    ids=["no library", "egl, no library", "no driver", "egl, no driver", "disable", "glfw, no display", "unknown"],
+)
+def test_simulates_without_opengl_and_says_what_is_missing(tmp_path, sitecustomize, variables, changed, message):
+    assert run(tmp_path, sitecustomize, **variables) == lines(f"RenderingUnavailable: {message}", changed)
+
+
+def script(code, *arguments):
+    """Runs code in a process of its own; returns its lines, none of them on standard error."""
+    environ = os.environ | {"PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code, *arguments], env=environ, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    return done.stdout.splitlines()
+
+
+def test_import_opens_nothing():
+    code = (
+        "import sys, threading, arc_suite, dm_control.suite\n"
+        "environment = arc_suite.load('tick', 'walk')\n"
+        "print(threading.active_count(), sorted(m for m in sys.modules if m.startswith('dm_control._render')))\n"
+        "environment.physics.render(32, 32)\n"
+        "print(threading.active_count(), sys.modules['dm_control._render'].BACKEND)"
+    )
+    assert script(code) == ["1 ['dm_control._render']", "2 egl"]
+
+
+# Draws beside others that use OpenGL in this process, and leaves all of it to the interpreter's exit.
+NEIGHBOURS = """
+import sys
+if sys.argv[1] == "first":
+    import dm_control.suite
+import arc_suite
+import dm_control.suite
+import numpy as np
+other = dm_control.suite.load("cartpole", "swingup", {"random": 0}); other.reset()
+environment = arc_suite.load("tick", "walk", {"random": 0}); environment.reset()
+pictures = [(environment.physics.render(48, 64), other.physics.render(48, 64)) for _ in range(3)]
+for ours, others in pictures:
+    assert np.array_equal(ours, pictures[0][0]) and np.array_equal(others, pictures[0][1])
+assert pictures[0][0].std() > 5 < pictures[0][1].std()
+import dm_control._render
+print(dm_control._render.BACKEND)
+"""
+
+
+@pytest.mark.parametrize("order", ["first", "last"])
+def test_dm_control_draws_in_the_same_process(order, monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    assert script(NEIGHBOURS, order) == ["egl"]
+
+
+def test_pictures_are_those_of_a_context_of_ones_own():
+    from dm_control.mujoco import Physics  # after arc_suite, which chooses the backend
+
+    environments = [arc_suite.load(robot, "walk", {"random": 0}) for robot in ("queen", "tick")]
+    for environment in environments:
+        environment.reset()
+    for height, width in ((120, 60), (60, 120)):  # grows in one direction, then in the other
+        for environment in environments:
+            own = Physics.from_xml_string(models.assemble(environment.task.body, decorated=True).to_xml_string())
+            own.set_state(environment.physics.get_state())
+            own.forward()
+            for depth in (False, True):
+                picture = environment.physics.render(height, width, "portrait", depth=depth)
+                np.testing.assert_array_equal(picture, own.render(height, width, "portrait", depth=depth))
+            own.free()
+
+
+def test_threads_draw_what_one_thread_draws():
+    def pictures(robot):
+        environment = arc_suite.load(robot, "walk", {"random": 0})
+        environment.reset()
+        size = environment.action_spec().shape
+        return [(environment.step(np.zeros(size)).reward, environment.physics.render(48, 64)) for _ in range(3)]
+
+    robots = [*ROBOTS]
+    with concurrent.futures.ThreadPoolExecutor(len(robots)) as pool:
+        together = list(pool.map(pictures, robots))
+    for robot, drawn in zip(robots, together, strict=True):
+        for (reward, picture), (own_reward, own_picture) in zip(drawn, pictures(robot), strict=True):
+            assert reward == own_reward
+            np.testing.assert_array_equal(picture, own_picture)
+
+
+def test_a_callback_may_draw():
+    environment = arc_suite.load("tick", "walk")
+    environment.reset()
+    inner = []
+    environment.physics.render(48, 64, scene_callback=lambda *_: inner.append(environment.physics.render(24, 32)))
+    assert inner[0].shape == (24, 32, 3)
+
+
+def test_pictures_while_the_interpreter_ends_are_refused():
+    code = (
+        "import atexit, sys, arc_suite\n"
+        "environment = arc_suite.load('tick', 'walk')\n"
+        "def late():\n"
+        "    try: environment.physics.render(32, 32)\n"
+        "    except arc_suite.simulation.opengl.RenderingUnavailable as error: print(error)\n"
+        "atexit.register(late)\n"
+        "environment.physics.render(32, 32)\n"
+    )
+    assert script(code) == ["cannot render: the interpreter is ending, and has closed OpenGL"]
+
+
+def test_mistakes_in_drawing_arrive_as_they_are():
+    environment = arc_suite.load("tick", "walk")
+    environment.reset()
+    with pytest.raises(ValueError, match="cannot both be `True`"):
+        environment.physics.render(48, 64, depth=True, segmentation=True)
+    with pytest.raises(ZeroDivisionError):
+        environment.physics.render(48, 64, scene_callback=lambda *_: 1 / 0)
+    assert environment.physics.render(48, 64).std() > 5
+
+
+# Memory of many environments that render; what the interpreter and the first picture take is in the first figure.
+MANY = """
+import sys, arc_suite
+def memory():  # MB
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096 / 1e6
+kept = []
+for count in map(int, sys.argv[1:]):
+    while len(kept) < count:
+        kept.append(arc_suite.load("queen", "walk"))
+        kept[-1].reset()
+        kept[-1].physics.render(480, 640)
+    print(count, memory())
+"""
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="reads memory from Linux's /proc")
+def test_a_further_rendering_environment_costs_little():
+    few, many = (float(line.split()[1]) for line in script(MANY, "2", "12"))
+    assert (many - few) / 10 < 8

@@ -1,0 +1,58 @@
+"""Pictures of tracks."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from synthetic import DT, synthetic
+
+import arc_suite
+from arc_suite.cpg import Demonstrator
+from arc_suite.style import record
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_pictures(tmp_path, count):
+    from arc_suite.style.plots import PICTURES
+
+    tracks = {"left": synthetic(late=(0, 2, 0, 0)), "right": synthetic(course=math.pi / 2, dragged=0)}
+    tracks = dict(list(tracks.items())[:count])
+    assert list(PICTURES) == ["gait", "reward", "speed", "path"]
+    for name, draw in PICTURES.items():
+        draw(tracks).savefig(tmp_path / f"{name}.png")
+        assert (tmp_path / f"{name}.png").stat().st_size > 5000
+
+
+def test_gait_diagram_shows_stance_and_schedule():
+    from matplotlib.colors import to_hex
+
+    from arc_suite.style.plots import BLUE, PALE, VERMILION, gait
+
+    track = synthetic(late=(0, 4, 0, 0))
+    (axis,) = gait({"a": track}).axes
+    seconds = dict.fromkeys((PALE, BLUE, VERMILION), 0.0)
+    for bars in axis.collections:
+        if bars.get_paths():
+            widths = [np.ptp(bar.vertices[:, 0]) for bar in bars.get_paths()]
+            seconds[to_hex(bars.get_facecolor()[0]).upper()] += sum(widths)
+    # Four seconds are five cycles of 16 steps; each of four feet shall stand for 8 of them, one is 4 late.
+    assert seconds == pytest.approx({PALE: 20 * 8 * DT, BLUE: (20 * 8 - 5 * 4) * DT, VERMILION: 5 * 4 * DT})
+    texts = [text.get_text() for text in axis.texts]
+    assert "50 %" in texts
+    assert "+0.25 cycles" in texts
+    assert "duty factor\n(0.50 wanted)" in texts
+
+
+def test_pictures_of_a_track_of_one_step():
+    from arc_suite.style.plots import PICTURES
+
+    track = record(arc_suite.load("tick", "walk"), Demonstrator("tick"), seed=0, max_steps=1)
+    for draw in PICTURES.values():
+        draw({"a": track})
+
+
+def test_metrics_come_without_matplotlib():
+    code = "import sys, arc_suite.style; print('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"

@@ -1,0 +1,166 @@
+"""tools/style.py, run as a user runs it."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+from arc_suite import data, style
+from arc_suite.robots import ROBOTS
+from arc_suite.style import METRICS
+
+ROOT = pathlib.Path(__file__).parents[2]
+TOOL, SPIDER = ROOT / "tools" / "style.py", ROOT / "examples" / "spider.json"
+FROZEN = """
+import numpy as np
+def frozen(robot): return lambda time_step: np.zeros({"tick": 18, "leaper": 12}[robot])
+def broken(robot): return lambda time_step: np.full(12, np.nan)
+"""
+
+
+def run(*arguments, path=""):
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(path), os.environ.get("PYTHONPATH", "")])}
+    return subprocess.run([sys.executable, TOOL, *arguments], capture_output=True, text=True, env=environment)
+
+
+def test_report_of_two_policies(tmp_path):
+    (tmp_path / "own_walkers.py").write_text(FROZEN)
+    figures, folder = tmp_path / "style.json", tmp_path / "pictures" / "leaper"
+    done = run(
+        "--robot=leaper",
+        "--compare=own_walkers:frozen",
+        "--episodes=2",
+        f"--json={figures}",
+        f"--output={folder}",
+        path=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[1].split() == ["leaper", "unit", "prescribed", "cpg", "medium", "own_walkers:frozen"]
+    rows = {line[:18].strip(): line[18:].split() for line in reversed(lines)}
+    assert {name.replace("_", " ") for name in METRICS} <= rows.keys()
+    assert rows["speed"][:2] == ["m/s", "0.600"]
+    assert [float(field) for field in rows["speed"][2::3]] == pytest.approx([0.59, 0.0], abs=0.03)
+    assert rows["duty factor"][0] == "0.600"
+    assert rows["foot slip"][-1] == "inf"
+    assert lines.count("") == 3  # above the robot's table, and two of legs
+
+    report = json.loads(figures.read_text(), parse_constant=pytest.fail)
+    assert (report["episodes"], report["seed"], list(report["robots"])) == (2, 0, ["leaper"])
+    assert set(report["versions"]) == {"arc_suite", "mujoco", "dm_control", "numpy"}
+    cpg, frozen = report["robots"]["leaper"].values()
+    assert cpg["return"]["mean"] == pytest.approx(2610, abs=150)
+    assert cpg["metrics"].keys() == METRICS.keys()
+    assert cpg["metrics"]["stride_length"]["unit"] == "m"
+    assert cpg["metrics"]["stride_length"]["prescribed"] == 0.5
+    assert cpg["metrics"]["foot_slip"]["legs"].keys() == {"fl", "fr", "rl", "rr"}
+    assert frozen["metrics"]["cost_of_transport"]["robot"]["mean"] is None
+    assert frozen["metrics"]["torque"]["robot"]["mean"] == 0.0
+    assert sorted(path.name for path in folder.iterdir()) == ["gait.png", "path.png", "reward.png", "speed.png"]
+
+
+def test_a_saved_body_beside_a_policy(tmp_path):
+    saved, figures = tmp_path / "spider.npz", tmp_path / "style.json"
+    done = run(f"--spec={SPIDER}", "--episodes=2", "--seed=4", f"--save={saved}", f"--json={figures}")
+    assert done.returncode == 0, done.stderr
+    assert [(track.body.name, track.seed) for track in style.load(saved)] == [("spider", 4), ("spider", 5)]
+
+    recorded = json.loads(figures.read_text())["robots"]["spider"]["cpg medium"]
+
+    compared = run(f"--policy={saved}", "--compare=zero", "--episodes=3", f"--json={figures}")
+    assert compared.returncode == 0, compared.stderr
+    report = json.loads(figures.read_text())["robots"]["spider"]
+    assert report["spider.npz"] == recorded
+    assert report["zero"]["return"]["episodes"] == 3
+    both = run(f"--spec={SPIDER}", f"--policy={saved}", "--episodes=1")
+    assert both.returncode == 0, both.stderr
+    twin = tmp_path / "twin" / "spider.npz"
+    twin.parent.mkdir()
+    twin.write_bytes(saved.read_bytes())
+    twins = run(f"--policy={saved}", f"--compare={twin}", "--episodes=1")
+    assert twins.stdout.splitlines()[1].split()[-2:] == [str(saved), str(twin)]
+    for robot in ("tick", "all"):
+        other = run(f"--policy={saved}", f"--robot={robot}")
+        message = f"style.py: {saved}: expected tracks of {'queen' if robot == 'all' else robot}, got those of spider\n"
+        assert (other.returncode, other.stdout, other.stderr) == (1, "", message)
+
+
+def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    data.collect(
+        "arc_suite/tick/noisy-v0", data.Settings(ROBOTS["tick"], "cpg", ("medium",), 0.2, steps=50), episodes=2
+    )
+    done = run("--policy=arc_suite/tick/noisy-v0", "--compare=cpg", "--episodes=2", f"--output={tmp_path}")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[1].split() == ["tick", "unit", "prescribed", "arc_suite/tick/noisy-v0", "cpg", "medium"]
+    change = next(line for line in lines if line.startswith("action change")).split()[2::3]
+    assert float(change[0]) > float(change[1]) + 0.05
+
+
+def test_datasets_without_minari_say_what_to_install(tmp_path):
+    (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
+    done = run("--policy=arc_suite/tick/noisy-v0", path=tmp_path)
+    message = "datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')"
+    assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
+
+
+def test_all_robots(tmp_path):
+    done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
+    assert done.returncode == 0, done.stderr
+    headings = [line.split(maxsplit=1)[0] for line in done.stdout.splitlines() if "prescribed" in line]
+    assert headings == [name for robot in ROBOTS for name in (robot, f"{robot},")]
+    assert sorted(str(path.relative_to(tmp_path)) for path in tmp_path.glob("*/*")) == sorted(
+        f"{robot}/{name}.png" for robot in ROBOTS for name in ("gait", "path", "reward", "speed")
+    )
+
+
+def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
+    (tmp_path / "matplotlib.py").write_text("raise ModuleNotFoundError(\"No module named 'matplotlib'\")")
+    done = run(f"--output={tmp_path}", path=tmp_path)
+    message = "pictures need matplotlib: pip install 'arc_suite[plot]' (No module named 'matplotlib')"
+    assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (
+            ["--robot=quen"],
+            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper, all)",
+        ),
+        (["--compare=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
+        (["--compare=cpg"], "--compare: expected another one than 'cpg medium'"),
+        (["--compare=none.npz"], "cannot read none.npz: no such file or directory"),
+        (["--save=tracks.json"], "--save=tracks.json: expected a file that ends in .npz"),
+        (["--save=a.npz", "--robot=all"], "--save=a.npz: expected one robot, got queen, bastion, tick, leaper"),
+        (["--save=nowhere/a.npz"], "cannot write nowhere/a.npz: no such file or directory"),
+        ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot beside --spec or --legs"),
+        (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
+        (
+            ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],
+            "policy 'own_walkers:broken': episode of seed 0: action[0]: expected a number from -1 to 1, got nan",
+        ),
+        ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
+        (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
+        ([f"--output={TOOL}"], f"cannot make folder {TOOL}: file exists"),
+        (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
+    (tmp_path / "own_walkers.py").write_text(FROZEN)
+    done = run(*arguments, path=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == f"style.py: {message}"  # on a line that a progress bar has left
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+
+
+def test_help_shows_an_example_and_the_flags():
+    done = run("--help")
+    assert "python tools/style.py --robot queen" in done.stdout
+    for flag in ("robot", "spec", "policy", "preset", "compare", "episodes", "seed", "json", "output", "save"):
+        assert f"--{flag}" in done.stdout

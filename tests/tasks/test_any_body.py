@@ -1,0 +1,216 @@
+"""Any body walks: the task is fitted to it and a demonstrator needs no tuning."""
+
+import json
+import math
+import pickle
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+import arc_suite
+from arc_suite import models, policies
+from arc_suite.cpg import Demonstrator
+from arc_suite.models.standing import stance
+from arc_suite.robots import ROBOTS, gaits, generator
+from arc_suite.robots.spec_files import body_to_json, load_body
+from arc_suite.tasks.fitting import fitted_gait, least_margin
+from arc_suite.tasks.walk import settings
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = sorted((ROOT / "examples").glob("*.json"))
+BODY = generator.generate(6, 3)
+
+
+def unit(body):
+    """sqrt(g h), the speed that speeds are measured in."""
+    return math.sqrt(9.81 * body.torso.standing_height)
+
+
+def track(body, seconds, demonstrator=None, **kwargs):
+    """Positions (n, 2) of the torso from control step to control step; the body must not fall."""
+    kwargs = {"time_limit": seconds, "random": 0, "joint_noise": 0.0, "base_noise": 0.0} | kwargs
+    environment = arc_suite.load(body, "walk", kwargs)
+    demonstrator = demonstrator or Demonstrator(body)
+    step, positions = environment.reset(), [environment.physics.position()[:2].copy()]
+    while not step.last():
+        step = environment.step(demonstrator(step))
+        positions.append(environment.physics.position()[:2].copy())
+    assert step.discount == 1.0
+    return np.array(positions)
+
+
+def speed(body, seconds=8.0, demonstrator=None, **kwargs):
+    """Mean forward speed in sqrt(g h) over the second half of a walk."""
+    positions = track(body, seconds, demonstrator, **kwargs)
+    half = len(positions) // 2
+    return (positions[-1, 0] - positions[half, 0]) / (seconds * (1.0 - half / (len(positions) - 1))) / unit(body)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_walk(path):
+    body = load_body(path)
+    seconds = 25.0 / math.sqrt(9.81 / body.torso.standing_height)
+    positions = track(body, seconds, joint_noise=0.05)
+    forward, sideways = positions[-1] - positions[0]
+    assert forward > 0.1 * unit(body) * seconds
+    assert abs(sideways) < 0.2 * forward
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_random_bodies_walk(seed):
+    body = generator.random_body(seed)
+    assert speed(body, joint_noise=0.05, random=seed) > 0.1
+
+
+def test_the_gait_makes_the_walk():
+    in_phase = Demonstrator(BODY, gait=gaits.Gait(0.6, (0.0,) * 6))
+    assert speed(BODY, demonstrator=in_phase) < 0.05
+    assert speed(BODY) > 0.17
+
+
+def test_speed_has_one_knob_that_goes_both_ways():
+    speeds = [speed(BODY, demonstrator=Demonstrator(BODY, froude=froude)) for froude in (-0.25, 0.1, 0.2, 0.3)]
+    assert speeds[0] < -0.15
+    assert 0.05 < speeds[1] < speeds[2] - 0.05 < speeds[3] - 0.1
+    presets = [speed(BODY, demonstrator=Demonstrator(BODY, preset)) for preset in ("slow", "medium", "fast")]
+    assert presets == sorted(presets)
+
+
+def test_mirrored_bodies_walk_mirrored_tracks():
+    body = generator.random_body(6)  # unequal, and drifting to a side
+    gait = fitted_gait(body)
+    positions = track(body, 6.0, Demonstrator(body, gait=gait))
+    mirrored = track(body.mirrored(), 6.0, Demonstrator(body.mirrored(), gait=gait))
+    assert np.ptp(positions[:, 1]) > 1e-3 * body.torso.standing_height
+    np.testing.assert_allclose(mirrored * (1.0, -1.0), positions, atol=1e-6)
+
+
+def test_bodies_of_one_shape_walk_alike():
+    walks = [(generator.scaled(BODY, scale), 8.0 * math.sqrt(scale)) for scale in (1.0, 2.0, 0.12, 12.5)]
+    speeds = [speed(body, seconds) for body, seconds in walks]  # 5 cm to 5 m high
+    assert speeds == pytest.approx([speeds[0]] * 4, rel=0.02)
+
+
+def test_an_episode_has_a_thousand_steps_whatever_the_size():
+    for scale in (0.15, 1.0, 7.3):
+        environment = arc_suite.load(generator.scaled(BODY, scale), "walk")
+        environment.reset()
+        action = np.zeros(environment.action_spec().shape)
+        environment._step_count = 997
+        lasts = [environment.step(action).last() for _ in range(3)]
+        assert lasts == [False, False, True]
+
+
+def test_a_domain_is_a_name_a_body_or_a_file(tmp_path):
+    path = tmp_path / "body.json"
+    path.write_text(body_to_json(BODY))
+    for domain in (BODY, path, str(path)):
+        environment = arc_suite.load(domain, "walk", {"random": 3})
+        step = environment.reset()
+        assert environment.task.body == BODY
+        size = sum(np.size(block) for block in step.observation.values())
+        assert size == 13 + 2 * 18 + 6 * 25
+    for domain, error, message in (
+        (
+            "queeen",
+            ValueError,
+            "unknown domain 'queeen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
+        ),
+        (str(tmp_path / "a.json"), OSError, f"cannot read {tmp_path / 'a.json'}: no such file or directory"),
+    ):
+        with pytest.raises(error) as caught:
+            arc_suite.load(domain, "walk")
+        assert str(caught.value) == message
+    with pytest.raises(ValueError, match="^unknown task 'run'; did you mean 'walk'"):
+        arc_suite.load(BODY, "run")
+
+
+def test_settings_are_fitted_by_the_documented_formulas():
+    body = generator.scaled(BODY, 2.0)  # 0.8 m high
+    parameters, weights, base_noise, joint_noise = settings(body, {})
+    assert parameters.target_velocity == pytest.approx(0.2 * math.sqrt(9.81 * 0.8))
+    assert parameters.velocity_band == pytest.approx(0.75 * parameters.target_velocity)
+    assert parameters.gait_frequency == pytest.approx(0.18 * math.sqrt(9.81 / 0.8))
+    assert parameters.stance_threshold == pytest.approx(0.048 + 0.04 * 0.8)
+    assert parameters.healthy_range == pytest.approx((0.32, 1.44))
+    assert parameters.duty_factor == 0.6
+    expected = 2.0 * math.pi * np.array(gaits.metachronal(body, 0.6).offsets)
+    assert parameters.phase_offsets == pytest.approx(expected)
+    assert (base_noise, joint_noise) == (pytest.approx(0.04), 0.1)
+    assert weights == settings(ROBOTS["queen"], {}).weights
+    changed = settings(body, {"target_velocity": 1.0, "healthy_range": (0.1, 2.0), "weights": {"control": -1.0}})
+    assert changed.parameters.target_velocity == 1.0
+    assert changed.parameters.healthy_range == (0.1, 2.0)
+    assert changed.weights["control"] == -1.0
+    with pytest.raises(ValueError, match="^unknown setting of walk 'target_speed'; did you mean 'target_velocity'"):
+        settings(body, {"target_speed": 1.0})
+
+
+def test_a_changed_robot_is_a_body_like_any_other():
+    queen = ROBOTS["queen"]
+    heavier = queen.replace(density=11.0)
+    assert settings(heavier, {}).parameters.target_velocity == pytest.approx(0.2 * unit(queen))
+    assert settings(queen, {}).parameters.target_velocity == 0.5
+
+
+def test_the_fitted_gait_is_the_fastest_that_never_tips():
+    quadruped = generator.generate(4, 3)
+    gait = fitted_gait(quadruped)
+    assert gait.duty_factor >= 0.75
+    assert least_margin(quadruped, gait) > 0.0
+    assert least_margin(quadruped, gaits.metachronal(quadruped, 0.6)) < 0.0
+    assert fitted_gait(BODY).duty_factor == 0.6
+    assert least_margin(BODY, fitted_gait(BODY)) >= 0.05 * 0.4
+
+
+def test_a_demonstrator_serves_batches_and_every_form_of_observation():
+    environments = [arc_suite.load(BODY, "walk", {"random": seed}) for seed in range(3)]
+    singles = [Demonstrator(BODY) for _ in environments]
+    batch = pickle.loads(pickle.dumps(Demonstrator(BODY)))
+    steps = [environment.reset() for environment in environments]
+    for _ in range(30):
+        flat = [np.concatenate([np.ravel(block) for block in step.observation.values()]) for step in steps]
+        actions = [policy(step) for policy, step in zip(singles, steps, strict=True)]
+        np.testing.assert_array_equal(batch(np.stack(flat)), actions)
+        assert np.abs(actions).max() <= 1.0
+        steps = [environment.step(action) for environment, action in zip(environments, actions, strict=True)]
+
+
+def test_what_a_demonstrator_cannot_do_is_one_line():
+    for arguments, message in (
+        ({"robot": "queen", "froude": 0.2}, "froude: queen has presets alone: slow, medium, fast, tuned"),
+        ({"robot": BODY, "froude": 0.0}, "froude: expected a number from 0.001 to 1, or negative, got 0.0"),
+        ({"robot": BODY, "froude": math.nan}, "froude: expected a number from 0.001 to 1, or negative, got nan"),
+    ):
+        with pytest.raises(ValueError) as error:
+            Demonstrator(**arguments)
+        assert str(error.value) == message
+    with pytest.raises(ValueError, match="^unknown preset 'quick'"):
+        Demonstrator(BODY, "quick")
+    assert policies.policy("zero", BODY)(None).shape == (18,)
+
+
+@pytest.mark.parametrize("seed", range(100, 110))
+def test_random_actions_upset_no_body(seed):
+    body = generator.random_body(seed)
+    model = mujoco.MjModel.from_xml_string(models.assemble(body).to_xml_string())
+    data = mujoco.MjData(model)
+    rng = np.random.default_rng(seed)
+    while data.time < 0.5:
+        data.ctrl[:] = rng.uniform(-1.0, 1.0, model.nu)
+        mujoco.mj_step(model, data, 25)
+    assert not any(warning.number for warning in data.warning)
+    assert np.isfinite(data.qpos).all()
+
+
+def test_one_link_legs_are_built_and_stand():
+    body = generator.generate(6, 1)
+    assert stance(body).margin > 0.08 * body.torso.standing_height
+    track(body, 4.0)  # no promise that it walks
+
+
+def test_specs_in_examples_are_plain_json():
+    for path in EXAMPLES:
+        assert set(json.loads(path.read_text())) <= {"name", "torso", "legs", "density", "ballast"}

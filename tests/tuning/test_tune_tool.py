@@ -1,0 +1,88 @@
+"""tools/tune_cpg.py searches, goes on when it was broken off, and judges what it found."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import imageio.v3 as imageio
+import pytest
+
+TOOL = Path(__file__).parents[2] / "tools" / "tune_cpg.py"
+QUICK = ("--robot=bastion", "--steps=20", "--starts=8", "--resets=2")
+
+
+def command(*arguments):
+    return [sys.executable, TOOL, *QUICK, *map(str, arguments)]
+
+
+def tune(*arguments):
+    return subprocess.run(command(*arguments), capture_output=True, text=True)
+
+
+def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
+    straight, broken = tmp_path / "straight", tmp_path / "broken"
+    done = tune("--generations=4", f"--output={straight}")
+    process = subprocess.Popen(
+        command("--generations=100000", f"--output={broken}"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    journal = broken / "journal.jsonl"
+    deadline = time.monotonic() + 60.0
+    while not (journal.exists() and journal.read_bytes().count(b"\n") >= 3) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:3]) + lines[1][:30])  # two generations, and a third that was being written
+    again = tune("--generations=4", f"--output={broken}")
+    assert (again.returncode, again.stdout) == (done.returncode, done.stdout)
+    for name in ("journal.jsonl", "result.json"):
+        assert (broken / name).read_bytes() == (straight / name).read_bytes()
+
+    result = json.loads((straight / "result.json").read_text())
+    tuned, medium = result["figures"]["tuned"], result["figures"]["medium"]
+    worse = [cost for cost in ("posture", "smoothness", "tilt") if tuned[cost] > medium[cost]]
+    assert done.returncode == (1 if worse or tuned["falls"] else 0)
+    broken = "tune_cpg.py: the result breaks its constraints: "
+    assert [cost for cost in worse if cost not in done.stderr.partition(broken)[2]] == []
+    assert (result["robot"], result["generations"], result["resets"]) == ("bastion", 4, 2)
+    assert tuned["return"]["mean"] > medium["return"]["mean"]
+    assert result["versions"]["mujoco"].startswith("3.17")
+    picture = imageio.imread(straight / "course.png")
+    assert picture.shape[0] > 500 and picture.std() > 10.0
+
+    lines = done.stdout.splitlines()
+    assert lines[0].split() == ["preset", "return", "falls", "of", "2", "posture", "smoothness", "tilt"]
+    assert [line.split()[0] for line in lines[2:4]] == ["tuned", "medium"]
+    assert lines[5].startswith("Preset(stiffness=")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'?"),
+        (["--generations=0"], "flag --generations=0: 0 is not a positive integer"),
+        (["--steps=1001"], "flag --steps=1001: "),
+        (["queen"], "unexpected argument 'queen'; see --help"),
+        (["--output=/dev/null/tune"], "cannot make folder /dev/null/tune: not a directory"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, message):
+    done = tune(*arguments)
+    assert done.returncode == 1
+    assert done.stderr.startswith(f"tune_cpg.py: {message}")
+    assert done.stderr.count("\n") == 1
+    assert done.stdout == ""
+
+
+def test_another_search_in_the_folder_is_refused(tmp_path):
+    tune("--generations=1", f"--output={tmp_path}")
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert sorted(before) == ["course.png", "journal.jsonl", "result.json"]
+    done = tune("--generations=2", "--seed=7", f"--output={tmp_path}")
+    assert done.returncode == 1
+    message = "of a search with seed 0, not 7; delete it or write to another folder"
+    assert done.stderr == f"tune_cpg.py: {tmp_path}/journal.jsonl: {message}\n"
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -1,0 +1,126 @@
+"""The walk as one would write it without this suite: a Gymnasium `MujocoEnv` over the robot's XML file."""
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.envs.mujoco import MujocoEnv
+
+from arc_suite import models, registry
+from arc_suite.robots import ROBOTS
+
+
+def full_model(robot: str):
+    """The robot's model as a file would hold it: decorated, and with MuJoCo's islands on, as they are by default."""
+    root = models.assemble(ROBOTS[robot], decorated=True)
+    root.option.flag.island = "enable"
+    return root
+
+
+def register(robot: str, xml_file: str) -> str:
+    """Registers the robot's ordinary environment.
+
+    Args:
+        robot: queen, bastion, tick or leaper.
+        xml_file: holds `full_model`.
+
+    Returns:
+        Its id.
+    """
+    env_id = f"ordinary/{robot}-walk-v0"
+    gymnasium.register(
+        env_id,
+        entry_point="arc_suite.benchmark.ordinary:OrdinaryEnv",
+        max_episode_steps=1000,
+        kwargs={"robot": robot, "xml_file": xml_file},
+    )
+    return env_id
+
+
+class OrdinaryEnv(MujocoEnv):
+    """The paper's reward and observation in the manner of Gymnasium's own MuJoCo environments."""
+
+    metadata = {"render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"], "render_fps": 20}
+
+    def __init__(self, robot: str, xml_file: str, terminate_when_unhealthy: bool = True, **kwargs):
+        """Loads the model.
+
+        Args:
+            robot: whose numbers to take.
+            xml_file: the model.
+            terminate_when_unhealthy: whether a fall ends the episode.
+            **kwargs: of `MujocoEnv`.
+        """
+        super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
+        settings = registry.load(robot, "walk").task.settings
+        self._weights, self._numbers = settings.weights, settings.parameters
+        self._base_noise, self._joint_noise = settings.base_noise, settings.joint_noise
+        self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
+        self._terminate_when_unhealthy = terminate_when_unhealthy
+        self._begin()
+        size = self._get_obs().size
+        self.observation_space = spaces.Box(low=-np.inf, high=np.inf, shape=(size,), dtype=np.float64)
+
+    def _begin(self):
+        self._phase = 0.0
+        self._previous_action = np.zeros(self.model.nu)
+
+    @property
+    def contact_forces(self):
+        return np.clip(self.data.cfrc_ext, -1.0, 1.0)
+
+    @property
+    def is_healthy(self):
+        low, high = self._numbers.healthy_range
+        return low <= self.data.qpos[2] <= high
+
+    def step(self, action):
+        action = np.clip(action, -1.0, 1.0)
+        x_before = self.data.qpos[0]
+        self.do_simulation(action, self.frame_skip)
+        x_velocity = (self.data.qpos[0] - x_before) / self.dt
+        self._phase = (self._phase + 2 * np.pi * self._numbers.gait_frequency * self.dt) % (2 * np.pi)
+
+        observation = self._get_obs()
+        reward, terms = self._get_rew(x_velocity, action)
+        terminated = self._terminate_when_unhealthy and not self.is_healthy
+        self._previous_action = action
+        if self.render_mode == "human":
+            self.render()
+        return observation, reward, terminated, False, {"reward_terms": terms}
+
+    def _get_rew(self, x_velocity, action):
+        numbers = self._numbers
+        stance = self.data.xpos[self._feet, 2] < numbers.stance_threshold
+        wanted = (self._phase + numbers.phase_offsets) % (2 * np.pi) < 2 * np.pi * numbers.duty_factor
+        wrong_feet = np.sum(stance != wanted)
+        angles = self.data.qpos[7:]
+        terms = {
+            "forward": max(0.0, 1.0 - abs(x_velocity - numbers.target_velocity) / numbers.velocity_band),
+            "healthy": float(self.is_healthy),
+            "gait_bonus": 1.0 - wrong_feet / len(self._feet),
+            "gait_cost": float(wrong_feet),
+            "control": np.sum(np.square(action)),
+            "smoothness": np.sum(np.square(action - self._previous_action)),
+            "contact": np.sum(np.square(self.contact_forces)),
+            "angular_velocity": np.sum(np.square(self.data.qvel[3:5])),
+            "vertical_velocity": np.square(self.data.qvel[2]),
+            "posture": np.sum(np.square(angles - numbers.default_angles)),
+        }
+        return sum(self._weights[name] * term for name, term in terms.items()), terms
+
+    def _get_obs(self):
+        position = self.data.qpos.flatten()[2:]
+        velocity = self.data.qvel.flatten()
+        contact_forces = self.contact_forces[1:].flatten()
+        clock = np.array([np.sin(self._phase), np.cos(self._phase)])
+        return np.concatenate((position, velocity, contact_forces, clock))
+
+    def reset_model(self):
+        base, joint = self._base_noise, self._joint_noise
+        scale = np.array([base] * 6 + [joint] * (self.model.nv - 6))
+        qpos = self.init_qpos + self.np_random.uniform(-1.0, 1.0, self.model.nq) * np.insert(scale, 0, base)
+        qpos[3:7] /= np.linalg.norm(qpos[3:7])
+        qvel = self.init_qvel + scale * self.np_random.standard_normal(self.model.nv)
+        self.set_state(qpos, qvel)
+        self._begin()
+        return self._get_obs()
