@@ -1,1 +1,11 @@
-"""Where creatures walk: the geometry of the ground and its height."""
+"""Where bodies move: name -> the arena that suits a body."""
+
+from arc_suite.arenas import bumps
+from arc_suite.arenas.arena import Arena
+from arc_suite.arenas.flat import Flat
+
+FLAT = Flat()
+
+ARENAS = {"flat": lambda body: FLAT, "bumps": bumps.fitted}
+
+__all__ = ["ARENAS", "FLAT", "Arena"]

@@ -1,13 +1,29 @@
-"""What a body walks on. An arena writes its geoms into a model that holds the body."""
+"""Flat: an endless level floor."""
+
+import dataclasses
 
 from dm_control import mjcf
 
-from arc_suite.models import builder
-from arc_suite.robots.spec import Simulation
+from arc_suite.arenas.arena import Arena
 
 
-def add_floor(root: mjcf.RootElement, simulation: Simulation) -> None:
-    """Adds `floor`, an endless flat plane at height 0."""
-    root.worldbody.add(
-        "geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **builder.contact(simulation)
-    )
+@dataclasses.dataclass(frozen=True)
+class Flat(Arena):
+    """The plane z = 0."""
+
+    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+        """Add the plane `floor`."""
+        root.worldbody.add("geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **contact)
+
+    def height(self, x, y):
+        """Return 0 for every point."""
+        return 0.0 * x
+
+    def clearance(self, points):
+        """Return z, whose bits no subtraction could change."""
+        return points[..., 2]
+
+    @property
+    def is_level(self) -> bool:
+        """True."""
+        return True

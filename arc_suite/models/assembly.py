@@ -1,17 +1,18 @@
-"""Whole models: a body on its arena, as PyMJCF, with or without looks."""
+"""Whole models: a body in its arena, as PyMJCF, with or without looks."""
 
 from dm_control import mjcf
 
-from arc_suite.arenas import flat
+from arc_suite.arenas import FLAT, Arena
 from arc_suite.models import builder, looks, sizing
 from arc_suite.robots.spec import Body
 
 
-def assemble(body: Body, decorated: bool = False) -> mjcf.RootElement:
-    """The body on an endless floor.
+def assemble(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mjcf.RootElement:
+    """Assemble a body in an arena.
 
     Args:
         body: the spec; what it leaves open is sized.
+        arena: where it moves.
         decorated: add looks, which change nothing dynamic but cost about a tenth of the speed.
 
     Returns:
@@ -19,7 +20,7 @@ def assemble(body: Body, decorated: bool = False) -> mjcf.RootElement:
     """
     body = sizing.sized(body)
     root = builder.build(body)
-    flat.add_floor(root, body.simulation)
+    arena.add_to(root, **builder.contact(body.simulation))
     if decorated:
         looks.decorate(root, body)
     return root

@@ -29,7 +29,7 @@ def register(robot: str, xml_file: str) -> str:
     env_id = f"ordinary/{robot}-walk-v0"
     gymnasium.register(
         env_id,
-        entry_point="arc_suite.benchmark.ordinary:OrdinaryEnv",
+        entry_point="benchmark.ordinary:OrdinaryEnv",
         max_episode_steps=1000,
         kwargs={"robot": robot, "xml_file": xml_file},
     )

@@ -13,10 +13,10 @@ _GROUND = {"rgb1": (0.33, 0.37, 0.42), "rgb2": (0.29, 0.33, 0.375), "markrgb": (
 
 
 def add_scene(root: mjcf.RootElement, height: float) -> None:
-    """Adds sky and light, and a grid on the geom `floor` that makes motion over it visible.
+    """Adds sky and light, and a grid on the ground that makes motion over it visible.
 
     Args:
-        root: holds the body `torso` and the geom `floor`.
+        root: holds the body `torso` and the geoms of an arena.
         height: of the creature, m; a cell of the grid is about that wide.
     """
     getattr(root.visual, "global").set_attributes(offwidth=MAX_WIDTH, offheight=MAX_HEIGHT)
@@ -41,7 +41,8 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
         specular=0.1,
         shininess=0.1,
     )
-    root.find("geom", "floor").material = "ground"
+    for geom in root.worldbody.geom:  # of the arena; the bodies have theirs
+        geom.material = "ground"
 
     # Lights ride on the torso, so that shadows stay sharp however far the creature walks.
     torso = root.find("body", "torso")

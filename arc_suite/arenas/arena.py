@@ -1,0 +1,38 @@
+"""The contract of an arena: what a place gives MuJoCo, and what it tells tasks of its ground."""
+
+import dataclasses
+from abc import ABC, abstractmethod
+
+from dm_control import mjcf
+
+
+@dataclasses.dataclass(frozen=True)
+class Arena(ABC):
+    """A place where a body moves: a frozen value, so that models and pictures can be cached by it.
+
+    The start is at the origin, x the way to go. Heights are functions of arrays with any leading
+    axes, of operators and methods alone or of the array's own namespace, so that one text serves
+    NumPy and JAX.
+    """
+
+    @abstractmethod
+    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+        """Add the ground to a model that holds a body.
+
+        Args:
+            root: the model; every geom of the ground is called `floor` or `floor_<something>`.
+            **contact: attributes of the ground's geoms: how it touches a body.
+        """
+
+    @abstractmethod
+    def height(self, x, y):
+        """Return the height of the ground (...) under points x (...) and y (...), m."""
+
+    def clearance(self, points):
+        """Return the heights (...) of points (..., 3) over the ground under them, m."""
+        return points[..., 2] - self.height(points[..., 0], points[..., 1])
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
+        return False
