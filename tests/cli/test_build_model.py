@@ -32,7 +32,7 @@ def saved(model):
 
 
 def compiled(body, decorated=False):
-    return mjcf.Physics.from_mjcf_model(models.assemble(body, decorated)).model.ptr
+    return mjcf.Physics.from_mjcf_model(models.assemble(body, decorated=decorated)).model.ptr
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

@@ -28,7 +28,7 @@ every_robot = pytest.mark.parametrize("robot", ROBOTS)
 
 
 def compiled(body, decorated):
-    return mujoco.MjModel.from_xml_string(models.assemble(body, decorated).to_xml_string())
+    return mujoco.MjModel.from_xml_string(models.assemble(body, decorated=decorated).to_xml_string())
 
 
 @every_body
