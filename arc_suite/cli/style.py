@@ -1,11 +1,10 @@
-"""Judges how a robot walks: gait, course, torso, joints and effort, for the robot and for each leg.
+"""Judge how a robot and each of its legs walk: gait, course, torso, joints and effort.
 
-Examples:
-  python tools/style.py --robot queen --policy cpg --preset medium
-  python tools/style.py --policy my_package.policies:make --compare cpg --output out/style
-  python tools/style.py --spec examples/spider.json --save out/spider.npz
-  python tools/style.py --policy out/spider.npz --compare zero
-  python tools/style.py --policy arc_suite/queen/cpg-medium-v0 --compare arc_suite/queen/random-v0
+  arc-suite style --robot queen --policy cpg --preset medium
+  arc-suite style --policy my_package.policies:make --compare cpg --output out/style
+  arc-suite style --spec examples/spider.json --save out/spider.npz
+  arc-suite style --policy out/spider.npz --compare zero
+  arc-suite style --policy arc_suite/queen/cpg-medium-v0 --compare arc_suite/queen/random-v0
 
 `--output` writes gait.png, reward.png, speed.png and path.png of the first episode. What every
 metric means is written in arc_suite/style/metrics.py.
@@ -16,31 +15,38 @@ import math
 import pathlib
 
 from absl import flags
-from tqdm import tqdm
 
 from arc_suite import evaluation, files, policies, style, versions
-from arc_suite.cli import body_flags, program
+from arc_suite.cli.flags import bodies, define_body, define_task, made_body, task
+from arc_suite.cli.program import progress
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
+define_body()
+define_task()
 _ROBOT = flags.DEFINE_string(
-    "robot", "queen", f"{', '.join(ROBOTS)}, or all. By default the one whose tracks are shown, if they are stored."
+    "robot", "queen", f"{', '.join(ROBOTS)}, or all. [default: the one of stored tracks, else queen]"
 )
 flags.DEFINE_string("policy", "cpg", sources.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
-flags.DEFINE_string("compare", None, "A second one, shown beside the first.")
-flags.DEFINE_string("compare_preset", "medium", "Preset of the second, if that is the cpg.")
+flags.DEFINE_string("compare", None, "A second policy, file or dataset, shown beside the first.")
+flags.DEFINE_string("compare_preset", "medium", "Preset of --compare, if that is the cpg.")
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the figures to, as JSON.")
-flags.DEFINE_string("output", None, "Folder to write pictures to; it is made if need be. Of several robots, one each.")
+flags.DEFINE_string(
+    "output",
+    None,
+    "Folder to write pictures to, made if need be; of several robots, a folder in it for each.",
+    short_name="o",
+)
 flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz).")
 
 
 def chosen_sources() -> dict[str, style.Source]:
-    """What is shown side by side, by label."""
+    """Return what is shown side by side, by label."""
     first = style.source(FLAGS.policy, FLAGS.preset)
     if FLAGS.compare is None:
         return {first.label: first}
@@ -53,19 +59,19 @@ def chosen_sources() -> dict[str, style.Source]:
 
 
 def chosen_bodies(stored: list[Body]) -> dict[str, Body]:
-    """The bodies that flags ask for, else the one whose tracks are stored, by name."""
-    if stored and not _ROBOT.present and body_flags.made() is None:
+    """Return the bodies that flags ask for, else the one whose tracks are stored, by name."""
+    if stored and not _ROBOT.present and made_body() is None:
         return {stored[0].name: stored[0]}
-    return body_flags.bodies(_ROBOT)
+    return bodies(_ROBOT)
 
 
 def number(value: float, decimals: int = 3) -> str:
-    """So many decimals; a dash for NaN."""
+    """Return a number as text; a dash for NaN."""
     return "-" if math.isnan(value) else f"{value:.{decimals}f}"
 
 
 def spread(summary: evaluation.Summary) -> str:
-    """Mean +- standard deviation, the mean alone where it is not finite."""
+    """Return mean +- standard deviation as text, the mean alone where it is not finite."""
     if not math.isfinite(summary.mean):
         return number(summary.mean)
     decimals = 1 if abs(summary.mean) >= 100.0 else 3
@@ -73,7 +79,7 @@ def spread(summary: evaluation.Summary) -> str:
 
 
 def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, list[str]]]) -> None:
-    """Rows of a name, a metric's figures, and a cell for each column."""
+    """Print rows of a name, a metric's figures, and a cell for each column."""
     width = max(8, *(len(text) for text in [*columns, *(cell for _, _, cells in rows for cell in cells)]))
     first = max(18, len(heading))
     line = f"{{:<{first}}} {{:<8}} {{:>10}}" + f"  {{:>{width}}}" * len(columns)
@@ -86,7 +92,7 @@ def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, li
 
 
 def print_report(robot: str, reports: dict) -> None:
-    """The tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
+    """Print the tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
     first = next(iter(reports.values()))
     rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
     rows += [
@@ -114,13 +120,13 @@ def pictures(robots: list[str]):
     except ImportError as error:
         raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
     with contextlib.ExitStack() as stack:
-        files = {}
+        targets = {}
         for robot in robots:
             folder = files.folder(pathlib.Path(FLAGS.output, robot if len(robots) > 1 else ""))
-            files[robot] = {name: stack.enter_context(files.writing(folder / f"{name}.png")) for name in PICTURES}
+            targets[robot] = {name: stack.enter_context(files.writing(folder / f"{name}.png")) for name in PICTURES}
 
         def draw(robot, tracks):
-            for name, file in files[robot].items():
+            for name, file in targets[robot].items():
                 PICTURES[name](tracks).savefig(file)
 
         yield draw
@@ -140,28 +146,32 @@ def saving(robots: list[str]):
         yield lambda tracks: style.save(file, tracks)
 
 
-def main():
-    """Records, measures, prints and writes."""
+def main() -> None:
+    """Record, measure, print and write."""
+    task_name, task_kwargs = task()  # WIRE: to style.source in chosen_sources
     chosen = chosen_sources()
-    bodies = chosen_bodies([source.body for source in chosen.values() if source.body is not None])
+    walkers = chosen_bodies([source.body for source in chosen.values() if source.body is not None])
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     takes = {
-        robot: {label: source.takes(body, seeds) for label, source in chosen.items()} for robot, body in bodies.items()
+        robot: {label: source.takes(body, seeds) for label, source in chosen.items()} for robot, body in walkers.items()
     }
-    robots = list(bodies)
+    robots = list(walkers)
     with files.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
         reports = {}
         for robot, by_label in takes.items():
             tracks = {}
             for label, several in by_label.items():
-                with tqdm(several, desc=f"{robot}, {label}", unit="episode", leave=False) as progress:
-                    tracks[label] = [take() for take in progress]
+                with progress(several, desc=f"{robot}, {label}", unit="episode", leave=False) as bar:
+                    tracks[label] = [take() for take in bar]
             save(next(iter(tracks.values())))
             reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
             print_report(robot, reports[robot])
             draw(robot, {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()})
-        file.update(episodes=FLAGS.episodes, seed=FLAGS.seed, robots=reports, versions=versions.recorded())
-
-
-if __name__ == "__main__":
-    program.run(main)
+        file.update(
+            task=task_name,
+            task_kwargs=task_kwargs,
+            episodes=FLAGS.episodes,
+            seed=FLAGS.seed,
+            robots=reports,
+            versions=versions.recorded(),
+        )

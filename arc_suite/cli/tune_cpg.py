@@ -1,20 +1,20 @@
-"""Searches the demonstrator's numbers of a robot that earn most, walking no worse than `medium` does.
+"""Search the numbers of a robot's demonstrator that earn most.
 
-The search is CMA-ES on the vector environment. Broken off at any moment, the same command goes on.
+It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off at any moment, the same command goes on.
 At the end the best numbers are judged beside `medium` over many resets and printed as a row for the
 table of presets.
 
-  python tools/tune_cpg.py --robot queen --output out/tune/queen
+  arc-suite tune_cpg --robot queen --output out/tune/queen
 """
 
 import contextlib
 import pathlib
 
 from absl import flags
-from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, versions
-from arc_suite.cli import program
+from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.program import progress
 from arc_suite.cpg.presets import TUNINGS, Preset
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks.walk import HORIZON
@@ -23,18 +23,21 @@ from arc_suite.tuning.judge import STYLE
 from arc_suite.tuning.search import HARD
 
 FLAGS = flags.FLAGS
+define_task()
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
-flags.DEFINE_integer("generations", 250, "Of the search; more make a finished one go on.", lower_bound=1)
-flags.DEFINE_integer("episodes", 2, "By which a candidate is judged.", lower_bound=1)
-flags.DEFINE_integer("steps", 300, "Control steps of these.", 1, HORIZON)
-flags.DEFINE_integer("starts", 1000, "Of which candidates are tried in the hardest.", lower_bound=HARD)
-flags.DEFINE_integer("seed", 0, "Of the search.", 0, 1000)
+flags.DEFINE_integer("generations", 250, "Generations of the search; more make a finished one go on.", lower_bound=1)
+flags.DEFINE_integer("episodes", 2, "Episodes by which a candidate is judged.", lower_bound=1)
+flags.DEFINE_integer("steps", 300, "Control steps of these episodes.", 1, HORIZON)
+flags.DEFINE_integer("starts", 1000, "Starts, of which candidates are tried in the hardest.", lower_bound=HARD)
+flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
-flags.DEFINE_string("output", "out/tune", "Folder of the journal, the plot and the result; it is made if need be.")
+flags.DEFINE_string(
+    "output", "out/tune", "Folder of the journal, the plot and the result, made if need be.", short_name="o"
+)
 
 
 def search(folder: pathlib.Path) -> tuple[Search, Journal]:
-    """Searches behind a progress bar, or goes on."""
+    """Search behind a progress bar, or go on."""
     settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps", "starts")}
     with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
         try:
@@ -44,7 +47,7 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
         for generation in journal.generations:
             course.step(generation.fitness)
         done = len(journal.generations)
-        with tqdm(total=max(FLAGS.generations, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
+        with progress(total=max(FLAGS.generations, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
             for _ in range(done, FLAGS.generations):
                 journal.append(course.step())
                 bar.set_postfix_str(f"return {HORIZON * journal.generations[-1].reward:.0f}")
@@ -53,7 +56,7 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
 
 
 def judge(preset: Preset) -> dict:
-    """Return, falls and style over the resets, of the result and of medium."""
+    """Return the return, falls and style over the resets, of the result and of medium."""
     body = ROBOTS[FLAGS.robot]
     presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
     score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()), range(FLAGS.resets))
@@ -65,14 +68,15 @@ def judge(preset: Preset) -> dict:
 
 
 def violations(figures: dict) -> list[str]:
-    """In what the result is not as good as it must be."""
+    """Return in what the result is not as good as it must be, a line each."""
     tuned, medium = figures["tuned"], figures["medium"]
     worse = [f"{name} {tuned[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if tuned[name] > medium[name]]
     return worse + [f"{tuned['falls']} falls"] * bool(tuned["falls"])
 
 
-def main():
-    """Searches, judges, prints and writes."""
+def main() -> None:
+    """Search, judge, print and write."""
+    task_name, task_kwargs = task()  # WIRE: to Search, Judge and the settings of the journal
     checks.name(FLAGS.robot, TUNINGS, "robot")
     try:
         from arc_suite.tuning import plots
@@ -102,7 +106,3 @@ def main():
     print(f"\n{preset}")
     if broken := violations(figures):
         raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")
-
-
-if __name__ == "__main__":
-    program.run(main)
