@@ -1,7 +1,7 @@
 """Collect a dataset in Minari's format, or replay one and compare it to the bit.
 
-Both use all cores. Killed or interrupted, the same command continues. Minari keeps datasets in ~/.minari/datasets, or where
-MINARI_DATASETS_PATH points; `minari list local` shows them.
+Both use all cores. Killed or interrupted, the same command continues. Minari keeps datasets in
+~/.minari/datasets, or where MINARI_DATASETS_PATH points; `minari list local` shows them.
 
   arc-suite collect --robot queen --policy cpg --preset medium --episodes 1000
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1

@@ -21,8 +21,8 @@ def root(tmp_path, monkeypatch):
     return tmp_path / "datasets"
 
 
-def run(*arguments, path=None):
-    environment = os.environ | ({"PYTHONPATH": str(path)} if path else {})
+def run(*arguments, path=""):
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(path), os.environ.get("PYTHONPATH", "")])}
     command = [sys.executable, ROOT / "tools" / "collect.py", *arguments]
     return subprocess.run(command, capture_output=True, text=True, env=environment)
 

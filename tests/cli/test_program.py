@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from arc_suite.cli.program import writing, writing_json
+from arc_suite.files import writing, writing_json
 
 TOOL = '''"""Counts."""
 import signal, sys
