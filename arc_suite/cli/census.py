@@ -1,6 +1,6 @@
 """Let random bodies walk and count those that do.
 
-Bodies are drawn by seed, so that anyone can try some that nobody has seen. A body walks if it does
+Bodies are told by seed, so that anyone can try some that nobody has seen. A body walks if it does
 not fall, its torso touches the ground for less than 1 % of the time, it gets more than one body
 length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
 

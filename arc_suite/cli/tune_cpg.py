@@ -1,6 +1,6 @@
 """Search the numbers of a robot's demonstrator that earn most.
 
-It must walk no worse than `medium` does. The search is CMA-ES on the vector environment; broken off
+It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off
 at any moment, the same command goes on. At the end the best numbers are judged beside `medium` over
 many resets and printed as a row for the table of presets.
 
