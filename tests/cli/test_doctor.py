@@ -42,6 +42,20 @@ def test_healthy():
     assert found["picture"][1].startswith("drawn by egl, ")
 
 
+def test_it_goes_on_where_nobody_reads_on():
+    line = f"{sys.executable} -m arc_suite.doctor | head -n 1; exit ${{PIPESTATUS[0]}}"
+    environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
+    done = subprocess.run(["bash", "-c", line], env=environ, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.count("\n"), done.stderr) == (0, 1, "")
+
+
+def test_a_wrong_flag_is_one_line():
+    command = [sys.executable, "-m", "arc_suite.doctor", "--verbose=1"]
+    done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("doctor.py: Unknown command line flag 'verbose'")
+
+
 def test_wrong_pair(tmp_path):
     pretend(tmp_path, "mujoco", "4.0.0")
     status, found, verdict = doctor(tmp_path)

@@ -1,4 +1,4 @@
-"""Every tool, and every face of the suite, takes any body."""
+"""Every program takes any body, any task and its settings; every face of the suite takes any body."""
 
 import subprocess
 import sys
@@ -17,9 +17,9 @@ ROOT = Path(__file__).parents[2]
 SPIDER = ROOT / "examples" / "spider.json"
 
 
-def run(tool, *arguments):
+def run(tool, *arguments, cwd=None):
     command = [sys.executable, ROOT / "tools" / tool, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd)
 
 
 def test_evaluate_takes_a_spec_and_a_body_made_to_order():
@@ -57,6 +57,47 @@ def test_bad_arguments_are_one_line(tool, arguments, message, tmp_path):
     output = [f"--output={tmp_path / 'a.png'}"] if tool == "render.py" else []
     done = run(tool, *arguments, *output)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"{tool}: {message}\n")
+
+
+@pytest.mark.parametrize(
+    "tool", ["evaluate.py", "render.py", "style.py", "collect.py", "tune_cpg.py", "walk_census.py"]
+)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--task=wlak"], "unknown task 'wlak'; did you mean 'walk'? (there are: "),
+        (["--set=foo"], "--set foo: expected name=value"),
+        (["--set==1"], "--set =1: expected name=value"),
+        (["--set=random=1"], "--set random=1: programs seed every episode; see --help for the flag of the first seed"),
+        (
+            ["--set=target_velocty=1"],
+            "unknown setting of walk 'target_velocty'; did you mean 'target_velocity'? (there are: ",
+        ),
+        (["--set", "target_velocity=fast"], "target_velocity: expected a finite number from -inf to inf, got 'fast'"),
+    ],
+)
+def test_bad_tasks_and_settings_are_one_line(tool, arguments, message, tmp_path):
+    where = {"render.py": ["--output=a.png"], "tune_cpg.py": ["--output=tune"], "walk_census.py": ["--processes=1"]}
+    done = run(tool, *arguments, *where.get(tool, []), cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith(f"{tool}: {message}")
+    assert not (tmp_path / "a.png").exists()
+
+
+def test_settings_are_json_where_they_parse():
+    code = """
+import sys
+from absl import flags
+from arc_suite.cli.flags import define_task, task
+define_task()
+flags.FLAGS(["program", *sys.argv[1:]])
+print(task())
+"""
+    settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "a=true", "h=Infinity"]
+    command = [sys.executable, "-c", code, *(f"--set={setting}" for setting in settings)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    expected = {"a": True, "b": 2.5, "c": "ripple", "d": "ripple", "e": {"x": [1, None]}, "f": "x=y", "g": ""}
+    assert done.stdout == f"{('walk', expected | {'h': float('inf')})}\n"
 
 
 @pytest.mark.parametrize("body", [generator.generate(5, 2), SPIDER, str(SPIDER)], ids=["body", "path", "string"])
