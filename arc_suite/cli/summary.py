@@ -1,7 +1,7 @@
 """A body in a few figures."""
 
 from arc_suite.models.sizing import control_timestep
-from arc_suite.models.standing import stance
+from arc_suite.models.standing import standing as stance
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.walk import settings
 
