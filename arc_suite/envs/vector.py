@@ -14,7 +14,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks, registry
-from arc_suite.simulation.physics import Batch
+from arc_suite.simulation import pictures
+from arc_suite.simulation.batch import Batch
 
 _AUTORESET_MODES = (AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value)
 _RENDER_MODES = ("rgb_array", "depth_array")
@@ -102,7 +103,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._physics, self._task = environment.physics, environment.task
         if not hasattr(self._task, "walker"):
             raise ValueError(f"task {task_name!r} has no batched form; use vectorization_mode 'sync' or 'async'")
-        self._physics.check_camera(camera_id)
+        pictures.check_camera(self._physics.model.ptr, camera_id)
         self._substeps = round(environment.control_timestep() / self._physics.timestep())
         self._time_limit = environment._step_limit  # control steps; dm_control has no public name for it
         self._step_limit = np.inf if max_episode_steps is None else _count("max_episode_steps", max_episode_steps)
