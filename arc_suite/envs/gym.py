@@ -11,7 +11,7 @@ from shimmy.dm_control_compatibility import DmControlCompatibilityV0
 from shimmy.utils.dm_env import dm_env_step2gym_step
 
 from arc_suite import checks, registry
-from arc_suite.simulation import opengl
+from arc_suite.simulation import opengl, pictures
 
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
@@ -71,7 +71,7 @@ class Env(DmControlCompatibilityV0):
         if render_mode is not None:
             checks.name(render_mode, modes, "render_mode")
         environment = registry.load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
-        environment.physics.check_camera(camera_id)
+        pictures.check_camera(environment.physics.model.ptr, camera_id)
         self.metadata = {"render_modes": modes}  # before shimmy writes a rate into the class's
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
