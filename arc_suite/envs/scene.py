@@ -9,7 +9,7 @@ import numpy as np
 
 from arc_suite import checks, registry
 from arc_suite.models.sizing import SUBSTEPS
-from arc_suite.simulation import compiled
+from arc_suite.simulation.model import compiled
 from arc_suite.tasks.contract import STEPS, Scene, Task
 from arc_suite.tasks.readings import layout
 
