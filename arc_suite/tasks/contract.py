@@ -222,14 +222,10 @@ class Task(ABC):
         Raises:
             ValueError: they are not those that the task declares; one line.
         """
-        for (name, part), (given, block) in zip(self._parts.items(), blocks.items(), strict=False):
-            if name != given or block.shape[-1] != part.stop - part.start:
-                break
-        else:
-            if len(blocks) == len(self._parts):
-                return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
-        observed = {name: block.shape[-1] for name, block in blocks.items()}
-        raise ValueError(f"observation of {self.name}: expected blocks {dict(self.blocks)}, got {observed}")
+        if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
+            observed = {name: block.shape[-1] for name, block in blocks.items()}
+            raise ValueError(f"observation of {self.name}: expected blocks {dict(self.blocks)}, got {observed}")
+        return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
 
     def split(self, vector: np.ndarray) -> collections.OrderedDict:
         """Return an observation vector (..., size) as named blocks, views of it.
@@ -240,6 +236,10 @@ class Task(ABC):
         if vector.shape[-1:] != (self.size,):
             raise ValueError(f"observation: expected {self.size} numbers, got shape {vector.shape}")
         return collections.OrderedDict((name, vector[..., part]) for name, part in self._parts.items())
+
+    @functools.cached_property
+    def _declared(self) -> list[tuple[str, int]]:
+        return list(self.blocks.items())
 
     @functools.cached_property
     def _parts(self) -> dict[str, slice]:

@@ -48,9 +48,9 @@ def terms(readings: Readings, step, parameters: Parameters) -> dict:
 
     Args:
         readings: after the control step.
-        step: what the task remembers of it: `forward_velocity` (...), m/s; `wrong_feet` (..., feet),
-            which are on the ground and should not be, or the reverse; `action` and
-            `previous_action` (..., joints).
+        step: what the task remembers of it: `forward_velocity` (...), m/s; `wrong_feet` (...), how
+            many are on the ground and should not be, or the reverse; `action` and `previous_action`
+            (..., joints).
         parameters: of the task.
 
     Returns:
@@ -58,14 +58,13 @@ def terms(readings: Readings, step, parameters: Parameters) -> dict:
         table of weights.
     """
     p = parameters
-    wrong_feet = step.wrong_feet.sum(axis=-1, dtype=float)
     # Products, since numpy's `x**2` rounds otherwise for scalars.
     vertical, roll, pitch = (component(readings.velocities, i) for i in (2, 3, 4))
     return {
         "forward": tent(step.forward_velocity - p.target_velocity, p.velocity_band),
         "healthy": healthy(readings.torso_height, p).astype(float),
-        "gait_bonus": 1.0 - wrong_feet / step.wrong_feet.shape[-1],
-        "gait_cost": wrong_feet,
+        "gait_bonus": 1.0 - step.wrong_feet / len(p.phase_offsets),
+        "gait_cost": step.wrong_feet,
         "control": (step.action**2).sum(axis=-1),
         "smoothness": ((step.action - step.previous_action) ** 2).sum(axis=-1),
         "contact": (readings.contact_forces**2).sum(axis=-1),

@@ -187,9 +187,9 @@ class Memory(NamedTuple):
         previous_action: (..., joints) of the step before; 0 before the first.
         x: (...) of the torso's frame in the world at the latest reading, m.
         forward_velocity: (...) mean of the torso's world x velocity over the latest step, m/s.
-        wrong_feet: (..., feet) whether a foot is on the ground and should not be, or the reverse.
+        wrong_feet: (...) number of feet that are on the ground and should not be, or the reverse.
         distance: (...) along world x since the start, m.
-        compliance: (...) sum over the steps of the share of feet that were as prescribed.
+        wrong_in_all: (...) sum of `wrong_feet` over the steps.
     """
 
     tick: int | np.ndarray
@@ -199,7 +199,7 @@ class Memory(NamedTuple):
     forward_velocity: np.ndarray
     wrong_feet: np.ndarray
     distance: np.ndarray
-    compliance: np.ndarray
+    wrong_in_all: np.ndarray
 
 
 class Walk(Task):
@@ -238,8 +238,7 @@ class Walk(Task):
         joints = len(self.scene.body.joint_names)
         qpos, qvel = initial_state(self.scene.standing, 6 + joints, self.settings, random)
         still, zero = np.zeros(joints), np.float64(0.0)
-        right = np.zeros(len(self.scene.body.legs), bool)
-        return Start(qpos, qvel, Memory(0, still, still, zero, zero, right, zero, zero))
+        return Start(qpos, qvel, Memory(0, still, still, zero, zero, zero, zero, zero))
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
         """Take down where the torso's frame stands."""
@@ -254,15 +253,14 @@ class Walk(Task):
         tick, x = memory.tick + 1, component(readings.frame_position, 0) + 0.0
         way = x - memory.x
         on_ground = readings.foot_heights < self.parameters.stance_threshold
-        wrong_feet = on_ground != self.clock.at(self.clock.stance, tick)
-        share = 1.0 - wrong_feet.sum(axis=-1, dtype=float) / wrong_feet.shape[-1]
+        wrong_feet = (on_ground != self.clock.at(self.clock.stance, tick)).sum(axis=-1, dtype=float)
         return memory._replace(
             tick=tick,
             x=x,
             forward_velocity=way / self.scene.control_timestep,
             wrong_feet=wrong_feet,
             distance=memory.distance + way,
-            compliance=memory.compliance + share,
+            wrong_in_all=memory.wrong_in_all + wrong_feet,
         )
 
     def terms(self, memory: Memory, readings: Readings) -> dict:
@@ -285,5 +283,7 @@ class Walk(Task):
     def progress(self, memory: Memory) -> dict:
         """Return the mean forward `speed`, m/s, and gait `compliance`, the mean share of feet as prescribed."""
         steps = memory.tick + (memory.tick == 0)
-        seconds = steps * self.scene.control_timestep
-        return {"speed": memory.distance / seconds, "compliance": memory.compliance / steps}
+        return {
+            "speed": memory.distance / (steps * self.scene.control_timestep),
+            "compliance": 1.0 - memory.wrong_in_all / (steps * len(self.parameters.phase_offsets)),
+        }
