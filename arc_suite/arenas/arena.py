@@ -36,3 +36,8 @@ class Arena(ABC):
     def is_level(self) -> bool:
         """Whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
         return False
+
+    @property
+    def lists_contacts(self) -> bool:
+        """Whether listing every pair of geoms that may touch is faster than looking for them: for few geoms of ground."""
+        return True

@@ -8,7 +8,7 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
-from arc_suite.simulation import forks
+from arc_suite.simulation import forks, timers
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
@@ -68,10 +68,13 @@ class Batch:
         self._check_process()
         simulations = self._simulations
         simulations.warning[...] = 0
-        simulations.set_models(self._silent)
-        simulations.step(rows, nstep - 1)
-        simulations.set_models(None)
-        simulations.step(rows)
+        with timers.off:
+            simulations.set_models(self._silent)
+            try:
+                simulations.step(rows, nstep - 1)
+            finally:
+                simulations.set_models(None)
+            simulations.step(rows)
         return simulations.warning[..., 1].any(axis=-1)
 
     def reset(self, rows: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, mocap_pos: np.ndarray | None = None) -> None:

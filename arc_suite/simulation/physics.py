@@ -11,7 +11,7 @@ from dm_control.mujoco import wrapper
 
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.robots.spec import Body
-from arc_suite.simulation import forks, pictures
+from arc_suite.simulation import forks, pictures, timers
 from arc_suite.simulation.model import compiled
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -67,14 +67,17 @@ class Physics(dm_mujoco.Physics):
         model, data, option = self.model.ptr, self.data.ptr, self._option
         time = data.time
         self._warnings.fill(0)
-        if nstep > 1:
-            flags = option.disableflags
-            option.disableflags = flags | _SENSOR
-            mujoco.mj_step(model, data, nstep - 1)
-            option.disableflags = flags
-        elif nstep != 1:
+        if nstep < 1:
             raise ValueError(f"nstep: expected an integer from 1, got {nstep!r}")
-        mujoco.mj_step(model, data)
+        with timers.off:
+            if nstep > 1:
+                flags = option.disableflags
+                option.disableflags = flags | _SENSOR
+                try:
+                    mujoco.mj_step(model, data, nstep - 1)
+                finally:  # an interrupt from the keyboard arrives here
+                    option.disableflags = flags
+            mujoco.mj_step(model, data)
         self.divergence = self._describe_divergence(time) if np.count_nonzero(self._warnings) else None
 
     def _describe_divergence(self, time: float) -> str:
