@@ -19,6 +19,7 @@ with versions.explained():
 
     registration.register_ids()
 
+__version__ = "0.1.0"
 __all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load", "register"]
 
 

@@ -1,8 +1,6 @@
-"""`python -m arc_suite.doctor` runs `arc_suite.cli.doctor`."""
+"""Run arc_suite/cli/doctor.py: `python -m arc_suite.doctor`."""
 
-import sys
-
-from arc_suite.cli.doctor import main
+from arc_suite.cli import doctor, program
 
 if __name__ == "__main__":
-    sys.exit(main())
+    program.run(doctor.main)

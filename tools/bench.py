@@ -14,7 +14,6 @@ import os
 
 from absl import flags
 from benchmark import contestants, measurement, report
-from tqdm import tqdm
 
 from arc_suite import checks, files
 from arc_suite.cli import program
@@ -62,7 +61,7 @@ def main():
     for path in (FLAGS.json, FLAGS.plot):
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)
     with files.writing(FLAGS.json) as json_path, files.writing(FLAGS.plot) as plot_path:
-        progress = functools.partial(tqdm, unit="round")
+        progress = functools.partial(program.progress, unit="round")
         results = measurement.measure(robots, rows, threads, workers, FLAGS.rounds, FLAGS.steps, progress)
         json_path.write_text(json.dumps(results, indent=1))
         report.plot(results, plot_path)

@@ -1,6 +1,8 @@
-"""Examines this machine: `python -m arc_suite.doctor` says what it finds, and how to mend what is wrong.
+"""Examine this machine: can it simulate and render, and if not, what mends it.
 
-Exit status 1 if something is.
+  arc-suite doctor
+
+Exit status 1 if something is wrong.
 """
 
 import json
@@ -34,7 +36,7 @@ class Finding(NamedTuple):
 
 
 def findings() -> Iterator[Finding]:
-    """Examines everything, one thing after the other."""
+    """Examine everything, one thing after the other."""
     yield Finding("system", f"{platform.platform()}, Python {platform.python_version()}")
     yield from _packages()
     yield Finding("cores", f"{os.cpu_count()}, of which vector environments use {usable_cores()}")
@@ -64,7 +66,7 @@ def _picture() -> Finding:
 
 
 def draw() -> None:
-    """Draws a picture and prints, as JSON, what it was drawn with. The doctor runs this in a process of its own."""
+    """Draw a picture and print, as JSON, what it was drawn with; the doctor runs this in a process of its own."""
     from dm_control import _render
 
     from arc_suite import registry
@@ -80,7 +82,7 @@ def draw() -> None:
 
 
 def main() -> int:
-    """Prints the report."""
+    """Print the report and return the exit status."""
     problems = 0
     for subject, found, remedy in findings():
         sign, line = ("ok", found) if remedy is None else ("PROBLEM", f"{found}; {remedy}")
@@ -88,7 +90,3 @@ def main() -> int:
         problems += remedy is not None
     print(f"{problems} problem{'s' * (problems > 1)}" if problems else "all is well")
     return int(problems > 0)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,17 +1,14 @@
 """Episodes in pictures: single views, one gait cycle at a glance, films."""
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import imageio.v2 as imageio
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from arc_suite.policies import policy
-from arc_suite.registry import load
-from arc_suite.robots.spec import Body
-
-FRAMES_PER_SECOND = 20  # one for each control step: real time
+_SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
 
 
 class Take:
@@ -21,74 +18,86 @@ class Take:
         robot: its name.
         earned: sum of the rewards so far.
         steps: control steps so far.
-        ended: whether the episode is over; stepping on changes nothing then.
+        advance: cycles that the gait clock made in the latest step; 0 before the first, or without a gait clock.
     """
 
-    def __init__(self, robot: Body, policy_name: str, preset: str, seed: int, camera: str, size: tuple[int, int]):
-        """Starts the episode.
+    def __init__(self, robot: str, environment, policy: Callable, camera: str, size: tuple[int, int]):
+        """Start the episode.
 
         Args:
-            robot: a robot, or any other body.
-            policy_name: cpg, zero or random.
-            preset: of the demonstrator, one of `cpg.PRESETS`.
-            seed: of the episode and of the random policy.
+            robot: its name.
+            environment: of `arc_suite.load`; the take closes it.
+            policy: maps a `TimeStep` to an action.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.
         """
-        self.robot = robot.name
+        self.robot = robot
         self.earned = 0.0
         self.steps = 0
-        self._act = policy(policy_name, robot, preset, seed)
-        self._environment = load(robot, "walk", {"random": seed})
-        self._time_step = self._environment.reset()
+        self.advance = 0.0
+        self._environment, self._policy = environment, policy
+        self._time_step = environment.reset()
         self._camera, self._size = camera, size
 
     @property
     def ended(self) -> bool:
+        """Whether the episode is over; stepping on changes nothing then."""
         return self._time_step.last()
 
     @property
     def phase(self) -> float:
-        """Of the gait clock, in cycles from 0 to 1."""
-        sine, cosine = self._time_step.observation["gait_clock"]
+        """Phase of the gait clock, in cycles from 0 to 1; 0 in a task that has none."""
+        sine, cosine = self._time_step.observation.get("gait_clock", (0.0, 1.0))
         return float(np.arctan2(sine, cosine) / (2.0 * np.pi) % 1.0)
 
     @property
-    def steps_per_cycle(self) -> float:
-        """Control steps in a cycle of the gait clock."""
-        frequency = self._environment.task.settings.parameters.gait_frequency
-        return 1.0 / (frequency * self._environment.control_timestep())
+    def control_timestep(self) -> float:
+        """Seconds in a control step."""
+        return self._environment.control_timestep()
 
     def step(self) -> None:
-        """Advances by one control step."""
-        if not self.ended:
-            self._time_step = self._environment.step(self._act(self._time_step))
-            self.earned += self._time_step.reward
-            self.steps += 1
+        """Advance by one control step."""
+        if self.ended:
+            return
+        before = self.phase
+        self._time_step = self._environment.step(self._policy(self._time_step))
+        self.advance = (self.phase - before) % 1.0
+        self.earned += self._time_step.reward
+        self.steps += 1
 
     def view(self) -> np.ndarray:
-        """What the camera sees: (height, width, 3) uint8."""
+        """Return what the camera sees: (height, width, 3) uint8."""
         width, height = self._size
         return self._environment.physics.render(height, width, self._camera)
 
     def close(self) -> None:
-        """Frees the simulation and its OpenGL context."""
+        """Free the simulation and its OpenGL context."""
         self._environment.close()
 
 
 def cycle(take: Take, count: int) -> Iterator[np.ndarray]:
-    """Shows the next whole gait cycle in so many views, captioned with the gait clock's phase."""
-    while not take.ended and take.phase * take.steps_per_cycle >= 1.0:
+    """Yield views of the next whole gait cycle, evenly spaced, captioned with the gait clock's phase.
+
+    Args:
+        take: whose gait clock advanced in the latest step.
+        count: of views.
+    """
+    while not take.ended and not (take.phase + 0.5 * take.advance) % 1.0 < take.advance:
         take.step()
     start = take.steps
     for i in range(count):
-        while not take.ended and take.steps < start + round(i * take.steps_per_cycle / count):
+        while not take.ended and take.steps < start + round(i / (count * take.advance)):
             take.step()
         yield captioned(take.view(), f"phase {take.phase:.2f}")
 
 
+def steps_per_frame(control_timestep: float) -> int:
+    """Return how many control steps a frame of a film shows, so that players keep its pace."""
+    return math.ceil(_SHORTEST_FRAME / control_timestep)
+
+
 def captioned(picture: np.ndarray, text: str) -> np.ndarray:
-    """The picture with a text in its lower left corner."""
+    """Return the picture with a text in its lower left corner."""
     image = Image.fromarray(picture)
     size = max(11, image.height // 22)
     font = ImageFont.load_default(size)
@@ -97,23 +106,36 @@ def captioned(picture: np.ndarray, text: str) -> np.ndarray:
 
 
 def grid(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
-    """Pictures of one size, row by row; they must fill the last row."""
+    """Return pictures of one size side by side, row by row; they must fill the last row."""
     rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
     return np.concatenate(rows, axis=0)
 
 
-def write_png(path: Path, frames: Iterable[np.ndarray]) -> None:
-    """Writes the only frame."""
+def write_png(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write the only frame, however many seconds it stands for."""
     (frame,) = frames
     Image.fromarray(frame).save(path, optimize=True)
 
 
-def write_mp4(path: Path, frames: Iterable[np.ndarray]) -> None:
-    """Writes a film that any browser plays: H.264, yuv420p, which needs even width and height."""
+def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write a film that any browser plays: H.264, yuv420p, which needs even width and height.
+
+    Args:
+        path: of the file.
+        frames: (height, width, 3) uint8.
+        seconds: that a frame lasts.
+
+    Raises:
+        ValueError: imageio-ffmpeg is not installed; one line.
+    """
+    try:
+        import imageio_ffmpeg  # noqa: F401
+    except ImportError as error:
+        raise ValueError(f"MP4 needs imageio-ffmpeg: pip install 'arc_suite[video]' ({error})") from None
     with imageio.get_writer(
         path,
         format="FFMPEG",
-        fps=FRAMES_PER_SECOND,
+        fps=1.0 / seconds,
         codec="libx264",
         pixelformat="yuv420p",
         quality=8,
@@ -124,14 +146,22 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray]) -> None:
             writer.append_data(frame)
 
 
-def write_gif(path: Path, frames: Iterable[np.ndarray]) -> None:
-    """Writes a film that plays forever; one palette for all frames, undithered, keeps it small and calm."""
+def write_gif(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write a film that plays forever; one palette for all frames, undithered, keeps it small and calm.
+
+    Args:
+        path: of the file.
+        frames: (height, width, 3) uint8.
+        seconds: that a frame lasts; the format counts in hundredths, so single frames are off by less than one.
+    """
     frames = list(frames)
     sample = Image.fromarray(np.concatenate(frames[:: -(-len(frames) // _GIF_SAMPLES)]))
     # Of Pillow's methods the octree is the one that keeps small bright spots: eyes and glows.
     palette = sample.quantize(_GIF_COLOURS, Image.Quantize.FASTOCTREE)
     first, *others = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    first.save(path, save_all=True, append_images=others, duration=1000 // FRAMES_PER_SECOND, loop=0)
+    ends = [round(100.0 * seconds * count) for count in range(len(frames) + 1)]
+    durations = [10 * (end - start) for start, end in zip(ends, ends[1:], strict=False)]  # ms
+    first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
 
 
 _GIF_COLOURS = 128

@@ -1,60 +1,97 @@
-"""What command-line tools share: errors of one line."""
+"""What all programs share: flags parsed, errors of one line, help, progress bars."""
 
 import contextlib
+import functools
 import io
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from types import ModuleType
+from typing import NoReturn
 
-from absl import app, flags, logging
+from absl import flags
+from tqdm import tqdm
 
+import arc_suite
 from arc_suite.simulation.opengl import RenderingUnavailable
 
+VERSION = f"arc_suite {arc_suite.__version__}"
 
-def run(main: Callable[[], int | None]) -> None:
-    """Parses the command line into absl's flags, calls `main` and exits the process.
+progress = functools.partial(tqdm, disable=None)  # silent where standard error is no terminal: logs stay readable
 
-    A wrong flag, a stray argument, and a ValueError, OSError or RenderingUnavailable from `main`
-    become one line on standard error and exit status 1, Ctrl-C one line and exit status 130; any
-    other exception is a mistake of ours and keeps its traceback. Where nobody reads the output any
-    more, as in `tool | head`, the work goes on without it, so that its files are written. `--help`
-    shows the docstring of the tool's module and its flags.
+_HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
+_VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
+
+
+def run(main: Callable[[], int | None], name: str | None = None, arguments: Sequence[str] | None = None) -> NoReturn:
+    """Parse arguments into absl's flags, call `main` and exit the process, with errors as `guard` shows them.
+
+    `--help` prints the docstring of the module of `main`, and the flags of that module and of this package.
 
     Args:
         main: reads `absl.flags.FLAGS`; takes nothing, returns an exit status or None.
+        name: how errors name the program; None for the file name of the running script.
+        arguments: to parse; None for those of the command line.
+    """
+    script, *given = sys.argv
+    arguments = given if arguments is None else arguments
+
+    def work():
+        _, *rest = flags.FLAGS([script, *arguments])
+        if _HELP.value:
+            return print(_help(sys.modules[main.__module__], name is None))
+        if _VERSION.value:
+            return print(VERSION)
+        if rest:
+            raise ValueError(f"unexpected argument {rest[0]!r}; see --help")
+        return main()
+
+    guard(work, name or Path(script).name)
+
+
+def guard(work: Callable[[], int | None], name: str) -> NoReturn:
+    """Call `work` and exit the process with the status that it returns.
+
+    A wrong flag, a ValueError, an OSError and a RenderingUnavailable become one line on standard
+    error and exit status 1, Ctrl-C one line and exit status 130; any other exception is a mistake of
+    ours and keeps its traceback. Where nobody reads the output any more, as in `program | head`, the
+    work goes on without it, so that its files are written.
+
+    Args:
+        work: takes nothing, returns an exit status or None.
+        name: the program's, with which the line begins.
     """
 
-    def parse(arguments):
-        try:
-            return flags.FLAGS(arguments)
-        except flags.Error as error:
-            sys.exit(_fail(error))
-
-    def wrapped(arguments):
-        logging.set_verbosity(logging.WARNING)  # dm_control tells of its backend at absl's usual verbosity
-        try:
-            if arguments[1:]:
-                raise ValueError(f"unexpected argument {arguments[1]!r}; see --help")
-            return main()
-        except (ValueError, OSError, RenderingUnavailable) as error:
-            return _fail(error)
-        except KeyboardInterrupt as interrupt:
-            _fail(str(interrupt) or "interrupted")
-            return 130  # as shells count what SIGINT ends
+    def fail(reason, status):
+        print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr)
+        return status
 
     # A stream that was closed before the start is None.
     output, errors = (_Output(stream or io.StringIO()) for stream in (sys.stdout, sys.stderr))
     with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
         try:
-            app.run(wrapped, flags_parser=parse)
+            status = work()
+        except (flags.Error, ValueError, OSError, RenderingUnavailable) as error:
+            status = fail(error, 1)
+        except KeyboardInterrupt as interrupt:
+            status = fail(str(interrupt) or "interrupted", 130)  # as shells count what SIGINT ends
         finally:
             output.flush()
+    sys.exit(status)
 
 
-def _fail(reason: object) -> int:
-    print(f"{Path(sys.argv[0]).name}: {' '.join(str(reason).split())}", file=sys.stderr)
-    return 1
+def _help(module: ModuleType, is_script: bool) -> str:
+    """Return a program's docstring and flags; examples call the script, if it is one that runs the program."""
+    text = module.__doc__.strip()
+    if is_script:
+        text = text.replace(f"arc-suite {module.__name__.rpartition('.')[2]} ", f"python {sys.argv[0]} ")
+    shown = flags.FlagValues()
+    for name, defined in flags.FLAGS.flags_by_module_dict().items():
+        if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):
+            for flag in defined:
+                shown[flag.name] = flag
+    return f"{text}\n\nFlags:\n{shown.get_help(include_special_flags=False)}"
 
 
 class _Output:

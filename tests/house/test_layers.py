@@ -27,7 +27,7 @@ LAYERS = (
     ("style",),
     ("tuning",),
     ("cli",),
-    ("doctor",),
+    ("doctor", "__main__"),
 )
 ORDER = [name for layer in LAYERS for name in layer]
 

@@ -32,7 +32,7 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
         dataset) and bare (the same rows and threads, actions precomputed), and their ratio.
     """
     lines = ["| robot | policy | collecting, steps/s | bare, steps/s | ratio |", "|---|---|---|---|---|"]
-    turns = iter(tqdm(range(len(robots) * len(POLICIES) * rounds), unit="round"))
+    turns = iter(tqdm(range(len(robots) * len(POLICIES) * rounds), unit="round", disable=None))
     for robot in robots:
         for policy in POLICIES:
             settings = data.Settings(ROBOTS[robot], policy, ("medium",) if policy == "cpg" else ())

@@ -1,0 +1,84 @@
+"""Print a body as an MJCF model that plain MuJoCo loads.
+
+The body is a robot of the suite, a spec file, or one made to order:
+
+  arc-suite build_model --robot queen --output queen.xml
+  arc-suite build_model --legs 6 --links 3 > walker.xml
+  arc-suite build_model --legs 5 --layout radial --scale 2 --json --output starfish.json
+  arc-suite build_model --seed 7 --summary --render random.png
+  arc-suite build_model --spec examples/spider.json --summary
+"""
+
+import contextlib
+
+import imageio.v3 as imageio
+from absl import flags
+
+from arc_suite import files, models
+from arc_suite.cli.flags import define_body, made_body
+from arc_suite.cli.summary import summary
+from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.robots.spec import Body
+from arc_suite.simulation.physics import Physics
+
+FLAGS = flags.FLAGS
+define_body()
+flags.DEFINE_enum("robot", None, list(ROBOTS), "A robot of the suite.")
+flags.DEFINE_integer("seed", None, "A random body; with --legs or --links, of that many.", lower_bound=0)
+flags.DEFINE_enum(
+    "layout",
+    None,
+    list(generator.LAYOUTS),
+    "Mirrored pairs, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
+)
+flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE)
+flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
+flags.DEFINE_bool("looks", False, "Add decorations, which weigh nothing and touch nothing.")
+flags.DEFINE_string(
+    "output",
+    None,
+    "File to write. [default: standard output, unless --summary or --render is given]",
+    short_name="o",
+)
+flags.DEFINE_bool("summary", False, "Print the body's size, mass, gait and the like.")
+flags.DEFINE_string("render", None, "File to write a picture of the standing body to.")
+
+
+def main() -> None:
+    """Build the body and write what is asked for."""
+    body = _body()
+    with contextlib.ExitStack() as stack:
+        if FLAGS.output is not None:
+            stack.enter_context(files.writing(FLAGS.output)).write_text(_text(body))
+        elif not FLAGS.summary and FLAGS.render is None:
+            print(_text(body), end="")
+        if FLAGS.render is not None:
+            path = stack.enter_context(files.writing(FLAGS.render))
+            physics = Physics.from_body(body)
+            physics.forward()
+            imageio.imwrite(path, physics.render(camera_id="portrait"))
+        if FLAGS.summary:
+            print(summary(body))
+
+
+def _body() -> Body:
+    sources = [name for name in ("robot", "spec", "legs", "seed") if FLAGS[name].value is not None]
+    if sources not in (["robot"], ["spec"], ["legs"], ["seed"], ["legs", "seed"]):
+        given = " and ".join(f"--{name}" for name in sources) or "none"
+        raise ValueError(f"expected one of --robot, --spec, --legs and --seed (or the last two), got {given}")
+    if sources in (["robot"], ["spec"]):
+        for name in ("links", "layout"):
+            if FLAGS[name].value is not None:
+                raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
+        body = ROBOTS[FLAGS.robot] if FLAGS.robot else made_body()
+    elif "seed" in sources:
+        body = generator.random_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
+    else:
+        body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links, FLAGS.layout)
+    return body if FLAGS.scale is None else generator.scaled(body, FLAGS.scale)
+
+
+def _text(body: Body) -> str:
+    if FLAGS.json:
+        return spec_files.body_to_json(body)
+    return models.assemble(body, decorated=FLAGS.looks).to_xml_string()

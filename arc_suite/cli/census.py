@@ -1,0 +1,70 @@
+"""Let random bodies walk and count those that do.
+
+Bodies are told by seed, so that anyone can try some that nobody has seen. A body walks if it does not fall, its torso touches the ground for less than 1 % of the time, it
+gets more than one body length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
+
+  arc-suite census --first 0 --count 500
+  arc-suite census --first 7000 --count 100 --legs 4 --picture failures.png
+"""
+
+import contextlib
+
+import imageio.v3 as imageio
+import numpy as np
+from absl import flags
+
+from arc_suite import files
+from arc_suite.cli import films
+from arc_suite.cli.flags import define_task, task
+from arc_suite.evaluation import census
+from arc_suite.robots import generator
+
+FLAGS = flags.FLAGS
+define_task()
+flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
+flags.DEFINE_integer("count", 500, "Number of bodies.", lower_bound=1)
+flags.DEFINE_integer("legs", None, "Number of legs. [default: random]", *generator.LEGS)
+flags.DEFINE_integer("links", None, "Actuated links of each leg. [default: random, 2 to 4]", *generator.LINKS)
+flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0)
+flags.DEFINE_float(
+    "froude",
+    None,
+    "Wanted speed in units of sqrt(g h), h being the standing height; negative for backwards. [default: 0.25]",
+)
+flags.DEFINE_bool("in_phase", False, "Move all legs at once: a check that the census tells bad from good.")
+flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
+flags.DEFINE_string("picture", None, "File to write a picture of up to twelve failures to.")
+
+
+def picture(outcomes: list[census.Outcome]) -> np.ndarray:
+    """Return how up to twelve bodies ended, each with its seed and what it failed by: (height, width, 3) uint8."""
+    views = []
+    for outcome in outcomes[:12]:
+        environment, _ = census.follow(outcome.trial)
+        caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
+        views.append(films.captioned(environment.physics.render(300, 400, "portrait"), caption))
+        environment.close()
+    columns = min(4, len(views))
+    views += [np.zeros_like(views[0])] * (-len(views) % columns)
+    return films.grid(views, columns)
+
+
+def main() -> None:
+    """Run the census and print it."""
+    task_name, task_kwargs = task()  # WIRE: to census.Trial
+    trials = [
+        census.Trial(seed, FLAGS.legs, FLAGS.links, FLAGS.seconds, FLAGS.froude, FLAGS.in_phase)
+        for seed in range(FLAGS.first, FLAGS.first + FLAGS.count)
+    ]
+    with contextlib.ExitStack() as stack:
+        path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
+        outcomes = list(census.census(trials, FLAGS.processes))
+        print(census.table(outcomes))
+        print(census.summary(outcomes))
+        failed = [outcome for outcome in outcomes if outcome.failures]
+        for outcome in failed:
+            print(
+                f"seed {outcome.trial.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
+            )
+        if path:
+            imageio.imwrite(path, picture(failed or outcomes))

@@ -1,0 +1,90 @@
+"""Flags that several programs have: of which body, and in which task."""
+
+import json
+from typing import Any
+
+from absl import flags
+
+from arc_suite import checks
+from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import TASKS
+
+FLAGS = flags.FLAGS
+
+
+def define_body() -> None:
+    """Define --spec, --legs and --links, by which a program takes any body."""
+    flags.DEFINE_string("spec", None, "A body from this JSON file, in place of a robot.")
+    flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
+    flags.DEFINE_integer(
+        "links", None, "Actuated links of each leg of a body made to order. [default: 3]", *generator.LINKS
+    )
+
+
+def define_task() -> None:
+    """Define --task and --set, by which a program takes any task and its settings."""
+    flags.DEFINE_string("task", "walk", f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
+    flags.DEFINE_multi_string(
+        "set",
+        [],
+        "Setting of the task, name=value; repeat it for several. Values are JSON where they parse, else text: "
+        "--set target_velocity=0.8 --set gait=ripple --set weights='{\"posture\": -0.01}'.",
+    )
+
+
+def made_body() -> Body | None:
+    """Return the body that --spec or --legs ask for, or None.
+
+    Raises:
+        ValueError: both are given, or --links without --legs, or no body in the file; one line.
+        OSError: the file cannot be read; one line.
+    """
+    if FLAGS.spec is not None and FLAGS.legs is not None:
+        raise ValueError("expected one of --spec and --legs, got both")
+    if FLAGS.links is not None and FLAGS.legs is None:
+        raise ValueError(f"--links={FLAGS.links}: goes with --legs")
+    if FLAGS.spec is not None:
+        return spec_files.load_body(FLAGS.spec)
+    return FLAGS.legs and generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
+
+
+def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
+    """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
+
+    Raises:
+        ValueError: as `made_body`, or an unknown robot, or a robot beside a body; one line.
+        OSError: as `made_body`.
+    """
+    body = made_body()
+    if body is None:
+        name = checks.name(robot.value, [*ROBOTS, "all"], "robot")
+        return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
+    if robot.present:
+        raise ValueError(f"--robot={robot.value}: expected no robot beside --spec or --legs")
+    return {body.name: body}
+
+
+def task() -> tuple[str, dict[str, Any]]:
+    """Return the name of the task that --task asks for and its settings, `task_kwargs` of `arc_suite.load`.
+
+    What settings a task has is checked where an environment is opened.
+
+    Raises:
+        ValueError: an unknown task, a setting without a value, or `random`; one line.
+    """
+    if ":" not in FLAGS.task:
+        checks.name(FLAGS.task, TASKS, "task")
+    return FLAGS.task, dict(_setting(text) for text in FLAGS["set"].value)
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    name, equals, value = text.partition("=")
+    if not (name and equals):
+        raise ValueError(f"--set {text}: expected name=value")
+    if name == "random":
+        raise ValueError(f"--set {text}: programs seed every episode; see --help for the flag of the first seed")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value

@@ -1,0 +1,108 @@
+"""Render a robot that walks: a picture (.png) or a film (.mp4, .gif).
+
+  arc-suite render --robot queen --policy cpg --output queen.png
+  arc-suite render --robot all --output robots.mp4
+  arc-suite render --legs 8 --links 4 --output walker.gif
+  arc-suite render --robot tick --set gait=ripple --output ripple.mp4
+
+A PNG of one robot under the demonstrator shows one cycle of its gait; any other PNG, and one after
+--steps=0, shows one moment. A film plays in real time. The program prints each robot's return up to
+then, and the file it wrote. No display is needed.
+"""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from absl import flags
+
+import arc_suite
+from arc_suite import checks, files
+from arc_suite.cli import films
+from arc_suite.cli.flags import bodies, define_body, define_task, task
+from arc_suite.cli.program import progress
+from arc_suite.models.builder import CAMERAS
+from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
+from arc_suite.policies import HELP, PRESET_HELP, policy
+from arc_suite.robots import ROBOTS
+
+_STEPS = {".png": 60, ".mp4": 200, ".gif": 80}
+_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
+_CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
+
+FLAGS = flags.FLAGS
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{', '.join(ROBOTS)}, or all of them side by side.")
+flags.DEFINE_string("policy", "cpg", HELP)
+flags.DEFINE_string("preset", "medium", PRESET_HELP)
+flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)
+flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
+flags.DEFINE_integer("width", None, "Of a view, in pixels. [default: 640, in a GIF 240]", 16, MAX_WIDTH)
+flags.DEFINE_integer("height", None, "Of a view, in pixels. [default: 480, in a GIF 180]", 16, MAX_HEIGHT)
+flags.DEFINE_integer(
+    "steps",
+    None,
+    "Control steps, of 0.05 s for the four robots: the length of a film, or how long to walk before a picture. "
+    "[default: 200, in a GIF 80, before a picture 60]",
+    lower_bound=0,
+)
+flags.DEFINE_string("output", None, "File to write: .png, .mp4 or .gif. Required.", short_name="o")
+
+
+def main() -> None:
+    """Play the episodes, write the file and print the returns."""
+    walkers = bodies(_ROBOT)
+    task_name, task_kwargs = task()
+    camera = checks.name(FLAGS.camera or ("profile" if len(walkers) == 1 else "portrait"), CAMERAS, "camera")
+    policies = {name: policy(FLAGS.policy, body, FLAGS.preset, FLAGS.seed) for name, body in walkers.items()}
+    if not FLAGS.output:
+        raise ValueError("no file to write; say --output=FILE.png, .mp4 or .gif")
+    extension = checks.name(Path(FLAGS.output).suffix.lower(), films.WRITERS, "extension")
+    steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
+    size = (FLAGS.width or _SIZES[extension][0], FLAGS.height or _SIZES[extension][1])
+
+    with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:
+        takes = []
+        for name, body in walkers.items():
+            environment = arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed})
+            takes.append(films.Take(name, environment, policies[name], camera, size))
+            stack.callback(takes[-1].close)
+        takes[0].view()  # finds out at once whether there is OpenGL
+        stride = films.steps_per_frame(takes[0].control_timestep)
+        frames = still(takes, steps) if extension == ".png" else film(takes, steps, stride)
+        films.WRITERS[extension](temporary, frames, stride * takes[0].control_timestep)
+    for take in takes:
+        print(f"{take.robot}: return {take.earned:.1f} in {take.steps} steps")
+    print(f"wrote {FLAGS.output}")
+
+
+def still(takes: list[films.Take], steps: int) -> Iterator[np.ndarray]:
+    """Yield one picture after so many steps: a gait cycle of a lone demonstrator, else a moment."""
+    for _ in progress(range(steps), "walking", leave=False):
+        for take in takes:
+            take.step()
+    if len(takes) == 1 and FLAGS.policy == "cpg" and takes[0].advance:
+        views = progress(films.cycle(takes[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
+        yield films.grid(list(views), _CYCLE_COLUMNS)
+    else:
+        yield panel(takes)
+
+
+def film(takes: list[films.Take], steps: int, stride: int) -> Iterator[np.ndarray]:
+    """Yield a frame for every `stride` control steps, until all episodes have ended."""
+    for start in progress(range(0, steps, stride), "rendering", leave=False):
+        for take in takes:
+            for _ in range(min(stride, steps - start)):
+                take.step()
+        yield panel(takes)
+        if all(take.ended for take in takes):
+            return
+
+
+def panel(takes: list[films.Take]) -> np.ndarray:
+    """Return what all cameras see, two side by side, with names where there are several."""
+    if len(takes) == 1:
+        return takes[0].view()
+    return films.grid([films.captioned(take.view(), take.robot.capitalize()) for take in takes], 2)

@@ -1,0 +1,177 @@
+"""Judge how a robot and each of its legs walk: gait, course, torso, joints and effort.
+
+  arc-suite style --robot queen --policy cpg --preset medium
+  arc-suite style --policy my_package.policies:make --compare cpg --output out/style
+  arc-suite style --spec examples/spider.json --save out/spider.npz
+  arc-suite style --policy out/spider.npz --compare zero
+  arc-suite style --policy arc_suite/queen/cpg-medium-v0 --compare arc_suite/queen/random-v0
+
+`--output` writes gait.png, reward.png, speed.png and path.png of the first episode. What every
+metric means is written in arc_suite/style/metrics.py.
+"""
+
+import contextlib
+import math
+import pathlib
+
+from absl import flags
+
+from arc_suite import evaluation, files, policies, style, versions
+from arc_suite.cli.flags import bodies, define_body, define_task, made_body, task
+from arc_suite.cli.program import progress
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import Body
+from arc_suite.style import sources
+
+FLAGS = flags.FLAGS
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string(
+    "robot", "queen", f"{', '.join(ROBOTS)}, or all. [default: the one of stored tracks, else queen]"
+)
+flags.DEFINE_string("policy", "cpg", sources.HELP)
+flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
+flags.DEFINE_string("compare", None, "A second policy, file or dataset, shown beside the first.")
+flags.DEFINE_string("compare_preset", "medium", "Preset of --compare, if that is the cpg.")
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", lower_bound=1)
+flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
+flags.DEFINE_string("json", None, "File to write the figures to, as JSON.")
+flags.DEFINE_string(
+    "output",
+    None,
+    "Folder to write pictures to, made if need be; of several robots, a folder in it for each.",
+    short_name="o",
+)
+flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz).")
+
+
+def chosen_sources() -> dict[str, style.Source]:
+    """Return what is shown side by side, by label."""
+    first = style.source(FLAGS.policy, FLAGS.preset)
+    if FLAGS.compare is None:
+        return {first.label: first}
+    second = style.source(FLAGS.compare, FLAGS.compare_preset)
+    if first.label != second.label:
+        return {first.label: first, second.label: second}
+    if FLAGS.policy == FLAGS.compare:
+        raise ValueError(f"--compare: expected another one than {first.label!r}")
+    return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
+
+
+def chosen_bodies(stored: list[Body]) -> dict[str, Body]:
+    """Return the bodies that flags ask for, else the one whose tracks are stored, by name."""
+    if stored and not _ROBOT.present and made_body() is None:
+        return {stored[0].name: stored[0]}
+    return bodies(_ROBOT)
+
+
+def number(value: float, decimals: int = 3) -> str:
+    """Return a number as text; a dash for NaN."""
+    return "-" if math.isnan(value) else f"{value:.{decimals}f}"
+
+
+def spread(summary: evaluation.Summary) -> str:
+    """Return mean +- standard deviation as text, the mean alone where it is not finite."""
+    if not math.isfinite(summary.mean):
+        return number(summary.mean)
+    decimals = 1 if abs(summary.mean) >= 100.0 else 3
+    return f"{number(summary.mean, decimals)} +- {number(summary.deviation, decimals)}"
+
+
+def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, list[str]]]) -> None:
+    """Print rows of a name, a metric's figures, and a cell for each column."""
+    width = max(8, *(len(text) for text in [*columns, *(cell for _, _, cells in rows for cell in cells)]))
+    first = max(18, len(heading))
+    line = f"{{:<{first}}} {{:<8}} {{:>10}}" + f"  {{:>{width}}}" * len(columns)
+    header = line.format(heading, "unit", "prescribed", *columns)
+    print("", header, "-" * len(header), sep="\n")
+    for name, metric, cells in rows:
+        prescribed = metric.get("prescribed")
+        prescribed = "" if prescribed is None else number(prescribed)
+        print(line.format(name.replace("_", " "), metric.get("unit", ""), prescribed, *cells))
+
+
+def print_report(robot: str, reports: dict) -> None:
+    """Print the tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
+    first = next(iter(reports.values()))
+    rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
+    rows += [
+        (name, metric, [spread(r["metrics"][name]["robot"]) for r in reports.values()])
+        for name, metric in first["metrics"].items()
+    ]
+    print_table(robot, list(reports), rows)
+    for label, figures in reports.items():
+        rows = [
+            (name, metric, [number(summary.mean) for summary in metric["legs"].values()])
+            for name, metric in figures["metrics"].items()
+            if metric["legs"]
+        ]
+        print_table(f"{robot}, {label}", list(first["metrics"]["duty_factor"]["legs"]), rows)
+
+
+@contextlib.contextmanager
+def pictures(robots: list[str]):
+    """Yields a function that writes the pictures of a robot's tracks by label; does nothing without `--output`."""
+    if FLAGS.output is None:
+        yield lambda robot, tracks: None
+        return
+    try:
+        from arc_suite.style.plots import PICTURES
+    except ImportError as error:
+        raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
+    with contextlib.ExitStack() as stack:
+        targets = {}
+        for robot in robots:
+            folder = files.folder(pathlib.Path(FLAGS.output, robot if len(robots) > 1 else ""))
+            targets[robot] = {name: stack.enter_context(files.writing(folder / f"{name}.png")) for name in PICTURES}
+
+        def draw(robot, tracks):
+            for name, file in targets[robot].items():
+                PICTURES[name](tracks).savefig(file)
+
+        yield draw
+
+
+@contextlib.contextmanager
+def saving(robots: list[str]):
+    """Yields a function that saves tracks; does nothing without `--save`."""
+    if FLAGS.save is None:
+        yield lambda tracks: None
+        return
+    if not FLAGS.save.endswith(".npz"):
+        raise ValueError(f"--save={FLAGS.save}: expected a file that ends in .npz")
+    if len(robots) > 1:
+        raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")
+    with files.writing(FLAGS.save) as file:
+        yield lambda tracks: style.save(file, tracks)
+
+
+def main() -> None:
+    """Record, measure, print and write."""
+    task_name, task_kwargs = task()  # WIRE: to style.source in chosen_sources
+    chosen = chosen_sources()
+    walkers = chosen_bodies([source.body for source in chosen.values() if source.body is not None])
+    seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
+    takes = {
+        robot: {label: source.takes(body, seeds) for label, source in chosen.items()} for robot, body in walkers.items()
+    }
+    robots = list(walkers)
+    with files.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
+        reports = {}
+        for robot, by_label in takes.items():
+            tracks = {}
+            for label, several in by_label.items():
+                with progress(several, desc=f"{robot}, {label}", unit="episode", leave=False) as bar:
+                    tracks[label] = [take() for take in bar]
+            save(next(iter(tracks.values())))
+            reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
+            print_report(robot, reports[robot])
+            draw(robot, {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()})
+        file.update(
+            task=task_name,
+            task_kwargs=task_kwargs,
+            episodes=FLAGS.episodes,
+            seed=FLAGS.seed,
+            robots=reports,
+            versions=versions.recorded(),
+        )

@@ -1,0 +1,108 @@
+"""Search the numbers of a robot's demonstrator that earn most.
+
+It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off at any moment, the same command goes on.
+At the end the best numbers are judged beside `medium` over many resets and printed as a row for the
+table of presets.
+
+  arc-suite tune_cpg --robot queen --output out/tune/queen
+"""
+
+import contextlib
+import pathlib
+
+from absl import flags
+
+from arc_suite import checks, evaluation, files, versions
+from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.program import progress
+from arc_suite.cpg.presets import TUNINGS, Preset
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks.walk import HORIZON
+from arc_suite.tuning import Journal, Judge, Search
+from arc_suite.tuning.judge import STYLE
+from arc_suite.tuning.search import HARD
+
+FLAGS = flags.FLAGS
+define_task()
+flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
+flags.DEFINE_integer("generations", 250, "Generations of the search; more make a finished one go on.", lower_bound=1)
+flags.DEFINE_integer("episodes", 2, "Episodes by which a candidate is judged.", lower_bound=1)
+flags.DEFINE_integer("steps", 300, "Control steps of these episodes.", 1, HORIZON)
+flags.DEFINE_integer("starts", 1000, "Starts, of which candidates are tried in the hardest.", lower_bound=HARD)
+flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
+flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
+flags.DEFINE_string(
+    "output", "out/tune", "Folder of the journal, the plot and the result, made if need be.", short_name="o"
+)
+
+
+def search(folder: pathlib.Path) -> tuple[Search, Journal]:
+    """Search behind a progress bar, or go on."""
+    settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps", "starts")}
+    with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
+        try:
+            course = Search(**settings)
+        except ImportError as error:
+            raise ValueError(f"a search needs cma: pip install 'arc_suite[tune]' ({error})") from None
+        for generation in journal.generations:
+            course.step(generation.fitness)
+        done = len(journal.generations)
+        with progress(total=max(FLAGS.generations, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
+            for _ in range(done, FLAGS.generations):
+                journal.append(course.step())
+                bar.set_postfix_str(f"return {HORIZON * journal.generations[-1].reward:.0f}")
+                bar.update()
+    return course, journal
+
+
+def judge(preset: Preset) -> dict:
+    """Return the return, falls and style over the resets, of the result and of medium."""
+    body = ROBOTS[FLAGS.robot]
+    presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
+    score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()), range(FLAGS.resets))
+    return {
+        name: {"return": evaluation.summary(HORIZON * score.rewards[row]), "falls": int(score.falls[row].sum())}
+        | {cost: float(values[row].mean()) for cost, values in score.style.items()}
+        for row, name in enumerate(presets)
+    }
+
+
+def violations(figures: dict) -> list[str]:
+    """Return in what the result is not as good as it must be, a line each."""
+    tuned, medium = figures["tuned"], figures["medium"]
+    worse = [f"{name} {tuned[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if tuned[name] > medium[name]]
+    return worse + [f"{tuned['falls']} falls"] * bool(tuned["falls"])
+
+
+def main() -> None:
+    """Search, judge, print and write."""
+    task_name, task_kwargs = task()  # WIRE: to Search, Judge and the settings of the journal
+    checks.name(FLAGS.robot, TUNINGS, "robot")
+    try:
+        from arc_suite.tuning import plots
+    except ImportError as error:
+        raise ValueError(f"the plot needs matplotlib: pip install 'arc_suite[plot]' ({error})") from None
+    folder = files.folder(FLAGS.output)
+    with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
+        course, journal = search(folder)
+        preset = course.result()
+        plots.course(FLAGS.robot, course.reward, journal.generations, HORIZON).savefig(picture)
+        figures = judge(preset)
+        file.update(
+            robot=FLAGS.robot,
+            seed=FLAGS.seed,
+            generations=len(journal.generations),
+            resets=FLAGS.resets,
+            preset=preset,
+            figures=figures,
+            versions=versions.recorded(),
+        )
+    columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
+    header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
+    print(header, "-" * len(header), sep="\n")
+    for name, row in figures.items():
+        total = f"{row['return'].mean:.1f} +- {row['return'].deviation:.1f}"
+        print(columns.format(name, total, row["falls"], *(f"{row[cost]:.3f}" for cost in STYLE)))
+    print(f"\n{preset}")
+    if broken := violations(figures):
+        raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")
