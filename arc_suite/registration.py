@@ -129,6 +129,6 @@ def register_ids() -> None:
 
 
 def importable(kind: str, name: str) -> str:
-    """Return a name in the form that another process can look up: with the module that registers it, if there is one."""
+    """Return a name as another process can look it up: with the module that registers it, if there is one."""
     module = _modules.get((kind, name))
     return name if module is None else f"{module}:{name}"

@@ -1,7 +1,8 @@
 """Let random bodies walk and count those that do.
 
-Bodies are told by seed, so that anyone can try some that nobody has seen. A body walks if it does not fall, its torso touches the ground for less than 1 % of the time, it
-gets more than one body length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
+Bodies are told by seed, so that anyone can try some that nobody has seen. A body walks if it does
+not fall, its torso touches the ground for less than 1 % of the time, it gets more than one body
+length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
 
   arc-suite census --first 0 --count 500
   arc-suite census --first 7000 --count 100 --legs 4 --picture failures.png
@@ -16,6 +17,7 @@ from absl import flags
 from arc_suite import files
 from arc_suite.cli import films
 from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.program import progress
 from arc_suite.evaluation import census
 from arc_suite.robots import generator
 
@@ -51,14 +53,13 @@ def picture(outcomes: list[census.Outcome]) -> np.ndarray:
 
 def main() -> None:
     """Run the census and print it."""
-    task_name, task_kwargs = task()  # WIRE: to census.Trial
     trials = [
-        census.Trial(seed, FLAGS.legs, FLAGS.links, FLAGS.seconds, FLAGS.froude, FLAGS.in_phase)
+        census.Trial(seed, FLAGS.legs, FLAGS.links, FLAGS.seconds, FLAGS.froude, FLAGS.in_phase, *task())
         for seed in range(FLAGS.first, FLAGS.first + FLAGS.count)
     ]
     with contextlib.ExitStack() as stack:
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
-        outcomes = list(census.census(trials, FLAGS.processes))
+        outcomes = list(census.census(trials, FLAGS.processes, progress))
         print(census.table(outcomes))
         print(census.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]

@@ -10,8 +10,8 @@ from arc_suite import checks, robots
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.stride import Stride
-from arc_suite.robots import ROBOTS, gaits
 from arc_suite.models.sizing import control_timestep
+from arc_suite.robots import ROBOTS, gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import fitted_gait
 

@@ -2,8 +2,6 @@
 
 import collections
 import math
-from collections.abc import Mapping
-from typing import Any
 
 import dm_env
 import numpy as np

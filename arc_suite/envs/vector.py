@@ -1,7 +1,6 @@
 """Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
 
 import functools
-import operator
 import os
 import threading
 from collections.abc import Iterable, Mapping, Sequence
@@ -107,7 +106,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         self.task, model = prepared(domain_name, task_name, task_kwargs)
         pictures.check_camera(model, camera_id)
-        self._step_limit = np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
+        self._step_limit = (
+            np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
+        )
 
         self.batch = Batch(model, self.num_envs, threads, self.task.reads)
         self._memory = None  # of all rows, with a leading axis

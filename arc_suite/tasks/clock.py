@@ -4,7 +4,6 @@ A gait's edges fall exactly on control steps, where rounding decides; so the pha
 double precision once, and every run, on a CPU or a GPU, looks them up.
 """
 
-import itertools
 import math
 from typing import NamedTuple, Self
 
@@ -42,7 +41,9 @@ class Clock(NamedTuple):
         """
         turn = TWO_PI * frequency * control_timestep
         count = int(min(steps, _LONGEST)) + 1
-        phases = np.array(list(itertools.accumulate(range(1, count), lambda phase, _: (phase + turn) % TWO_PI, initial=0.0)))
+        phases = np.zeros(count)
+        for tick in range(1, count):
+            phases[tick] = (phases[tick - 1] + turn) % TWO_PI
         if steps > _LONGEST:
             ends = np.arange(count // 2, count)
             phases = phases[: ends[np.argmin(np.abs(np.sin(0.5 * phases[ends])))]]

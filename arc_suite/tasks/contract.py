@@ -141,7 +141,12 @@ class Task(ABC):
 
     @property
     def parameters(self) -> Parameters | None:
-        """What the task prescribes of a walk: target speed, gait, standing pose; None where it prescribes none."""
+        """What the task prescribes of a walk: its gait and its standing pose; None where it prescribes none."""
+        return None
+
+    @property
+    def target_velocity(self) -> float | None:
+        """The velocity along world x that is asked for all the time, m/s; None where it changes or is not."""
         return None
 
     def first(self) -> Any:

@@ -45,6 +45,7 @@ class Steer(walk.Walk):
 
     name = "steer"
     commands = {"command": 3}
+    target_velocity = None
     bonuses = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
 
     @functools.cached_property

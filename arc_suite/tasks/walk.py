@@ -233,6 +233,11 @@ class Walk(Task):
         """The numbers that terms read."""
         return self.settings.parameters
 
+    @property
+    def target_velocity(self) -> float | None:
+        """The target velocity, m/s."""
+        return self.parameters.target_velocity
+
     def start(self, random: np.random.RandomState, carry: Any) -> Start:
         """Draw the state: the standing pose, with noise. The clock starts at 0, with no action before."""
         joints = len(self.scene.body.joint_names)
