@@ -74,7 +74,9 @@ def _contact(model: mujoco.MjModel, first: int, second: int) -> dict:
         mixed = {
             "condim": condim.max(),
             "friction": friction.max(axis=0),
-            "solref": share * solref[0] + (1.0 - share) * solref[1] if (solref > 0.0).all() else solref.min(axis=0),
+            "solref": share * solref[0] + (1.0 - share) * solref[1]
+            if (solref[:, 0] > 0.0).all()
+            else solref.min(axis=0),
             "solimp": share * solimp[0] + (1.0 - share) * solimp[1],
         }
     slide, spin, roll = mixed["friction"]
