@@ -4,6 +4,7 @@ import contextlib
 import functools
 import io
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -85,7 +86,7 @@ def _help(module: ModuleType, is_script: bool) -> str:
     """Return a program's docstring and flags; examples call the script, if it is one that runs the program."""
     text = module.__doc__.strip()
     if is_script:
-        text = text.replace(f"arc-suite {module.__name__.rpartition('.')[2]} ", f"python {sys.argv[0]} ")
+        text = re.sub(rf"\barc-suite {module.__name__.rpartition('.')[2]}\b", f"python {sys.argv[0]}", text)
     shown = flags.FlagValues()
     for name, defined in flags.FLAGS.flags_by_module_dict().items():
         if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):

@@ -27,8 +27,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(tmp_path):
     document.write_text("Before.\n<!-- benchmark -->\nold\n<!-- end of benchmark -->\nAfter.\n")
     small = ("--robots=queen,leaper", "--rows=1,4", "--workers=1,2", "--rounds=2", "--steps=2")
     result = bench(*small, f"--document={document}", folder=tmp_path)
-    assert result.returncode == 0, result.stderr
-    assert "6/6" in result.stderr  # progress
+    assert (result.returncode, result.stderr) == (0, "")
     lines = result.stdout.splitlines()
     for start in (
         "mj_step, full model",

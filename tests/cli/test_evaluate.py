@@ -57,6 +57,22 @@ def test_json_holds_every_episode_and_the_versions(tmp_path):
     assert "arc_suite" in report["versions"]
 
 
+def test_another_task_than_the_papers_has_no_expert(tmp_path):
+    path = tmp_path / "evaluation.json"
+    changed = ("--set=target_velocity=0.25", '--set=weights={"posture": -0.01}', "--set=gait=wave")
+    result = evaluate("--robot=all", "--policy=zero", "--episodes=1", *changed, f"--json={path}")
+    assert result.returncode == 0, result.stderr
+    rows = [line.split() for line in result.stdout.splitlines()[2:]]
+    assert [(row[0], row[7]) for row in rows] == [(robot, "-") for robot in ("queen", "bastion", "tick", "leaper")]
+    report = json.loads(path.read_text())
+    assert report["task"] == "walk"
+    assert report["task_kwargs"] == {"target_velocity": 0.25, "weights": {"posture": -0.01}, "gait": "wave"}
+    assert "return_over_expert" not in report
+    plain = evaluate("--robot=queen", "--policy=zero", "--episodes=1").stdout.splitlines()[2].split()
+    assert plain[7] == "2048"
+    assert plain[1] != rows[0][1]
+
+
 def test_json_is_refused_before_the_work_starts():
     result = evaluate("--json=/nowhere/a.json")
     assert (result.returncode, result.stdout) == (1, "")
@@ -90,6 +106,6 @@ def test_bad_input_is_one_line_and_exit_status_1(arguments, message):
 
 def test_help_shows_an_example_and_the_flags():
     result = evaluate("--help")
-    assert "python tools/evaluate.py --robot all" in result.stdout
+    assert f"python {TOOL} --robot all --policy cpg" in result.stdout
     for flag in ("--robot", "--policy", "--preset", "--episodes", "--seed", "--json"):
         assert flag in result.stdout

@@ -2,15 +2,22 @@
 
 import collections
 import json
+import os
+import pty
 import shlex
 import subprocess
 import sys
+import termios
 
 import pytest
 
-from arc_suite.cli.program import writing, writing_json
+import arc_suite
+from arc_suite.files import writing, writing_json
 
-TOOL = '''"""Counts."""
+TOOL = '''"""Count.
+
+arc-suite __main__ --count 3
+"""
 import signal, sys
 from absl import flags
 from arc_suite.cli import program
@@ -25,6 +32,8 @@ def main():
     kinds = {"value": ValueError, "os": OSError, "gl": RenderingUnavailable, "key": KeyError, "int": KeyboardInterrupt}
     if RAISES.value == "signal":
         signal.raise_signal(signal.SIGINT)
+    for _ in program.progress(range(COUNT.value), "counting"):
+        pass
     if RAISES.value:
         raise kinds[RAISES.value]("a\\n  b")
     print("counted", COUNT.value)
@@ -93,10 +102,42 @@ def test_wrong_arguments_are_one_line(tool, argument, message):
     assert done.stderr.startswith(f"count.py: {message}")
 
 
-def test_help_shows_docstring_and_flags(tool):
-    done = tool("--help")
-    assert "Counts." in done.stdout
+@pytest.mark.parametrize("flag", ["--help", "-h"])
+def test_help_shows_docstring_and_flags_of_the_program_alone(tool, flag):
+    done = tool(flag)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("Count.\n\npython ")  # the example calls this very script
+    assert [line.split(":")[0] for line in done.stdout.splitlines() if line.startswith("-")] == [
+        "--count",
+        "-h,--[no]help",
+        "--output",
+        "--raises",
+        "--[no]version",
+    ]
     assert "How many." in done.stdout
+
+
+def test_help_is_cut_short_without_complaint(tool):
+    line = f"{shlex.join(map(str, tool().args))} --help | head -n 1"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("Count.\n", "")
+
+
+def test_version(tool):
+    done = tool("--version", "--raises=value")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"arc_suite {arc_suite.__version__}\n", "")
+
+
+def test_progress_is_shown_on_terminals_alone(tool):
+    assert tool("--count=3").stderr == ""
+    ours, theirs = pty.openpty()
+    termios.tcsetwinsize(theirs, (24, 80))
+    done = subprocess.run([*tool().args, "--count=3"], stdout=subprocess.DEVNULL, stderr=theirs)
+    os.close(theirs)
+    shown = os.read(ours, 10_000).decode()
+    os.close(ours)
+    assert done.returncode == 0
+    assert "counting" in shown and "3/3" in shown
 
 
 def test_writing_replaces_the_target_only_at_the_end(tmp_path):

@@ -11,8 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import arc_suite
 from arc_suite.cli import films
-from arc_suite.robots import ROBOTS
+from arc_suite.models.sizing import control_timestep
+from arc_suite.policies import policy
+from arc_suite.robots import generator
+from arc_suite.robots.spec_files import body_to_json
 
 TOOL = Path(__file__).parents[2] / "tools" / "render.py"
 
@@ -92,8 +96,55 @@ def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 1.0
 
 
+@pytest.mark.parametrize(("scale", "frames", "milliseconds"), [(1.0, 6, 350), (16.0, 6, 1390), (0.1, 3, 110)])
+def test_films_keep_the_pace_of_any_body(tmp_path, scale, frames, milliseconds):
+    """A giant's control step is longer, a mite's shorter than what players show: some of its frames are left out."""
+    body = generator.scaled(generator.generate(4, 2), scale)
+    (tmp_path / "body.json").write_text(body_to_json(body))
+    done = render(tmp_path, "--spec=body.json", "--steps=6", "-o", "body.gif")
+    assert done.returncode == 0, done.stderr
+    durations = []
+    with Image.open(tmp_path / "body.gif") as film:
+        for i in range(film.n_frames):
+            film.seek(i)
+            durations.append(film.info["duration"])
+    assert (len(durations), sum(durations)) == (frames, milliseconds)
+    assert milliseconds / 1000 == pytest.approx(6 * control_timestep(body), abs=0.005)
+
+
+def test_a_film_of_frames_between_hundredths_keeps_their_sum(tmp_path):
+    path = tmp_path / "a.gif"
+    frames = np.zeros((20, 8, 20, 3), np.uint8)
+    frames[range(20), 4, range(20)] = 255
+    films.write_gif(path, frames, 0.0333)
+    with Image.open(path) as film:
+        total = 0
+        for i in range(film.n_frames):
+            film.seek(i)
+            total += film.info["duration"]
+    assert (film.n_frames, total) == (20, 670)
+
+
+def test_settings_of_the_task_are_seen(tmp_path):
+    plain = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png")
+    other = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png", "--set=weights={}")
+    quick = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png", "--set=velocity_band=9")
+    assert plain.stdout == other.stdout
+    assert quick.stdout.splitlines()[1:] == plain.stdout.splitlines()[1:]
+    assert quick.stdout != plain.stdout
+
+
+def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
+    (tmp_path / "imageio_ffmpeg.py").write_text("raise ModuleNotFoundError(\"No module named 'imageio_ffmpeg'\")")
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    done = render(tmp_path, "--steps=1", "--output=a.mp4", PYTHONPATH=path)
+    message = "MP4 needs imageio-ffmpeg: pip install 'arc_suite[video]' (No module named 'imageio_ffmpeg')"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"render.py: {message}\n")
+
+
 def test_a_take_stays_at_its_end():
-    take = films.Take(ROBOTS["leaper"], "random", "medium", 0, "profile", (64, 48))
+    environment = arc_suite.load("leaper", "walk", {"random": 0})
+    take = films.Take("leaper", environment, policy("random", "leaper", seed=0), "profile", (64, 48))
     for _ in range(200):
         if take.ended:
             break

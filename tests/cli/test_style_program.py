@@ -161,6 +161,6 @@ def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
 
 def test_help_shows_an_example_and_the_flags():
     done = run("--help")
-    assert "python tools/style.py --robot queen" in done.stdout
+    assert f"python {TOOL} --robot queen" in done.stdout
     for flag in ("robot", "spec", "policy", "preset", "compare", "episodes", "seed", "json", "output", "save"):
         assert f"--{flag}" in done.stdout

@@ -1,0 +1,97 @@
+"""The command `arc-suite`, and `python -m arc_suite`, which is the same."""
+
+import functools
+import pathlib
+import re
+import subprocess
+import sys
+
+import pytest
+
+import arc_suite
+from arc_suite.cli import main
+
+ROOT = pathlib.Path(__file__).parents[2]
+VERSION = f"arc_suite {arc_suite.__version__}\n"
+TASKED = ("render", "evaluate", "style", "collect", "tune_cpg", "census")
+TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in main.PROGRAMS if name not in ("census", "doctor")}
+TOOLS |= {"census": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_suite" / "doctor.py"}
+
+
+def run(*arguments):
+    return subprocess.run([sys.executable, "-m", "arc_suite", *arguments], capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",)])
+def test_help_lists_the_programs(arguments):
+    done = run(*arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    lines = done.stdout.splitlines()
+    assert lines[0] == "arc-suite PROGRAM [flags]"
+    assert [line.split()[0] for line in lines if line.startswith("  ")] == list(main.PROGRAMS)
+    assert "  render       Render a robot that walks: a picture (.png) or a film (.mp4, .gif)." in lines
+    assert max(map(len, lines)) <= 100
+
+
+def test_every_program_is_listed():
+    folder = pathlib.Path(main.__file__).parent
+    programs = {path.stem for path in folder.glob("*.py") if "\ndef main() -> " in path.read_text()}
+    assert programs - {"main"} == set(main.PROGRAMS)
+
+
+def test_version():
+    done = run("--version")
+    assert (done.returncode, done.stdout, done.stderr) == (0, VERSION, "")
+
+
+@pytest.mark.parametrize(
+    ("argument", "near"), [("rendr", "render"), ("walk_census", "census"), ("--robot", "doctor"), ("stile", "style")]
+)
+def test_an_unknown_program_is_one_line_with_the_nearest(argument, near):
+    done = run(argument, "--robot=queen")
+    line = f"arc-suite: unknown program {argument!r}; did you mean {near!r}? (there are: {', '.join(main.PROGRAMS)})\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
+
+
+def test_only_the_program_that_runs_is_imported():
+    code = (
+        "import sys; from arc_suite.cli import main; sys.argv[1:] = ['doctor', '--version']\n"
+        "try: main.main()\n"
+        "finally: print(sorted(name for name in sys.modules if name.startswith('arc_suite.cli.')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == f"{VERSION}{['arc_suite.cli.doctor', 'arc_suite.cli.main', 'arc_suite.cli.program']}\n"
+
+
+@functools.cache
+def help_of(program):
+    done = run(program, "--help")
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+@pytest.mark.parametrize("program", main.PROGRAMS)
+def test_help_of_a_program(program):
+    text = help_of(program)
+    assert text.startswith(f"{main.summary(program)}\n\n")
+    assert f"\n  arc-suite {program}" in text
+    names = re.findall(r"^(-\S*?):", text, re.MULTILINE)
+    assert "--[no]version" in names
+    assert ("-o,--output" in names) == (program in ("build_model", "render", "style", "tune_cpg"))
+    assert "--output" not in names
+    assert {"--task", "--set"} & set(names) == ({"--task", "--set"} if program in TASKED else set())
+
+
+@pytest.mark.parametrize("program", main.PROGRAMS)
+def test_errors_of_a_program_name_it(program):
+    done = run(program, "stray")
+    line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
+
+
+@pytest.mark.parametrize("program", main.PROGRAMS)
+def test_a_tool_is_the_program(program):
+    tool = TOOLS[program]
+    done = subprocess.run([sys.executable, tool, "--help"], capture_output=True, text=True)
+    expected = help_of(program).replace(f"arc-suite {program}", f"python {tool}")
+    assert (done.returncode, done.stdout, done.stderr) == (0, expected, "")

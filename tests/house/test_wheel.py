@@ -1,0 +1,95 @@
+"""The wheel: what is in it, and that it works where there is no clone."""
+
+import email
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import zipfile
+
+import mujoco
+import pytest
+
+import arc_suite
+
+ROOT = pathlib.Path(__file__).parents[2]
+NOT_SOURCES = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "out")
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """Builds in a copy: a build leaves files beside the sources, and takes up what another one left."""
+    folder = tmp_path_factory.mktemp("wheel")
+    shutil.copytree(ROOT, folder / "sources", ignore=NOT_SOURCES)
+    command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, folder / "sources"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(wheel, tmp_path_factory):
+    """Installs into an empty environment that borrows dependencies alone, and runs commands there."""
+    folder = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
+    install = ["install", "--quiet", "--no-deps", "--no-index", "--disable-pip-version-check", wheel]
+    subprocess.run([sys.executable, "-m", "pip", "--python", folder / "bin" / "python", *install], check=True)
+    (site,) = folder.glob("lib/python*/site-packages")
+    # Comes after the environment's own; that a clone is installed there for development is not taken over.
+    (site / "dependencies.pth").write_text(sysconfig.get_path("purelib"))
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+
+    def run(program, *arguments):
+        command = [folder / "bin" / program, *arguments]
+        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout
+
+    return run
+
+
+def metadata(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        return email.message_from_bytes(archive.read(name))
+
+
+def test_the_wheel_holds_the_package_and_nothing_else(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
+    prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"
+    assert {name for name in names if not name.startswith(prefix)} == package
+    assert [name for name in names if name.endswith("/LICENSE")]
+
+
+def test_its_description_has_no_link_that_only_a_repository_has(wheel):
+    about = metadata(wheel)
+    assert (about["Version"], about["License"]) == (arc_suite.__version__, "Apache-2.0")
+    description = about.get_payload()
+    links = re.findall(r"\]\(([^)]*)\)", description)
+    assert links
+    assert [link for link in links if not link.startswith("https://")] == []
+    assert "<img" not in description
+
+
+def test_the_package_comes_from_the_wheel(run):
+    code = "import arc_suite; print(arc_suite.__file__)"
+    assert pathlib.Path(run("python", "-c", code).strip()).parents[1].name == "site-packages"
+    assert str(ROOT) not in run("python", "-c", code)
+
+
+def test_programs(run):
+    assert run("arc-suite", "--version") == f"arc_suite {arc_suite.__version__}\n"
+    model = mujoco.MjModel.from_xml_string(run("arc-suite", "build_model", "--legs", "6", "--links", "3"))
+    assert model.nu == 18
+    table = run("arc-suite", "evaluate", "--robot", "tick", "--episodes", "1")
+    assert table.splitlines()[-1].startswith("tick ")
+    assert "arc-suite doctor" in run("python", "-m", "arc_suite", "doctor", "--help")
+    assert "Flags:" in run("python", "-m", "arc_suite.doctor", "--help")
