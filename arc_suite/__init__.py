@@ -14,8 +14,8 @@ with versions.explained():
     opengl.select_backend()  # before anything imports dm_control
 
     from arc_suite import registration, registry
+    from arc_suite.envs.dm import load
     from arc_suite.registration import register
-    from arc_suite.registry import load
 
     registration.register_ids()
 

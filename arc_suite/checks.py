@@ -1,14 +1,18 @@
 """Checks of names, seeds and numbers, whose errors are one line with one wording."""
 
 import difflib
+import math
 import operator
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
 
 _LARGEST_SEED = 2**32 - 1  # that a RandomState takes
 
 
 def name(value, valid: Iterable[str], kind: str) -> str:
-    """Return the value if it is valid.
+    """Return the value if it is a valid name.
 
     Raises:
         ValueError: it is not; the message names it and the nearest valid name.
@@ -27,10 +31,69 @@ def seed(value) -> int:
     Raises:
         ValueError: it is not an integer from 0 to 2**32 - 1; one line.
     """
+    return integer("seed", value, 0, _LARGEST_SEED)
+
+
+def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
+    """Return the value as a Python integer.
+
+    Args:
+        what: name of the value, with which an error begins.
+        value: a Python or NumPy integer.
+        low: least that it may be.
+        high: most that it may be; None for no bound.
+
+    Raises:
+        ValueError: it is no integer, or out of range; one line.
+    """
     try:
         number = operator.index(value)
     except TypeError:
-        number = -1
-    if not 0 <= number <= _LARGEST_SEED:
-        raise ValueError(f"seed: expected an integer from 0 to {_LARGEST_SEED}, got {value!r}")
+        number = low - 1
+    if number < low or (high is not None and number > high):
+        bounds = f"from {low}" if high is None else f"from {low} to {high}"
+        raise ValueError(f"{what}: expected an integer {bounds}, got {value!r}")
     return number
+
+
+def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf) -> float:
+    """Return the value as a float.
+
+    Args:
+        what: name of the value, with which an error begins.
+        value: a Python or NumPy number.
+        low: least that it may be.
+        high: most that it may be.
+
+    Raises:
+        ValueError: it is no finite number, or out of range; one line.
+    """
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not real or not math.isfinite(value) or not low <= value <= high:
+        raise ValueError(f"{what}: expected a finite number from {low:g} to {high:g}, got {value!r}")
+    return float(value)
+
+
+def array(what: str, value: Any, size: int) -> np.ndarray:
+    """Return the value as (size,) floats; a single number stands for all of them.
+
+    Raises:
+        ValueError: it is neither one finite number nor so many of them; one line.
+    """
+    numbers = np.asarray(value)
+    if numbers.dtype.kind not in "if" or numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
+        raise ValueError(f"{what}: expected one finite number or {size} of them, got {value!r}")
+    return np.broadcast_to(numbers, size).astype(float)
+
+
+def mapping(what: str, value: Any) -> Mapping[str, Any]:
+    """Return the value if it is a mapping, and an empty one for None.
+
+    Raises:
+        ValueError: it is neither; one line.
+    """
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{what}: expected a mapping of names to values, got {value!r}")
+    return value

@@ -1,74 +1,82 @@
-"""What the suite knows: its own robots and tasks, those of other packages, and Gymnasium's ids for them all."""
+"""Robots and tasks of other packages, and Gymnasium's ids for all there are."""
 
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
 
+from arc_suite import registry
+from arc_suite.arenas import ARENAS
 from arc_suite.cpg.demonstrator import pattern
 from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
 from arc_suite.models.looks import LOOKS
 from arc_suite.models.looks.look import Look
-from arc_suite.registry import all_tasks
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import TASKS, walk
-
-MAX_EPISODE_STEPS = 1000
+from arc_suite.tasks import TASKS, Task, walk
+from arc_suite.tasks.contract import STEPS
 
 _modules = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
 
 def register(
     *,
+    module: str | None = None,
     body: Body | None = None,
     walk: Mapping[str, Any] | None = None,
     tuning: Mapping[str, Preset] | None = None,
     look: Look | None = None,
-    tasks: Mapping[str, Callable] | None = None,
+    tasks: Iterable[type[Task]] = (),
+    arenas: Mapping[str, Any] | None = None,
 ) -> None:
-    """Adds a robot, tasks or both to the suite: every task then exists for every robot.
+    """Add a robot, tasks, arenas or all of them to the suite: every task then exists for every robot.
 
     Call it where a module is imported. `load` and Gymnasium's ids then name the robot as they name
-    Queen; processes that do not share this one's memory import the module to know the name too.
+    Queen.
 
     Args:
+        module: whose import makes this call, `__name__` there; processes that do not share this
+            one's memory import it to know the names too. None where nobody else needs them.
         body: of the robot; its name becomes a domain.
         walk: the robot's row of numbers in the task walk: keys and units as in `tasks.walk.SETTINGS`,
             and any of `tasks.walk.COMMON`; None to have them fitted to the body.
         tuning: presets of a demonstrator of the robot by name, slow, medium and fast among them; None
             to have them fitted likewise.
         look: what the robot wears; None for what every body wears.
-        tasks: factories by name, called as `tasks.walk.walk` is: with a body, `environment_kwargs` and
-            the caller's `task_kwargs`, `random` among them. The environment's physics is a
-            `physics.Physics`; its task, like dm_control.suite's, keeps its random stream in `_random`.
-            What it offers as `terms`, a mapping of floats, Gymnasium's steps report.
+        tasks: classes by the contract of `tasks.contract`, each with its name.
+        arenas: functions by name, from a body to the `Arena` that suits it.
 
     Raises:
         ValueError: a name that is taken, or a number or tuning that does not fit the body; one line,
             and nothing has been registered.
     """
-    module = sys._getframe(1).f_globals.get("__name__")
-    tasks = dict(tasks or {})
-    for name, factory in tasks.items():
-        if not (isinstance(name, str) and name.isidentifier()):
-            raise ValueError(f"task {name!r}: expected a name of letters, digits and underscores")
-        if not callable(factory):
-            raise ValueError(f"task {name!r}: expected a function that makes an environment, got {factory!r}")
-        if name in TASKS and _modules.get(("task", name)) != module:
-            raise ValueError(f"task {name!r} is already registered")
+    module = None if module == "__main__" else module
+    tasks, arenas = {_task_name(task): task for task in tasks}, dict(arenas or {})
+    for kind, table, new in (("task", TASKS, tasks), ("arena", ARENAS, arenas)):
+        for name, value in new.items():
+            if name in table and (module is None or _modules.get((kind, name)) != module) and table[name] is not value:
+                raise ValueError(f"{kind} {name!r} is already registered")
     if body is None:
         if (walk, tuning, look) != (None, None, None):
             raise ValueError("walk, tuning and look belong to a body, and none is given")
-        if not tasks:
-            raise ValueError("nothing to register: give a body, tasks or both")
+        if not (tasks or arenas):
+            raise ValueError("nothing to register: give a body, tasks or arenas")
     else:
         _register_body(body, walk, tuning, look)
         _modules["domain", body.name] = module
     TASKS.update(tasks)
-    _modules.update({("task", name): module for name in tasks})
+    ARENAS.update(arenas)
+    _modules.update({("task", name): module for name in tasks} | {("arena", name): module for name in arenas})
     register_ids()
+
+
+def _task_name(task) -> str:
+    name = getattr(task, "name", None)
+    if not (isinstance(task, type) and issubclass(task, Task)):
+        raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {task!r}")
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise ValueError(f"task {name!r}: expected a name of letters, digits and underscores")
+    return name
 
 
 def _register_body(body, row, tuning, look) -> None:
@@ -104,22 +112,23 @@ def _check_tuning(body: Body, tuning: Mapping[str, Preset]) -> None:
 
 
 def register_ids() -> None:
-    """Registers `arc_suite/<robot>-<task>-v0` for every task that has no id yet.
+    """Register `arc_suite/<robot>-<task>-v<version>` with Gymnasium for every pair that has no id yet.
 
     The adapters are imported when an environment is made.
     """
-    for domain_name, task_name in all_tasks():
-        env_id = f"arc_suite/{domain_name}-{task_name}-v0"
+    for domain_name, task_name in registry.all_tasks():
+        env_id = registry.env_id(domain_name, TASKS[task_name])
         if env_id not in gymnasium.registry:
             gymnasium.register(
                 env_id,
                 entry_point="arc_suite.envs.gym:Env",
                 vector_entry_point="arc_suite.envs.vector:VectorEnv",
-                max_episode_steps=MAX_EPISODE_STEPS,
-                kwargs={"domain_name": _importable("domain", domain_name), "task_name": _importable("task", task_name)},
+                max_episode_steps=STEPS,
+                kwargs={"domain_name": importable("domain", domain_name), "task_name": importable("task", task_name)},
             )
 
 
-def _importable(kind: str, name: str) -> str:
+def importable(kind: str, name: str) -> str:
+    """Return a name as another process can look it up: with the module that registers it, if there is one."""
     module = _modules.get((kind, name))
-    return name if module in (None, "__main__") else f"{module}:{name}"
+    return name if module is None else f"{module}:{name}"

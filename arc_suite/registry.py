@@ -1,28 +1,29 @@
-"""The registry: every task x every robot, or any other body."""
+"""Names of what there is: robots, tasks and arenas, those of other packages among them."""
 
 import importlib
 import os
 from collections.abc import Mapping
 
 from arc_suite import checks
+from arc_suite.arenas import ARENAS, Arena
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, load_body
-from arc_suite.tasks import TASKS
+from arc_suite.tasks import TASKS, Task
 
 
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
-    """Names of the tasks by name of the robot, as they are now."""
+    """Return the names of the tasks by name of the robot, as they are now."""
     return {domain: tuple(TASKS) for domain in ROBOTS}
 
 
 def all_tasks() -> tuple[tuple[str, str], ...]:
-    """Names of a robot and a task, of all there are now."""
+    """Return the names of robot and task, of all pairs there are now."""
     return tuple((domain, task) for domain in ROBOTS for task in TASKS)
 
 
 def body_of(domain) -> Body:
-    """The body that a domain stands for.
+    """Return the body that a domain stands for.
 
     Args:
         domain: name of a robot, path of a file that holds a body (a `Path`, or a string that ends
@@ -41,36 +42,30 @@ def body_of(domain) -> Body:
     return _find(domain, ROBOTS, "domain")
 
 
-def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
-    """Opens an environment, as `dm_control.suite.load` does.
-
-    Args:
-        domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
-            where that has not been imported yet; or any body; see `body_of`.
-        task_name: walk, or a task of another package likewise.
-        task_kwargs: settings of the task: `time_limit` (s), `random` (a seed or `RandomState`),
-            `gait`, `weights`, and every target and threshold; see `arc_suite.tasks.walk.settings`.
-        environment_kwargs: `flat_observation=True` gives one vector in place of named blocks.
-        visualize_reward: let rendered pictures show the reward as a colour.
-
-    Returns:
-        A `dm_control.rl.control.Environment`.
+def task_of(name: str) -> type[Task]:
+    """Return the task of a name; see `arc_suite.load`.
 
     Raises:
-        ValueError: an unknown name, or a value that does not fit; one line that names it and the
-            nearest valid name.
-        OSError: a file that cannot be read.
+        ValueError: an unknown name; one line.
     """
-    body, task = body_of(domain_name), _find(task_name, TASKS, "task")
-    for name, kwargs in (("task_kwargs", task_kwargs), ("environment_kwargs", environment_kwargs)):
-        if not isinstance(kwargs, Mapping | None):
-            raise ValueError(f"{name}: expected a mapping of names to values, got {kwargs!r}")
-    environment = task(body, environment_kwargs=environment_kwargs, **(task_kwargs or {}))
-    environment.task.visualize_reward = visualize_reward
-    return environment
+    return _find(name, TASKS, "task")
 
 
-def _find(name, table, kind: str):
+def arena_of(arena: str | Arena, body: Body) -> Arena:
+    """Return the arena of a name, made to suit a body, or the arena itself.
+
+    Raises:
+        ValueError: an unknown name; one line.
+    """
+    return arena if isinstance(arena, Arena) else _find(arena, ARENAS, "arena")(body)
+
+
+def env_id(domain_name: str, task: type[Task]) -> str:
+    """Return Gymnasium's id of a robot's task."""
+    return f"arc_suite/{domain_name}-{task.name}-v{task.version}"
+
+
+def _find(name, table: Mapping, kind: str):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
         try:

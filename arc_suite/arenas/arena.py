@@ -36,3 +36,8 @@ class Arena(ABC):
     def is_level(self) -> bool:
         """Whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
         return False
+
+    @property
+    def lists_contacts(self) -> bool:
+        """Whether it pays to list all pairs of geoms that may touch: for ground of few geoms."""
+        return True

@@ -17,6 +17,7 @@ from absl import flags
 from arc_suite import files
 from arc_suite.cli import films
 from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.program import progress
 from arc_suite.evaluation import census
 from arc_suite.robots import generator
 
@@ -52,14 +53,13 @@ def picture(outcomes: list[census.Outcome]) -> np.ndarray:
 
 def main() -> None:
     """Run the census and print it."""
-    task_name, task_kwargs = task()  # WIRE: to census.Trial
     trials = [
-        census.Trial(seed, FLAGS.legs, FLAGS.links, FLAGS.seconds, FLAGS.froude, FLAGS.in_phase)
+        census.Trial(seed, FLAGS.legs, FLAGS.links, FLAGS.seconds, FLAGS.froude, FLAGS.in_phase, *task())
         for seed in range(FLAGS.first, FLAGS.first + FLAGS.count)
     ]
     with contextlib.ExitStack() as stack:
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
-        outcomes = list(census.census(trials, FLAGS.processes))
+        outcomes = list(census.census(trials, FLAGS.processes, progress))
         print(census.table(outcomes))
         print(census.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]

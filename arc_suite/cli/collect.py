@@ -6,7 +6,7 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
   arc-suite collect --robot queen --policy cpg --preset medium --episodes 1000
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1
   arc-suite collect --spec examples/spider.json --policy my_package.policies:make
-  arc-suite collect --verify arc_suite/queen/cpg-medium-v0
+  arc-suite collect --verify arc_suite/queen/walk/cpg-medium-v0
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from arc_suite.cli.flags import bodies, define_body, define_task, made_body, tas
 from arc_suite.cli.program import progress
 from arc_suite.cpg import PRESETS
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks.walk import HORIZON
+from arc_suite.tasks.contract import STEPS
 
 FLAGS = flags.FLAGS
 define_body()
@@ -28,10 +28,10 @@ flags.DEFINE_list("preset", ["medium"], f"Of the cpg: {', '.join(PRESETS)}; seve
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
 flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1)
 flags.DEFINE_integer(
-    "steps", HORIZON, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=HORIZON
+    "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
 )
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
-flags.DEFINE_string("id", None, "Id of the dataset. [default: arc_suite/ROBOT/POLICY-PRESET-v0, or like it]")
+flags.DEFINE_string("id", None, "Id of the dataset. [default: arc_suite/ROBOT/TASK/POLICY-PRESET-v0, or like it]")
 flags.DEFINE_boolean("overwrite", False, "Replace a dataset of that id, once the new one is complete.")
 flags.DEFINE_string("verify", None, "Replay the dataset of this id instead.")
 flags.DEFINE_integer("rows", 64, "Episodes at a time; the data do not depend on it.", lower_bound=1)
@@ -40,7 +40,6 @@ flags.DEFINE_integer("threads", None, "Threads to simulate on; the data do not d
 
 def main() -> None:
     """Collect or verify."""
-    task_name, task_kwargs = task()  # WIRE: to data.Settings
     try:
         from arc_suite import data
     except ImportError as error:
@@ -56,7 +55,7 @@ def main() -> None:
     presets = tuple(checks.name(preset, PRESETS, "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
     for body in walkers.values():
-        settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
+        settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, *task())
         dataset_id = FLAGS.id or settings.dataset_id()
         missing = data.collect(
             dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite, progress

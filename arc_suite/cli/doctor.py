@@ -69,9 +69,9 @@ def draw() -> None:
     """Draw a picture and print, as JSON, what it was drawn with; the doctor runs this in a process of its own."""
     from dm_control import _render
 
-    from arc_suite import registry
+    from arc_suite.envs.dm import load
 
-    physics = registry.load("queen", "walk").physics
+    physics = load("queen", "walk").physics
     try:
         picture = physics.render(48, 64)
     except opengl.RenderingUnavailable as error:

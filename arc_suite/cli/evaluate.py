@@ -1,6 +1,7 @@
-"""Judge a policy: return, length, speed and gait compliance of its episodes.
+"""Judge a policy: return and length of its episodes, and the task's own figures.
 
-The return stands beside that of the paper's demonstrator, where the task is the paper's. IQM is the
+Walk's figures are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
+return stands beside that of the paper's demonstrator, where the task is the paper's. IQM is the
 interquartile mean of the return, with a stratified bootstrap interval.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
@@ -8,7 +9,6 @@ interquartile mean of the return, with a stratified bootstrap interval.
   arc-suite evaluate --robot queen --set target_velocity=0.4
 """
 
-import numpy as np
 from absl import flags
 
 import arc_suite
@@ -27,7 +27,13 @@ flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for eac
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")
 
-COLUMNS = "{:<12} {:>16} {:>26} {:>12} {:>14} {:>12} {:>13}"
+_WIDTHS = (16, 26, 12, 9)  # of the columns that every task has
+
+
+def line(first: str, *cells: str) -> str:
+    """Return a line of the table: the columns that every task has, then the task's own figures."""
+    widths = (*_WIDTHS, *(12 for _ in cells[len(_WIDTHS) :]))
+    return f"{first:<12}" + "".join(f" {cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
 
 
 def main() -> None:
@@ -38,20 +44,20 @@ def main() -> None:
     players = {
         name: (
             arc_suite.load(body, task_name, task_kwargs),
-            policies.policy(FLAGS.policy, body, FLAGS.preset, FLAGS.seed),
+            policies.policy(FLAGS.policy, body, FLAGS.preset),
         )
         for name, body in walkers.items()
     }
     # The paper's demonstrators walked by the published numbers; with others there is nothing to compare with.
-    experts = evaluation.EXPERT_RETURNS if (task_name, task_kwargs) == ("walk", {}) else {}
+    experts = {name: None if task_kwargs else evaluation.expert_return(task_name, name) for name in walkers}
     with files.writing_json(FLAGS.json) as file:
-        header = COLUMNS.format(
-            "robot", "return", "IQM [95 % interval]", "paper's cpg", "length", "speed", "compliance"
-        )
-        print(header, "-" * len(header), sep="\n")
         reports = {}
         for robot, (environment, policy) in players.items():
-            reports[robot] = report(evaluate(robot, environment, policy), experts.get(robot))
+            episodes = evaluate(robot, environment, policy)
+            if not reports:
+                header = line("robot", "return", "IQM [95 % interval]", "paper's cpg", "steps", *episodes[0].progress)
+                print(header, "-" * len(header), sep="\n")
+            reports[robot] = report(episodes, experts[robot])
             print(row(robot, reports[robot]), flush=True)
         file.update(
             task=task_name,
@@ -62,7 +68,7 @@ def main() -> None:
             robots=reports,
             versions=versions.recorded(),
         )
-        if len(reports) > 1 and reports.keys() <= experts.keys():
+        if len(reports) > 1 and None not in experts.values():
             file["return_over_expert"] = total = over_all(reports)
             print(
                 "all          IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]".format(
@@ -85,28 +91,26 @@ def report(episodes: list[evaluation.Episode], expert: float | None) -> dict:
         episodes: of the robot.
         expert: return of the paper's demonstrator, if it has one.
     """
-    total, length, speed, compliance = (evaluation.summary(values) for values in np.transpose(episodes))
+    figures = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
     return {
         "expert_return": expert,
-        "return": total,
-        "length": length,
-        "speed": speed,
-        "compliance": compliance,
+        "return": evaluation.summary([episode.total for episode in episodes]),
+        "length": evaluation.summary([episode.length for episode in episodes]),
+        **{name: evaluation.summary(values) for name, values in figures.items()},
         "episodes": episodes,
     }
 
 
 def row(robot: str, figures: dict) -> str:
     """Return one line of the table."""
-    total = figures["return"]
-    return COLUMNS.format(
+    total, progress = figures["return"], figures["episodes"][0].progress
+    return line(
         robot,
         f"{total.mean:.1f} +- {total.deviation:.1f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
         "-" if figures["expert_return"] is None else f"{figures['expert_return']:.0f}",
-        f"{figures['length'].mean:.1f} steps",
-        f"{figures['speed'].mean:.3f} m/s",
-        f"{100 * figures['compliance'].mean:.1f} %",
+        f"{figures['length'].mean:.1f}",
+        *(f"{figures[name].mean:.3f}" for name in progress),
     )
 
 

@@ -24,7 +24,7 @@ from arc_suite.cli.flags import bodies, define_body, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
-from arc_suite.policies import HELP, PRESET_HELP, policy
+from arc_suite.policies import HELP, PRESET_HELP, alone, policy
 from arc_suite.robots import ROBOTS
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80}
@@ -56,7 +56,7 @@ def main() -> None:
     walkers = bodies(_ROBOT)
     task_name, task_kwargs = task()
     camera = checks.name(FLAGS.camera or ("profile" if len(walkers) == 1 else "portrait"), CAMERAS, "camera")
-    policies = {name: policy(FLAGS.policy, body, FLAGS.preset, FLAGS.seed) for name, body in walkers.items()}
+    policies = {name: alone(policy(FLAGS.policy, body, FLAGS.preset), FLAGS.seed) for name, body in walkers.items()}
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.png, .mp4 or .gif")
     extension = checks.name(Path(FLAGS.output).suffix.lower(), films.WRITERS, "extension")

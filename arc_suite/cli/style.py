@@ -4,7 +4,7 @@
   arc-suite style --policy my_package.policies:make --compare cpg --output out/style
   arc-suite style --spec examples/spider.json --save out/spider.npz
   arc-suite style --policy out/spider.npz --compare zero
-  arc-suite style --policy arc_suite/queen/cpg-medium-v0 --compare arc_suite/queen/random-v0
+  arc-suite style --policy arc_suite/queen/walk/cpg-medium-v0 --compare arc_suite/queen/walk/random-v0
 
 `--output` writes gait.png, reward.png, speed.png and path.png of the first episode. What every
 metric means is written in arc_suite/style/metrics.py.
@@ -20,7 +20,6 @@ from arc_suite import evaluation, files, policies, style, versions
 from arc_suite.cli.flags import bodies, define_body, define_task, made_body, task
 from arc_suite.cli.program import progress
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.spec import Body
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
@@ -58,11 +57,14 @@ def chosen_sources() -> dict[str, style.Source]:
     return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
 
 
-def chosen_bodies(stored: list[Body]) -> dict[str, Body]:
-    """Return the bodies that flags ask for, else the one whose tracks are stored, by name."""
-    if stored and not _ROBOT.present and made_body() is None:
-        return {stored[0].name: stored[0]}
-    return bodies(_ROBOT)
+def chosen_stages(stored: list[style.Stage]) -> dict[str, style.Stage]:
+    """Return the bodies and the task that flags ask for, else those whose tracks are stored, by the body's name."""
+    name, settings = task()
+    if stored and not (FLAGS["task"].present or FLAGS["set"].present):
+        name, settings = stored[0].task, stored[0].task_kwargs
+    unasked = not _ROBOT.present and made_body() is None
+    chosen = [stored[0].body] if stored and unasked else bodies(_ROBOT).values()
+    return {body.name: style.Stage(body, name, settings) for body in chosen}
 
 
 def number(value: float, decimals: int = 3) -> str:
@@ -106,7 +108,7 @@ def print_report(robot: str, reports: dict) -> None:
             for name, metric in figures["metrics"].items()
             if metric["legs"]
         ]
-        print_table(f"{robot}, {label}", list(first["metrics"]["duty_factor"]["legs"]), rows)
+        print_table(f"{robot}, {label}", list(first["metrics"]["foot_slip"]["legs"]), rows)
 
 
 @contextlib.contextmanager
@@ -148,14 +150,14 @@ def saving(robots: list[str]):
 
 def main() -> None:
     """Record, measure, print and write."""
-    task_name, task_kwargs = task()  # WIRE: to style.source in chosen_sources
     chosen = chosen_sources()
-    walkers = chosen_bodies([source.body for source in chosen.values() if source.body is not None])
+    stages = chosen_stages([source.stage for source in chosen.values() if source.stage is not None])
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     takes = {
-        robot: {label: source.takes(body, seeds) for label, source in chosen.items()} for robot, body in walkers.items()
+        robot: {label: source.takes(stage, seeds) for label, source in chosen.items()}
+        for robot, stage in stages.items()
     }
-    robots = list(walkers)
+    robots = list(stages)
     with files.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
         reports = {}
         for robot, by_label in takes.items():
@@ -168,8 +170,8 @@ def main() -> None:
             print_report(robot, reports[robot])
             draw(robot, {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()})
         file.update(
-            task=task_name,
-            task_kwargs=task_kwargs,
+            task=next(iter(stages.values())).task,
+            task_kwargs=next(iter(stages.values())).task_kwargs,
             episodes=FLAGS.episodes,
             seed=FLAGS.seed,
             robots=reports,

@@ -17,7 +17,7 @@ from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.cpg.presets import TUNINGS, Preset
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks.walk import HORIZON
+from arc_suite.tasks.contract import STEPS
 from arc_suite.tuning import Journal, Judge, Search
 from arc_suite.tuning.judge import STYLE
 from arc_suite.tuning.search import HARD
@@ -27,7 +27,7 @@ define_task()
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
 flags.DEFINE_integer("generations", 250, "Generations of the search; more make a finished one go on.", lower_bound=1)
 flags.DEFINE_integer("episodes", 2, "Episodes by which a candidate is judged.", lower_bound=1)
-flags.DEFINE_integer("steps", 300, "Control steps of these episodes.", 1, HORIZON)
+flags.DEFINE_integer("steps", 300, "Control steps of these episodes.", 1, STEPS)
 flags.DEFINE_integer("starts", 1000, "Starts, of which candidates are tried in the hardest.", lower_bound=HARD)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
@@ -39,6 +39,7 @@ flags.DEFINE_string(
 def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
     settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps", "starts")}
+    settings |= dict(zip(("task", "task_kwargs"), task(), strict=True))
     with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
         try:
             course = Search(**settings)
@@ -50,7 +51,7 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
         with progress(total=max(FLAGS.generations, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
             for _ in range(done, FLAGS.generations):
                 journal.append(course.step())
-                bar.set_postfix_str(f"return {HORIZON * journal.generations[-1].reward:.0f}")
+                bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}")
                 bar.update()
     return course, journal
 
@@ -59,9 +60,9 @@ def judge(preset: Preset) -> dict:
     """Return the return, falls and style over the resets, of the result and of medium."""
     body = ROBOTS[FLAGS.robot]
     presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
-    score = Judge(body, len(presets), FLAGS.resets, HORIZON)(list(presets.values()), range(FLAGS.resets))
+    score = Judge(body, len(presets), FLAGS.resets, STEPS, *task())(list(presets.values()), range(FLAGS.resets))
     return {
-        name: {"return": evaluation.summary(HORIZON * score.rewards[row]), "falls": int(score.falls[row].sum())}
+        name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
         | {cost: float(values[row].mean()) for cost, values in score.style.items()}
         for row, name in enumerate(presets)
     }
@@ -76,7 +77,7 @@ def violations(figures: dict) -> list[str]:
 
 def main() -> None:
     """Search, judge, print and write."""
-    task_name, task_kwargs = task()  # WIRE: to Search, Judge and the settings of the journal
+    task_name, task_kwargs = task()
     checks.name(FLAGS.robot, TUNINGS, "robot")
     try:
         from arc_suite.tuning import plots
@@ -86,10 +87,12 @@ def main() -> None:
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
         course, journal = search(folder)
         preset = course.result()
-        plots.course(FLAGS.robot, course.reward, journal.generations, HORIZON).savefig(picture)
+        plots.course(FLAGS.robot, course.reward, journal.generations, STEPS).savefig(picture)
         figures = judge(preset)
         file.update(
             robot=FLAGS.robot,
+            task=task_name,
+            task_kwargs=task_kwargs,
             seed=FLAGS.seed,
             generations=len(journal.generations),
             resets=FLAGS.resets,

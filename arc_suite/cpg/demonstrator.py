@@ -6,16 +6,14 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import checks, robots
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.stride import Stride
+from arc_suite.models.sizing import control_timestep
 from arc_suite.robots import ROBOTS, gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import fitted_gait
-from arc_suite.tasks.walker import blocks
-
-CONTROL_TIMESTEP = 0.05  # s, of the four robots
 
 # Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
 FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
@@ -25,8 +23,9 @@ class Demonstrator:
     """Walks one body at one speed, in one environment or in a batch of them.
 
     The policy keeps its own clock, one for each environment, and asks the observation for joint
-    angles and velocities and the torso's orientation alone. A dm_env `TimeStep` that is the first
-    of an episode restarts the clock; with flat observations, call `reset`.
+    angles and velocities and the torso's orientation alone. It acts in the rows of a batch by
+    `begin` and `act`, as every policy does, and in one environment as a function of a `TimeStep`
+    with named blocks, whose first of an episode restarts the clock.
     """
 
     def __init__(self, robot: str | Body, preset: str | Preset = "medium", froude: float | None = None, gait=None):
@@ -57,66 +56,64 @@ class Demonstrator:
             raise ValueError(f"froude: {body.name} has presets alone: {', '.join(presets_of(body))}")
         else:
             self._control = Prescribed.fit(body, preset, gait)
-        self._joints = len(body.joint_names)
-        self._size = 5 + self._joints + 6 + self._joints + 6 * len(body.part_names) + 2
-        self.reset()
+        self._clock = np.array(0)
 
-    def reset(self, rows=None) -> None:
-        """Starts the clock again.
-
-        Args:
-            rows: indices or mask of the environments of a batch whose clock restarts; None for all.
-        """
-        if rows is None or self._clock.ndim == 0:
+    def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
+        """Restart the clock of some rows, given by their indices; seeds make no difference."""
+        if self._clock.ndim == 0:
             self._clock = np.array(0)
         else:
             self._clock[rows] = 0
 
-    def __call__(self, observation) -> np.ndarray:
-        """The action for a control step.
+    def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
+        """Return the actions of a control step.
 
         Args:
-            observation: a dm_env `TimeStep`, its observation (named blocks or flat), or a flat
-                observation vector, (..., size); a batch keeps its leading axes from call to call.
+            observation: blocks by name, each (..., size); leading axes stay from call to call.
+            rewards: make no difference.
 
         Returns:
             (..., joints) in [-1, 1].
 
         Raises:
-            ValueError: an observation of another size.
+            ValueError: not named blocks; one line.
         """
-        if hasattr(observation, "step_type"):
-            if observation.first():
-                self.reset()
-            observation = observation.observation
-        quaternion, angles, velocities = self._felt(observation)
+        quaternion, angles, velocities = felt(observation)
         if self._clock.shape != angles.shape[:-1]:
             self._clock = np.broadcast_to(self._clock, angles.shape[:-1]).copy()
         action = self._control(self._clock, quaternion, angles, velocities)
         self._clock = self._clock + 1
         return action
 
-    def _felt(self, observation):
-        """The torso's quaternion, joint angles and joint velocities."""
-        if hasattr(observation, "keys"):
-            if "posture" in observation:
-                return felt(observation)
-            observation = observation["observations"]
-        vector = np.asarray(observation, dtype=float)
-        if vector.shape[-1:] != (self._size,):
-            raise ValueError(f"observation: expected {self._size} numbers, got shape {vector.shape}")
-        return felt(blocks(vector, self._joints))
+    def __call__(self, timestep) -> np.ndarray:
+        """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
+        if timestep.first():
+            self._clock = np.array(0)
+        return self.act(timestep.observation)
 
 
-def felt(observation: Mapping) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities."""
-    posture, velocities = np.asarray(observation["posture"]), np.asarray(observation["velocities"])
+def felt(observation: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities.
+
+    Raises:
+        ValueError: not named blocks; one line.
+    """
+    if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
+        raise ValueError(
+            "observation: expected blocks posture and velocities by name, as `split` of a task gives them, "
+            f"got {type(observation).__name__}"
+        )
+    posture, velocities = (np.asarray(observation[name], dtype=float) for name in ("posture", "velocities"))
     return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
 
 
 def presets_of(body: Body) -> Mapping[str, Preset | float]:
-    """A body's presets by name: of a robot its numbers, of any other body its speed as a share of sqrt(g h)."""
-    return TUNINGS[body.name] if ROBOTS.get(body.name) == body and body.name in TUNINGS else FROUDES
+    """Return a body's presets by name: of a robot its numbers, of any other its speed as a share of sqrt(g h).
+
+    Raises:
+        ValueError: a body of a robot's name that has other joints; one line.
+    """
+    return robots.row(TUNINGS, body, "presets") or FROUDES
 
 
 class Prescribed(NamedTuple):
@@ -125,11 +122,13 @@ class Prescribed(NamedTuple):
     Attributes:
         pattern: of the joints.
         crouch: (joints,) angles held while settling, rad.
+        control_timestep: s.
         stiffness, damping, settle, ramp, ramp_start: as in `Preset`.
     """
 
     pattern: Pattern
     crouch: np.ndarray
+    control_timestep: float | np.ndarray
     stiffness: float | np.ndarray
     damping: float | np.ndarray
     settle: int | np.ndarray
@@ -143,7 +142,7 @@ class Prescribed(NamedTuple):
             preset = preset._replace(phase_offsets=gait.offsets, duty_factor=gait.duty_factor)
         laid = pattern(body, preset)
         crouch = pattern(body, preset._replace(centre=preset.crouch)).centre if preset.crouch else laid.centre
-        return cls(laid, crouch, *(getattr(preset, name) for name in cls._fields[2:]))
+        return cls(laid, crouch, control_timestep(body), *(getattr(preset, name) for name in cls._fields[3:]))
 
     @classmethod
     def stacked(cls, controls: Sequence[Self]) -> Self:
@@ -158,7 +157,7 @@ class Prescribed(NamedTuple):
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
         """Actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
         steps = clock[..., None]
-        walking = joint_targets(self.pattern, CONTROL_TIMESTEP * clock)
+        walking = joint_targets(self.pattern, (self.control_timestep * steps)[..., 0])
         targets = np.where(steps < self.settle, self.crouch, walking)
         ramp = (self.ramp_start + (1.0 - self.ramp_start) * steps / self.ramp).clip(max=1.0)
         return torques(targets, angles, velocities, ramp * self.stiffness, self.damping)

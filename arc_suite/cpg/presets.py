@@ -4,6 +4,8 @@ import functools
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from arc_suite.robots.gaits import TRIPOD, TROT
+
 # An angle in degrees for all legs, or one for each rank: front, (middle,) rear.
 ByRank = float | tuple[float, ...]
 
@@ -52,10 +54,7 @@ class Preset(NamedTuple):
 SPEEDS = ("slow", "medium", "fast")  # the published ones
 PRESETS = (*SPEEDS, "tuned")
 
-_TRIPOD = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0)  # of l1 l2 l3 r1 r2 r3
-_TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
-
-_hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=_TRIPOD)
+_hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=TRIPOD)
 _queen = functools.partial(
     _hexapod, damping=0.18, frequency=1.5, centre={"knee": (-25, -25, 25), "ankle": (15, 30, -15)}
 )
@@ -68,7 +67,7 @@ _leaper = functools.partial(
     settle=0,
     ramp=15,
     ramp_start=0.2,
-    phase_offsets=_TROT,
+    phase_offsets=TROT,
     sweep=30,
     centre={"knee": 0, "ankle": 0},
 )

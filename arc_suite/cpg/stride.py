@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.models.sizing import GRAVITY, control_timestep, natural_frequency, sized
-from arc_suite.models.standing import stance
+from arc_suite.models.standing import standing
 from arc_suite.robots.gaits import Gait
 from arc_suite.robots.spec import Body, Leg
 from arc_suite.tasks.fitting import GAIT_FREQUENCY
@@ -71,26 +71,26 @@ class Stride(NamedTuple):
         if not (isinstance(froude, (int, float)) and 1e-3 <= abs(froude) <= 1.0):
             raise ValueError(f"froude: expected a number from 0.001 to 1, or negative, got {froude!r}")
         body = sized(body)
-        standing = stance(body)
-        cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / standing.height)
-        speed = froude * math.sqrt(GRAVITY * standing.height)
+        pose = standing(body)
+        cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / pose.height)
+        speed = froude * math.sqrt(GRAVITY * pose.height)
         # A foot on the ground covers from +reach to -reach while its stance lasts.
         reach = 0.5 * speed * gait.duty_factor / cycle
         joints = [joint for leg in body.legs for joint in leg.joints]
         counts = [len(leg.joints) for leg in body.legs]
         sweeps, lifts, raised = [], [], []
-        for leg, jacobian in zip(body.legs, standing.jacobians, strict=True):
+        for leg, jacobian in zip(body.legs, pose.jacobians, strict=True):
             sweep = _sweep(leg, jacobian, reach)
-            lift = _lift(leg, jacobian, LIFT * standing.height)
+            lift = _lift(leg, jacobian, LIFT * pose.height)
             able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
             sweeps.append(sweep)
             lifts.append(lift)
             raised.append((1.0 - able) * UNLOAD / LIFT * lift)
-        inertia = standing.inertias + [joint.armature for joint in joints]
+        inertia = pose.inertias + [joint.armature for joint in joints]
         gear = np.array([joint.motor.gear for joint in joints])
         friction = np.array([joint.damping for joint in joints])
         frequency = natural_frequency(body)
-        lateral = standing.soles[:, 1] / max(abs(standing.soles[:, 1]).max(), 1e-9)
+        lateral = pose.soles[:, 1] / max(abs(pose.soles[:, 1]).max(), 1e-9)
         return cls(
             pattern=Pattern(
                 frequency=cycle,

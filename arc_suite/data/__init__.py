@@ -1,6 +1,6 @@
-"""Datasets of walks in Minari's format, which offline-RL libraries open and which replay to the bit.
+"""Datasets in Minari's format, which offline-RL libraries open and which replay to the bit.
 
-dataset = arc_suite.data.open("arc_suite/queen/cpg-medium-v0")
+dataset = arc_suite.data.open("arc_suite/queen/walk/cpg-medium-v0")
 episode = dataset[0]
 track = style.record(dataset.environment(), episode.playback(), episode.seed, max_steps=episode.length)
 """

@@ -10,14 +10,12 @@ from minari import __version__ as minari_version
 from minari.serialization import serialize_space
 from tqdm import tqdm
 
-from arc_suite import checks, evaluation
-from arc_suite.cpg import PRESETS
+from arc_suite import checks, evaluation, policies
 from arc_suite.data import rollouts
-from arc_suite.data.actors import actor
 from arc_suite.data.settings import Settings
 from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.tasks import terms, walk
+from arc_suite.tasks import terms
 
 ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
 
@@ -81,15 +79,15 @@ def collect(
 
 
 def _check(settings: Settings, episodes: int) -> None:
-    if settings.policy == "cpg" and not settings.presets:
-        raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
-    for preset in settings.presets:
-        checks.name(preset, PRESETS, "preset")
     if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
         raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
     checks.seed(settings.seed)
     checks.seed(settings.seed + episodes - 1)
-    actor(settings, rows=1).begin(0, settings.seed)  # finds out whether there is such a policy
+    _policy(settings, rows=1).begin([0], [settings.seed])  # finds out whether there is such a policy
+
+
+def _policy(settings: Settings, rows: int) -> policies.Policy:
+    return policies.policy(settings.policy, settings.body, settings.presets, rows, settings.noise)
 
 
 def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
@@ -109,7 +107,7 @@ def _difference(metadata: dict, provenance: dict, specification: str) -> str | N
 def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, threads, progress: Callable) -> None:
     """Plays the missing episodes into the storage."""
     rows = math.ceil(len(missing) / math.ceil(len(missing) / rows))  # all rows busy to the end, or nearly
-    environment = VectorEnv(settings.body, "walk", rows, threads, max_episode_steps=settings.steps)
+    environment = settings.environment(rows, threads)
     seeds = [settings.seed + index for index in missing]
     pending, size, started, spent = {}, 0, time.monotonic(), 0.0
 
@@ -131,7 +129,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
         unit_scale=True,
     ) as bar:
         try:
-            for step in rollouts.play(environment, actor(settings, rows), seeds, settings.steps):
+            for step in rollouts.play(environment, _policy(settings, rows), seeds, settings.steps):
                 bar.update(step.playing)
                 for episode in step.finished:
                     pending[episode.seed - settings.seed] = episode._replace(preset=settings.preset(episode.seed))
@@ -149,10 +147,9 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
 
 def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str, threads) -> dict:
     """Minari's metadata, but for the counts."""
-    weights = walk.settings(settings.body, {}).weights
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
-    environment = VectorEnv(settings.body, "walk", evaluation.EPISODES, threads, max_episode_steps=settings.steps)
+    environment = settings.environment(evaluation.EPISODES, threads)
     with contextlib.closing(environment):
         return {
             "dataset_id": dataset_id,
@@ -163,11 +160,11 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
             "action_space": serialize_space(environment.single_action_space),
             "env_spec": specification,
             "algorithm_name": "-".join([settings.policy, *settings.presets]),
-            "description": f"{settings.body.name} walks by policy {settings.policy}{presets}{noise}; "
-            f"episode k has seed {settings.seed} + k.",
+            "description": f"{settings.body.name} in the task {settings.task} by policy {settings.policy}"
+            f"{presets}{noise}; episode k has seed {settings.seed} + k.",
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
-            "ref_min_score": _mean_return(environment, Settings(settings.body, "zero", (), steps=settings.steps)),
-            "ref_max_score": terms.greatest(weights) * settings.steps,
+            "ref_min_score": _mean_return(environment, settings._replace(policy="zero", presets=(), noise=0.0)),
+            "ref_max_score": terms.greatest(environment.task.settings.weights) * settings.steps,
             "num_episodes_average_score": evaluation.EPISODES,
             "arc_suite": provenance,
         }
@@ -176,6 +173,6 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
     """Over the seeds of the evaluation protocol, one in each row of the environment."""
     count = environment.num_envs
-    played = rollouts.play(environment, actor(settings, count), range(count), settings.steps)
+    played = rollouts.play(environment, _policy(settings, count), range(count), settings.steps)
     totals = {episode.seed: episode.total for step in played for episode in step.finished}
     return float(np.mean([totals[seed] for seed in range(count)]))  # in one order, whichever falls first

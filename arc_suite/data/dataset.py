@@ -11,6 +11,8 @@ import h5py
 from arc_suite import registry
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
+from arc_suite.data.settings import Settings
+from arc_suite.envs.dm import load
 from arc_suite.robots.spec import Body
 
 METADATA = "metadata.json"
@@ -21,7 +23,7 @@ def open(dataset_id: str) -> "Dataset":
     """Opens a dataset that `tools/collect.py` has written.
 
     Args:
-        dataset_id: such as "arc_suite/queen/cpg-medium-v0"; Minari says where datasets lie.
+        dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari says where datasets lie.
 
     Raises:
         ValueError: no such dataset, or one that is damaged or not of this suite; one line.
@@ -36,7 +38,9 @@ class Dataset:
         id: Minari's.
         path: its folder.
         metadata: Minari's for the dataset; "arc_suite" holds `settings`, `versions` and `model_sha256`.
-        body: what walked.
+        body: what moved.
+        task: name of the task.
+        task_kwargs: settings of the task.
         steps: after which episodes were truncated.
     """
 
@@ -47,13 +51,30 @@ class Dataset:
         with damages(dataset_id, path / "data" / METADATA):
             specification = json.loads(self.metadata["env_spec"])
             domain = specification["kwargs"]["domain_name"]
+            self.task: str = specification["kwargs"]["task_name"]
+            self.task_kwargs: dict = specification["kwargs"].get("task_kwargs", {})
             self.steps = operator.index(specification["max_episode_steps"])
             self._length = operator.index(self.metadata["total_episodes"])
         self.body: Body = registry.body_of(domain)
 
+    @property
+    def settings(self) -> Settings:
+        """What the episodes depend on."""
+        known = self.metadata["arc_suite"]["settings"]
+        return Settings(
+            self.body,
+            known["policy"],
+            tuple(known["presets"]),
+            known["noise"],
+            known["seed"],
+            self.steps,
+            self.task,
+            self.task_kwargs,
+        )
+
     def environment(self):
-        """The dm_env in which the episodes play: `arc_suite.load(body, "walk")`."""
-        return registry.load(self.body, "walk")
+        """Return the dm_env in which the episodes play."""
+        return load(self.body, self.task, self.task_kwargs)
 
     def __len__(self) -> int:
         return self._length
@@ -113,4 +134,9 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
         for name, kind in (("settings", dict), ("versions", dict), ("model_sha256", str)):
             if not isinstance(metadata["arc_suite"][name], kind):
                 raise TypeError(f"expected {name} of arc_suite to be a {kind.__name__}")
+    if "task" not in metadata["arc_suite"]["settings"]:
+        raise ValueError(
+            f"dataset {dataset_id!r} is of an earlier form, which does not tell its task: collect it anew, "
+            "with --overwrite under the same id"
+        )
     return metadata

@@ -1,11 +1,13 @@
 """Episodes as arrays, and as groups of an HDF5 file in Minari's layout."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import h5py
 import numpy as np
+
+from arc_suite.policies import Script
 
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
 TERMS = "infos/reward_terms"  # as in the info of a step
@@ -49,20 +51,13 @@ class Episode(NamedTuple):
         """Size of the arrays."""
         return sum(array.nbytes for array in self.arrays().values())
 
-    def playback(self) -> Callable:
-        """A policy that does what was done: TimeStep -> action; the first `TimeStep` of an episode rewinds it.
+    def playback(self) -> Script:
+        """Return a policy, for one row, that does what was done; after the last recorded action, nothing.
 
-        In an environment of the same body whose reset has the episode's seed it repeats the episode
-        to the bit. After the last recorded action it stands still.
+        In an environment of the same body and task, whose reset has the episode's seed, it repeats
+        the episode to the bit.
         """
-        step = 0
-
-        def policy(timestep):
-            nonlocal step
-            step = 0 if timestep.first() else step + 1
-            return self.actions[step] if step < self.length else np.zeros_like(self.actions[0])
-
-        return policy
+        return Script(lambda seed: self.actions, 1, self.actions.shape[1])
 
     def digest(self) -> str:
         """The sha256 of everything in it: equal for episodes that are equal to the bit."""
@@ -129,5 +124,5 @@ def _attributes(index: int, episode: Episode) -> dict:
 
 
 def name(index: int) -> str:
-    """Of an episode's group, as Minari has it."""
+    """Return the name of an episode's group in the HDF5 file, as Minari has it."""
     return f"episode_{index}"

@@ -18,7 +18,7 @@ def check(dataset_id: str) -> str:
         ValueError: it is no such id, or the version is missing; one line with an example.
     """
     if not _valid(dataset_id):
-        example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/cpg-medium-v0")))
+        example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0")))
         raise ValueError(
             f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
             f"at the end alone, such as {example!r}"

@@ -7,6 +7,7 @@ import numpy as np
 
 from arc_suite.data.episodes import Episode
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import Policy
 
 
 class Step(NamedTuple):
@@ -21,15 +22,15 @@ class Step(NamedTuple):
     finished: list[Episode]
 
 
-def play(environment: VectorEnv, actor, seeds: Sequence[int], steps: int) -> Iterator[Step]:
+def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: int) -> Iterator[Step]:
     """Plays one episode for each seed; a row whose episode ends starts the next one at once.
 
-    An episode depends on its seed and the actor alone, not on rows, threads or its neighbours.
+    An episode depends on its seed and the policy alone, not on rows, threads or its neighbours.
     Actions are rounded to float32 before they are applied, so that what is recorded is what was done.
 
     Args:
         environment: with at most as many rows as there are seeds.
-        actor: see `actors`.
+        policy: made for as many rows.
         seeds: of the episodes, started in this order.
         steps: the most that an episode can have.
 
@@ -41,13 +42,13 @@ def play(environment: VectorEnv, actor, seeds: Sequence[int], steps: int) -> Ite
     waiting = iter(seeds)
     seated = [next(waiting) for _ in range(rows)]  # the seed that each row plays, None if it is done
     observations, _ = environment.reset(seed=seated)
-    for row, seed in enumerate(seated):
-        actor.begin(row, seed)
+    policy.begin(range(rows), seated)
+    for row in range(rows):
         recording.begin(row, observations)
     rewards = np.zeros(rows)
     playing = np.ones(rows, bool)
     while playing.any():
-        actions = actor(observations, rewards).clip(-1.0, 1.0).astype(np.float32)
+        actions = policy.act(environment.task.split(observations), rewards).clip(-1.0, 1.0).astype(np.float32)
         observations, rewards, terminated, truncated, info = environment.step(actions)
         recording.add(actions, observations, rewards, info["reward_terms"])
         ended = np.flatnonzero((terminated | truncated) & playing)
@@ -61,8 +62,8 @@ def play(environment: VectorEnv, actor, seeds: Sequence[int], steps: int) -> Ite
             mask = np.zeros(rows, bool)
             mask[starting] = True
             observations, _ = environment.reset(seed=seated, options={"reset_mask": mask})
+            policy.begin(starting, [seated[row] for row in starting])
             for row in starting:
-                actor.begin(row, seated[row])
                 recording.begin(row, observations)
         if len(starting) < len(ended):
             environment.rest(~playing)

@@ -7,12 +7,11 @@ from tqdm import tqdm
 
 from arc_suite import versions
 from arc_suite.data import rollouts
-from arc_suite.data.actors import Script
 from arc_suite.data.collection import ROWS
 from arc_suite.data.dataset import open
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import model_sha256
-from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import Script
 from arc_suite.robots.spec import Body
 
 
@@ -41,13 +40,13 @@ def verify(
     """
     dataset = open(dataset_id)
     if body not in (None, dataset.body):
-        raise ValueError(f"dataset {dataset_id!r} holds walks of {dataset.body.name}, and not of {body.name}")
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of {dataset.body.name}, and not of {body.name}")
     was = dataset.metadata["arc_suite"]
     for package, version in versions.recorded().items():
         if was["versions"].get(package) != version:
             there = f"{package} {was['versions'].get(package)}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
-    if was["model_sha256"] != model_sha256(dataset.body):
+    if was["model_sha256"] != model_sha256(dataset.body, dataset.task, dataset.task_kwargs):
         raise ValueError(f"dataset {dataset_id!r} was collected with another model of {dataset.body.name}")
     count, first = len(dataset), was["settings"]["seed"]
     if not count:
@@ -62,7 +61,7 @@ def verify(
         recorded[seed] = episode
         return episode.actions
 
-    environment = VectorEnv(dataset.body, "walk", rows, threads, max_episode_steps=dataset.steps)
+    environment = dataset.settings.environment(rows, threads)
     replayer = Script(script, *environment.action_space.shape)
     bar = progress(desc="replaying", leave=False, total=dataset.metadata["total_steps"], unit="step", unit_scale=True)
     with contextlib.closing(environment), bar:

@@ -10,8 +10,9 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from shimmy.dm_control_compatibility import DmControlCompatibilityV0
 from shimmy.utils.dm_env import dm_env_step2gym_step
 
-from arc_suite import checks, registry
-from arc_suite.simulation import opengl
+from arc_suite import checks
+from arc_suite.envs.dm import load
+from arc_suite.simulation import opengl, pictures
 
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
@@ -21,7 +22,8 @@ class Env(DmControlCompatibilityV0):
 
     Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
     [-1, 1]. A step's info holds `reward_terms`, the task's unweighted terms by name as plain
-    floats; a reset's info is empty, since nothing has been rewarded yet.
+    floats, and `progress`, its figures of how well the episode has gone so far; a reset's info is
+    empty, since nothing has been rewarded yet.
 
     An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` says
     otherwise, and terminated when the dm_env's discount is 0, which never happens at the time
@@ -70,8 +72,8 @@ class Env(DmControlCompatibilityV0):
             raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
         if render_mode is not None:
             checks.name(render_mode, modes, "render_mode")
-        environment = registry.load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
-        environment.physics.check_camera(camera_id)
+        environment = load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
+        pictures.check_camera(environment.physics.model.ptr, camera_id)
         self.metadata = {"render_modes": modes}  # before shimmy writes a rate into the class's
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
@@ -90,7 +92,7 @@ class Env(DmControlCompatibilityV0):
 
     @np_random.setter
     def np_random(self, value: np.random.Generator):
-        self._env.task._random = np.random.RandomState(value.bit_generator)
+        self._env.task.random = np.random.RandomState(value.bit_generator)
         self._np_random_seed = -1
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
@@ -110,21 +112,20 @@ class Env(DmControlCompatibilityV0):
         self._check_open("reset")
         if seed is not None:
             seed = checks.seed(seed)
-            self._env.task._random = np.random.RandomState(seed)
         gymnasium.Env.reset(self, seed=seed)
-        observation = self._env.reset().observation
+        observation = self._env.reset(seed).observation
         self._stepping = True
         self._show()
         return _flat(observation), {}
 
     def step(self, action):
-        """Advances by one control step of 0.05 s.
+        """Advances by one control step.
 
         Args:
             action: (motors,), clipped to [-1, 1].
 
         Returns:
-            Observation, reward, terminated, truncated, and an info with `reward_terms`.
+            Observation, reward, terminated, truncated, and an info with `reward_terms` and `progress`.
 
         Raises:
             ValueError: an action of another shape or with NaN; nothing has changed then.
@@ -138,8 +139,19 @@ class Env(DmControlCompatibilityV0):
         observation, reward, terminated, truncated, _ = dm_env_step2gym_step(timestep)
         self._stepping = not timestep.last()
         self._show()
-        terms = {name: float(term) for name, term in getattr(self._env.task, "terms", {}).items()}
-        return _flat(observation), float(reward), terminated, truncated, {"reward_terms": terms}
+        run = self._env.task
+        info = {"reward_terms": _floats(run.terms), "progress": _floats(run.progress)}
+        return _flat(observation), float(reward), terminated, truncated, info
+
+    def command(self, name: str, value) -> None:
+        """Set a command of the task from now on, until the next episode; see `arc_suite.envs.dm.Environment.command`.
+
+        Raises:
+            ValueError: no such command, or a value of another size; one line.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("command")
+        self._env.command(name, value)
 
     def render(self):
         """A picture of the present state in the mode and size chosen at the start.
@@ -183,6 +195,10 @@ class Env(DmControlCompatibilityV0):
 
     def __setstate__(self, state):
         self.__dict__.update(state)
+
+
+def _floats(figures: Mapping[str, Any]) -> dict[str, float]:
+    return {name: float(figure) for name, figure in figures.items()}
 
 
 def _flat(observation) -> np.ndarray:

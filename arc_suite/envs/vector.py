@@ -1,7 +1,6 @@
 """Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
 
 import functools
-import operator
 import os
 import threading
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,8 +12,12 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from arc_suite import checks, registry
-from arc_suite.simulation.physics import Batch
+from arc_suite import checks
+from arc_suite.envs.scene import checked_action, checked_command, prepared
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.simulation import pictures
+from arc_suite.simulation.batch import Batch
+from arc_suite.tasks import terms
 
 _AUTORESET_MODES = (AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value)
 _RENDER_MODES = ("rgb_array", "depth_array")
@@ -45,11 +48,15 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     to episode, whatever the number of threads. Spaces, observations and `reward_terms` are that
     environment's, batched as `SyncVectorEnv` does. Arrays handed out are the caller's own.
 
+    A step's info holds `reward_terms` and `progress`, the task's figures of how well the episode has
+    gone so far.
+
     Where a row's physics diverges, the row's episode is terminated with reward 0 and `info` has
     `diverged`; the other rows notice nothing.
 
     Attributes:
         batch: the simulations. Writing their state is for experiments.
+        task: what the rows do; its `split` gives an observation's blocks by name.
     """
 
     def __init__(
@@ -94,33 +101,30 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._same_step = checks.name(mode, _AUTORESET_MODES, "autoreset_mode") == AutoresetMode.SAME_STEP.value
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
-        self.num_envs = _count("num_envs", num_envs)
-        threads = usable_cores() if num_threads is None else _count("num_threads", num_threads)
+        self.num_envs = checks.integer("num_envs", num_envs, 1)
+        threads = usable_cores() if num_threads is None else checks.integer("num_threads", num_threads, 1)
 
-        # One ordinary environment lends the rows its settings, its model and its decorated body.
-        environment = registry.load(domain_name, task_name, task_kwargs)
-        self._physics, self._task = environment.physics, environment.task
-        if not hasattr(self._task, "walker"):
-            raise ValueError(f"task {task_name!r} has no batched form; use vectorization_mode 'sync' or 'async'")
-        self._physics.check_camera(camera_id)
-        self._substeps = round(environment.control_timestep() / self._physics.timestep())
-        self._time_limit = environment._step_limit  # control steps; dm_control has no public name for it
-        self._step_limit = np.inf if max_episode_steps is None else _count("max_episode_steps", max_episode_steps)
+        self.task, model = prepared(domain_name, task_name, task_kwargs)
+        pictures.check_camera(model, camera_id)
+        self._step_limit = (
+            np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
+        )
 
-        self.batch = Batch(self._physics.model.ptr, self.num_envs, threads)
-        self._walker = self._task.walker(self._physics, (self.num_envs,))
+        self.batch = Batch(model, self.num_envs, threads, self.task.reads)
+        self._memory = None  # of all rows, with a leading axis
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
+        self._carries = [self.task.first() for _ in range(self.num_envs)]
+        self._streams_begin = np.ones(self.num_envs, bool)  # rows whose next episode is the first of its stream
         if seed is not None:
             self._seed(self._seeds(seed), np.ones(self.num_envs, bool))
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
         self._ended = np.zeros(self.num_envs, bool)  # rows that start an episode in the next step
         self._resting = np.zeros(self.num_envs, bool)
-        self._begun = False
         self._busy = threading.Lock()
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
-            "render_fps": round(1.0 / environment.control_timestep()),
+            "render_fps": round(1.0 / self.task.scene.control_timestep),
             "autoreset_mode": AutoresetMode(mode),
         }
         self.render_mode = render_mode
@@ -130,10 +134,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             "camera_id": camera_id,
             "depth": render_mode == "depth_array",
         }
-        self._observation = self._walker.observation_vector(self.batch.data, dtype=np.float32)  # the latest
-        size = self._observation.shape[-1]
-        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, environment.action_spec().shape, np.float32)
+        self._observation = np.zeros((self.num_envs, self.task.size), np.float32)  # the latest
+        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.task.size,), np.float32)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (model.nu,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -155,17 +158,16 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         rows = self._rows((options or {}).get("reset_mask"))
-        if not (self._begun or rows.all()):
+        if self._memory is None and not rows.all():
             raise ResetNeeded("cannot reset some rows: reset all of them first")
         if seed is not None:
             self._seed(self._seeds(seed), rows)
-        self._begun = True
         self._begin(rows, self._observation)
         return self._observation.copy(), {}
 
     @_one_at_a_time
     def step(self, actions):
-        """Advances every row by one control step of 0.05 s, but for rows that start an episode instead.
+        """Advances every row by one control step, but for rows that start an episode instead.
 
         Args:
             actions: (num_envs, motors), clipped to [-1, 1]; ignored for a row that starts an episode.
@@ -181,19 +183,28 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
-        if not self._begun:
+        if self._memory is None:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
-        data, stepping, restarting = self.batch.data, ~(self._ended | self._resting), self._ended & ~self._resting
-        self._walker.before_step(actions, data)
-        diverged = self.batch.step(self._substeps, stepping)
-        self._walker.after_step(data)
+        task, before, data = self.task, self._memory, self.batch.data
+        stepping, restarting = ~(self._ended | self._resting), self._ended & ~self._resting
+        memory, inputs = task.before(before, checked_action(actions, self.action_space.shape))
+        np.copyto(data.ctrl, inputs.ctrl, where=stepping[:, None])
+        if inputs.kick is not None:
+            data.qvel[stepping] += inputs.kick[stepping]
+        diverged = self.batch.step(SUBSTEPS, stepping)
+        readings = task.read(data)
+        self._memory = memory = _chosen(stepping, task.after(memory, readings), before)
         self._steps += 1
 
-        reward = np.where(stepping, self._walker.reward(data, diverged if diverged.any() else None), 0.0)
-        observation = self._walker.observation_vector(data, dtype=np.float32)
-        time_is_up = self._steps >= self._time_limit
-        terminated = stepping & (diverged | self._walker.fallen(data)) & ~time_is_up
-        truncated = stepping & (time_is_up | (self._steps >= self._step_limit))
+        self._terms = earned = task.terms(memory, readings)
+        if diverged.any():
+            self._terms = earned = {name: np.where(diverged, 0.0, term) for name, term in earned.items()}
+        reward = np.where(stepping, terms.total(earned, task.settings.weights), 0.0)
+        observation = task.vector(task.observe(memory, readings), np.float32)
+        failed, cut = task.ended(memory, readings)
+        time_is_up = self._steps >= task.step_limit
+        terminated = stepping & (diverged | failed) & ~time_is_up
+        truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self._step_limit))
         self._ended = terminated | truncated
 
         info = {}
@@ -206,6 +217,27 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             self._begin(restarting, observation)
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
+
+    @_one_at_a_time
+    def command(self, name: str, value, rows=None) -> None:
+        """Set a command of the task in some rows from now on, until their next episodes.
+
+        Args:
+            name: one of the task's `commands`.
+            value: (size,) numbers for all rows of the mask, or (num_envs, size), of which the rows of
+                the mask count; None, or NaN in some, for what the task itself would do.
+            rows: mask (num_envs,) of the rows; None for all.
+
+        Raises:
+            ValueError: no such command, or a value or mask that does not fit; one line.
+            ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
+        """
+        mask, value = self._rows(rows, "rows"), checked_command(self.task, name, value, (self.num_envs,))
+        if self._memory is None:
+            raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
+        present = getattr(self._memory, name)
+        self._memory = self._memory._replace(**{name: np.where(mask[:, None], value, present)})
 
     @_one_at_a_time
     def rest(self, mask) -> None:
@@ -246,30 +278,43 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         return tuple(self._render_row(row) for row in rows)
 
     def close_extras(self) -> None:
-        """Frees the simulations and what they were rendered with."""
-        self._physics.free()
+        """Free the simulations."""
         del self.batch
 
     def _render_row(self, row: int) -> np.ndarray:
-        data = self._physics.data.ptr
-        data.qpos[:], data.qvel[:] = self.batch.data.qpos[row], self.batch.data.qvel[row]
-        return self._physics.render(**self._picture)
+        scene = self.task.scene
+        return pictures.picture(scene.body, scene.arena, self.batch.data.qpos[row], **self._picture)
 
     def _begin(self, rows: np.ndarray, observation: np.ndarray) -> None:
-        """Starts episodes in some rows, (num_envs,) booleans, and puts their observations among the others."""
-        states = [self._task.initial_state(self._physics, self._randoms[row]) for row in np.flatnonzero(rows)]
-        self.batch.reset(rows, *map(np.stack, zip(*states, strict=True)))
-        self._walker.restart(rows)
+        """Start episodes in some rows, (num_envs,) booleans, and put their observations among the others."""
+        task, starts = self.task, []
+        for row in np.flatnonzero(rows):
+            if not self._streams_begin[row]:
+                self._carries[row] = task.carry(_mapped(lambda field, row=row: field[row], self._memory))
+            starts.append(task.start(self._randoms[row], self._carries[row]))
+        qpos, qvel, memories, mocap = zip(*starts, strict=True)
+        self._streams_begin &= ~rows
+        self.batch.reset(rows, np.stack(qpos), np.stack(qvel), None if mocap[0] is None else np.stack(mocap))
+        memory, readings = _mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(rows))
+        lifted = task.lift(memory, readings)
+        if lifted is not None:
+            self.batch.place(rows, lifted)
+            readings = task.read(self.batch.part(rows))
+        memory = task.begin(memory, readings)
+        # Before the first step there is nothing to keep, as all rows begin.
+        self._memory = memory if self._memory is None else _scattered(rows, memory, self._memory)
         self._steps[rows] = 0
         self._ended, self._resting = self._ended & ~rows, self._resting & ~rows
-        observation[rows] = self._walker.observation_vector(self.batch.part(rows), rows)
+        observation[rows] = task.vector(task.observe(memory, readings), np.float32)
 
     def _info(self, rows: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
         """What the latest step tells of some rows."""
         info = {}
         if rows.any():
-            terms = {name: np.where(rows, term, 0.0) for name, term in self._walker.terms.items()}
-            info |= _marked({"reward_terms": _marked(terms, rows)}, rows)
+            groups = {"reward_terms": self._terms, "progress": self.task.progress(self._memory)}
+            for name, figures in groups.items():
+                masked = {figure: np.where(rows, values, 0.0) for figure, values in figures.items()}
+                info |= _marked({name: _marked(masked, rows)}, rows)
         diverged = diverged & rows
         if diverged.any():
             info |= _marked({"diverged": diverged}, diverged)
@@ -288,7 +333,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Starts new streams of random numbers in some rows, but for rows whose seed is None."""
         for row in np.flatnonzero(rows):
             if seeds[row] is not None:
-                self._randoms[row] = np.random.RandomState(seeds[row])
+                self._randoms[row], self._carries[row] = np.random.RandomState(seeds[row]), self.task.first()
+                self._streams_begin[row] = True
 
     def _rows(self, mask, name: str = "reset_mask") -> np.ndarray:
         """The rows of a mask; all of them for None."""
@@ -305,14 +351,27 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _count(name: str, value: Any) -> int:
-    try:
-        number = operator.index(value)
-    except TypeError:
-        number = 0
-    if number < 1:
-        raise ValueError(f"{name}: expected an integer from 1, got {value!r}")
-    return number
+def _mapped(function, memory, *others):
+    """A memory whose fields a function makes of the fields of memories."""
+    return type(memory)(*map(function, memory, *others))
+
+
+def _chosen(rows: np.ndarray, there, elsewhere):
+    """A memory that is one in some rows, (num_envs,) booleans, and another in the other rows."""
+    if rows.all():
+        return there
+    return _mapped(lambda new, old: np.where(rows.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
+
+
+def _scattered(rows: np.ndarray, some, memory):
+    """A memory with other values in some rows, (num_envs,) booleans, of which there are as many as in `some`."""
+
+    def scattered(new, old):
+        copied = old.copy()
+        copied[rows] = new
+        return copied
+
+    return _mapped(scattered, some, memory)
 
 
 def _marked(values: Mapping[str, Any], rows: np.ndarray) -> dict[str, Any]:

@@ -4,18 +4,19 @@ import collections
 import functools
 import math
 import multiprocessing
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from dm_control.rl import control
 from tqdm import tqdm
 
+from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
+from arc_suite.envs.dm import load
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import gaits, generator
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.walk import walk
 
 JOINT_NOISE = 0.05  # rad, of the pose that walks start in
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
@@ -32,6 +33,8 @@ class Trial(NamedTuple):
         seconds: to walk.
         froude: wanted speed as a share of sqrt(g h); None for the medium one, negative for backwards.
         in_phase: move all legs at once, which no body walks with.
+        task: name of the task, which is to be a kind of walk.
+        task_kwargs: its settings, as in `arc_suite.load`.
     """
 
     seed: int
@@ -40,6 +43,8 @@ class Trial(NamedTuple):
     seconds: float = 20.0
     froude: float | None = None
     in_phase: bool = False
+    task: str = "walk"
+    task_kwargs: Mapping[str, Any] = {}
 
     @property
     def body(self) -> Body:
@@ -91,7 +96,8 @@ def follow(trial: Trial) -> tuple[control.Environment, Course]:
         The environment as the walk left it, and the walk.
     """
     body = trial.body
-    environment = walk(body, trial.seconds, trial.seed, joint_noise=JOINT_NOISE, base_noise=0.0)
+    start = {"time_limit": trial.seconds, "random": trial.seed, "joint_noise": JOINT_NOISE, "base_noise": 0.0}
+    environment = load(body, trial.task, start | dict(trial.task_kwargs))
     gait = gaits.Gait(0.6, (0.0,) * len(body.legs)) if trial.in_phase else None
     demonstrator = Demonstrator(body, froude=trial.froude, gait=gait)
     data = environment.physics.data.ptr
@@ -103,17 +109,11 @@ def follow(trial: Trial) -> tuple[control.Environment, Course]:
             step = environment.step(demonstrator(step))
             positions.append(data.qpos[:2].copy())
             touching.append(bool(np.isin(data.contact.geom, shapes).any()))
-            if step.discount == 0.0 or _upright(data.qpos[3:7]) < MOST_TILT_COSINE:
+            if step.discount == 0.0 or rotations.upright(data.qpos[3:7]) < MOST_TILT_COSINE:
                 ending = "fall"
     except control.PhysicsError:
         ending = "divergence"
     return environment, Course(np.array(positions), np.array(touching), ending)
-
-
-def _upright(quaternion) -> float:
-    """Cosine of the torso's tilt."""
-    _, x, y, _ = quaternion
-    return 1.0 - 2.0 * (x * x + y * y)
 
 
 def judge(trial: Trial, course: Course) -> Outcome:
@@ -148,17 +148,18 @@ def attempt(trial: Trial) -> Outcome:
     return judge(trial, course)
 
 
-def census(trials: Sequence[Trial], processes: int | None = None) -> Iterator[Outcome]:
-    """Walks many bodies, showing a progress bar.
+def census(trials: Sequence[Trial], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
+    """Walk many bodies.
 
     Args:
         trials: to run.
         processes: to run them on; None for one per core.
+        progress: makes a progress bar as `tqdm` does.
 
     Yields:
         The outcomes, in the order of the trials.
     """
-    progress = functools.partial(tqdm, total=len(trials), unit="body", desc="walk")
+    progress = functools.partial(progress, total=len(trials), unit="body", desc="walk")
     if processes == 1:
         yield from progress(map(attempt, trials))
         return

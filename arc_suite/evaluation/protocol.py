@@ -1,11 +1,15 @@
 """The evaluation protocol, in one place: ten seeded episodes and deterministic actions."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.policies import Policy
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting
 
-# Returns of the paper's demonstrators, the expert lines of its figures.
+# Returns of the paper's demonstrators in the task walk: the expert lines of its figures.
 EXPERT_RETURNS = {"queen": 2048.0, "bastion": 2311.0, "tick": 1971.0, "leaper": 2630.0}
 
 
@@ -15,62 +19,55 @@ class Episode(NamedTuple):
     Attributes:
         total: its return.
         length: control steps.
-        speed: mean forward velocity, m/s.
-        compliance: mean share of feet that were in stance or swing as the gait prescribes.
+        progress: the task's figures at its end by name.
     """
 
     total: float
     length: int
-    speed: float
-    compliance: float
+    progress: Mapping[str, float]
 
 
-def rollout(environment, policy, seed: int, max_steps: int | None = None) -> Iterator:
-    """Plays one episode.
+def expert_return(task: str, robot: str) -> float | None:
+    """Return what the paper's demonstrator of a robot earns in a task; None where the paper has none."""
+    return EXPERT_RETURNS.get(robot) if task == "walk" else None
+
+
+def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Iterator:
+    """Play one episode.
 
     Args:
         environment: of `arc_suite.load`.
-        policy: maps a `TimeStep` to an action.
-        seed: of the episode's initial state.
+        policy: made for one row.
+        seed: of the episode's start.
         max_steps: to stop early.
 
     Yields:
         The `TimeStep` of the reset and of every step; the environment stands there meanwhile.
     """
-    environment.task.random.seed(seed)
-    timestep = environment.reset()
+    timestep = environment.reset(seed)
+    policy.begin([0], [seed])
     yield timestep
-    length = 0
+    length, reward = 0, 0.0
     while not timestep.last() and length != max_steps:
-        timestep = environment.step(policy(timestep))
-        length += 1
+        blocks = {name: block[None] for name, block in timestep.observation.items()}
+        timestep = environment.step(policy.act(blocks, np.array([reward]))[0])
+        length, reward = length + 1, timestep.reward
         yield timestep
 
 
-def run(environment, policy, seed: int, max_steps: int | None = None) -> Episode:
-    """Plays one episode and sums it up; the arguments are those of `rollout`."""
-    total, compliance, length = 0.0, 0.0, 0
-    for timestep in rollout(environment, policy, seed, max_steps):
-        if timestep.first():
-            start = environment.physics.position()[0]
-            continue
-        total += timestep.reward
-        compliance += environment.task.terms["gait_bonus"]
-        length += 1
-    seconds = length * environment.control_timestep()
-    speed = (environment.physics.position()[0] - start) / seconds
-    return Episode(float(total), length, float(speed), float(compliance / length))
+def run(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Episode:
+    """Play one episode and sum it up; the arguments are those of `rollout`."""
+    rewards = [timestep.reward for timestep in rollout(environment, policy, seed, max_steps) if not timestep.first()]
+    progress = {name: float(figure) for name, figure in environment.task.progress.items()}
+    return Episode(float(sum(rewards)), len(rewards), progress)
 
 
-def episodes(environment, policy, seeds: Iterable[int] = range(EPISODES)) -> list[Episode]:
-    """Runs one episode for each seed.
+def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)) -> list[Episode]:
+    """Run one episode for each seed.
 
     Args:
         environment: of `arc_suite.load`.
-        policy: maps a `TimeStep` to an action.
+        policy: made for one row.
         seeds: of the episodes; those of the protocol if not given.
-
-    Returns:
-        One `Episode` for each seed.
     """
     return [run(environment, policy, seed) for seed in seeds]

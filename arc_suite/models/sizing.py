@@ -8,7 +8,7 @@ sqrt(h / g), and a mite and a giant walk alike.
 import functools
 import math
 
-from arc_suite.models.standing import Stance, stance
+from arc_suite.models.standing import Standing, standing
 from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
 
 GRAVITY = 9.81  # m/s^2
@@ -73,18 +73,18 @@ def sized(body: Body) -> Body:
     complete = all(None not in (j.armature, j.damping, j.motor) for leg in body.legs for j in leg.joints)
     if complete and body.simulation and body.camera:
         return body
-    standing = stance(body)
+    pose = standing(body)
     frequency = natural_frequency(body)
-    least_load = _LEAST_LEVER * standing.height * standing.mass * GRAVITY / len(body.legs)
+    least_load = _LEAST_LEVER * pose.height * pose.mass * GRAVITY / len(body.legs)
     legs, first = [], 0
     for leg in body.legs:
         last = first + len(leg.joints)
-        legs.append(_sized_leg(leg, standing.inertias[first:last], standing.loads[first:last], least_load, frequency))
+        legs.append(_sized_leg(leg, pose.inertias[first:last], pose.loads[first:last], least_load, frequency))
         first = last
     return body.replace(
         legs=tuple(legs),
         simulation=simulation(body),
-        camera=body.camera or _camera(standing),
+        camera=body.camera or _camera(pose),
     )
 
 
@@ -106,6 +106,6 @@ def _sized_joint(joint: Joint, inertia: float, torque: float, frequency: float) 
     return joint.replace(motor=motor, armature=armature, damping=damping)
 
 
-def _camera(standing: Stance) -> TrackingCamera:
-    size = max(abs(standing.soles[:, :2]).max(), standing.height)
+def _camera(pose: Standing) -> TrackingCamera:
+    size = max(abs(pose.soles[:, :2]).max(), pose.height)
     return TrackingCamera(position=(0.0, -4.0 * float(size), 1.6 * float(size)))

@@ -10,7 +10,7 @@ from arc_suite.models import builder
 from arc_suite.robots.spec import Body, Joint, Motor, Simulation, TrackingCamera
 
 
-class Stance(NamedTuple):
+class Standing(NamedTuple):
     """Mechanics of the standing pose, in the torso's frame and SI units; joints are the actuated ones.
 
     Attributes:
@@ -36,8 +36,8 @@ class Stance(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def stance(body: Body) -> Stance:
-    """Compiles the body and measures its stance; armature, damping, motors and constants play no part."""
+def standing(body: Body) -> Standing:
+    """Compiles the body and measures its standing pose; armature, damping, motors and constants play no part."""
     model = mujoco.MjModel.from_xml_string(builder.build(_unpowered(body)).to_xml_string())
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -57,7 +57,7 @@ def stance(body: Body) -> Stance:
     mujoco.mj_fullM(model, data, matrix)
     loads = _foot_loads(mass * -model.opt.gravity[2], soles[:, :2] - centre[:2])
     held = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
-    return Stance(
+    return Standing(
         height=body.torso.standing_height,
         mass=mass,
         centre=centre,
@@ -70,7 +70,7 @@ def stance(body: Body) -> Stance:
 
 
 def _unpowered(body: Body) -> Body:
-    """The body with everything that is left to be sized set to what does not matter to its stance."""
+    """The body with everything that is left to be sized set to what does not matter to its standing pose."""
 
     def plain(joint: Joint | None) -> Joint | None:
         return joint and joint.replace(armature=0.0, damping=0.0, motor=Motor(gear=1.0))

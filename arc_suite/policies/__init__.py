@@ -1,5 +1,6 @@
 """Who acts: one protocol, and policies by name."""
 
 from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, policy
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone
 
-__all__ = ["HELP", "POLICIES", "PRESET_HELP", "policy"]
+__all__ = ["HELP", "POLICIES", "PRESET_HELP", "Individuals", "Mixture", "Policy", "Script", "Sum", "alone", "policy"]

@@ -1,16 +1,44 @@
-"""Policies by name: TimeStep -> action. Some need no training; any other is found on Python's path."""
+"""Policies by name: some need no training; any other is found on Python's path."""
 
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
-POLICIES = ("cpg", "zero", "random")
+_CHUNK = 256  # control steps that are drawn at once
+
+
+def _cpg(body: Body, presets: Sequence[str], rows: int) -> Policy:
+    if not presets:
+        raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
+    demonstrators = [Demonstrator(body, preset) for preset in presets]
+    return demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, rows)
+
+
+def _zero(body: Body, presets: Sequence[str], rows: int) -> Policy:
+    return Script(lambda seed: (), rows, len(body.joint_names))
+
+
+def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
+    joints = len(body.joint_names)
+
+    def draw(seed):
+        random = np.random.default_rng(seed)
+        while True:
+            yield from random.uniform(-1.0, 1.0, (_CHUNK, joints))
+
+    return Script(draw, rows, joints)
+
+
+# Name -> what makes the policy of a body, presets and a number of rows.
+POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
+
 HELP = (
     f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name, or from the Body "
     "of what is no robot of the suite."
@@ -18,45 +46,63 @@ HELP = (
 PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}."
 
 
-def policy(name: str, robot: str | Body, preset: str = "medium", seed: int | None = None) -> Callable:
-    """Makes a policy for one environment.
+def policy(
+    name: str, robot: str | Body, presets: str | Sequence[str] = "medium", rows: int = 1, noise: float = 0.0
+) -> Policy:
+    """Make a policy for the rows of a batch, or for one environment; see `protocol.alone`.
 
     Args:
-        name: cpg, the demonstrator; zero, which stands still; random, uniform in [-1, 1]; or
-            `module:attribute`, a function on Python's path that makes a policy from the name of a
-            robot, or from a body that is none.
+        name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
+            episode's seed; or `module:attribute`, a function on Python's path that makes a function
+            from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        preset: of the demonstrator, one of `cpg.PRESETS`.
-        seed: of the random policy.
-
-    Returns:
-        A function of a dm_env `TimeStep` that returns an action, (joints,).
+        presets: of the demonstrator, one of `cpg.PRESETS`, or several that take turns from seed to seed.
+        rows: of the batch.
+        noise: standard deviation of normal noise on the actions, by the episode's seed.
 
     Raises:
         ValueError: an unknown name; one line that names it and the nearest valid one.
     """
-    checks.name(preset, PRESETS, "preset")
+    presets = (presets,) if isinstance(presets, str) else tuple(presets)
+    for preset in presets:
+        checks.name(preset, PRESETS, "preset")
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, str) and ":" in name:
-        return _from_path(name, body)
-    checks.name(name, POLICIES, "policy")
-    if name == "cpg":
-        return Demonstrator(body, preset)
-    size = len(body.joint_names)
-    if name == "zero":
-        return lambda time_step: np.zeros(size)
-    random = np.random.default_rng(None if seed is None else checks.seed(seed))
-    return lambda time_step: random.uniform(-1.0, 1.0, size)
+        made = _from_path(name, body, rows)
+    else:
+        made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, rows)
+    return Sum(made, _noise(body, noise, rows)) if noise else made
 
 
-def _from_path(path: str, body: Body) -> Callable:
+def _noise(body: Body, deviation: float, rows: int) -> Policy:
+    joints = len(body.joint_names)
+
+    def draw(seed):
+        random = np.random.default_rng((seed, 1))  # the 1 keeps this stream apart from that of the random policy
+        while True:
+            yield from random.normal(0.0, deviation, (_CHUNK, joints))
+
+    return Script(draw, rows, joints)
+
+
+def _from_path(path: str, body: Body, rows: int) -> Policy:
     try:
         factory = pkgutil.resolve_name(path)
     except (ImportError, ValueError, AttributeError) as error:
         raise ValueError(f"policy {path!r}: {error}") from None
     if not callable(factory):
         raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
-    made = factory(body.name if ROBOTS.get(body.name) == body else body)
-    if not callable(made):
-        raise ValueError(f"policy {path!r}: expected it to return a function of a TimeStep, got {type(made).__name__}")
-    return made
+    make = _checked(path, factory, body.name if ROBOTS.get(body.name) == body else body)
+    make()  # finds out at once whether it makes one
+    return Individuals(make, rows, len(body.joint_names), f"policy {path!r}")
+
+
+def _checked(path: str, factory: Callable, robot: str | Body) -> Callable[[], Callable]:
+    def make():
+        made = factory(robot)
+        if not callable(made):
+            kind = type(made).__name__
+            raise ValueError(f"policy {path!r}: expected it to return a function of a TimeStep, got {kind}")
+        return made
+
+    return make

@@ -1,5 +1,33 @@
 """The four creatures of the paper, as data: domain name -> `Body`."""
 
+from collections.abc import Mapping
+from typing import Any
+
 from arc_suite.robots import bastion, leaper, queen, tick
+from arc_suite.robots.spec import Body
 
 ROBOTS = {module.BODY.name: module.BODY for module in (queen, bastion, tick, leaper)}
+
+
+def row(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
+    """Return a robot's row of a table of numbers, by the body's name; None where there is none.
+
+    A body of a robot's name has the robot's numbers whatever its density or sizes are, as long as
+    it has the robot's joints.
+
+    Args:
+        table: rows by name of a robot.
+        body: any body.
+        what: the numbers are for, with which an error begins.
+
+    Raises:
+        ValueError: a body of a robot's name that has other joints; one line.
+    """
+    if body.name not in table:
+        return None
+    if body.name in ROBOTS and body.joint_names != ROBOTS[body.name].joint_names:
+        raise ValueError(
+            f"{what}: expected a body named {body.name!r} to have the {len(ROBOTS[body.name].joint_names)} joints of "
+            f"{body.name}, got {len(body.joint_names)} or others; give it another name"
+        )
+    return table[body.name]

@@ -10,6 +10,9 @@ from typing import NamedTuple
 from arc_suite import checks
 from arc_suite.robots.spec import Body
 
+TRIPOD = (0.5, 0.0, 0.5, 0.0, 0.5, 0.0)  # offsets of l1 l2 l3 r1 r2 r3, cycles
+TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
+
 
 class Gait(NamedTuple):
     """When legs stand.

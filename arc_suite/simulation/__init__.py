@@ -1,1 +1,1 @@
-"""MuJoCo runs: one, a batch, and pictures of them."""
+"""MuJoCo runs: the model they step, one of them, a batch, pictures."""

@@ -186,7 +186,7 @@ class _Renderer:
         self._calls = queue.SimpleQueue()
         self._thread = None
         if backend.BACKEND != "glfw":  # GLFW insists on the main thread, from which pictures are wanted as a rule
-            self._thread = threading.Thread(target=self._serve, name="arc_suite.rendering", daemon=True)
+            self._thread = threading.Thread(target=self._serve, name="arc_suite.simulation.opengl", daemon=True)
             self._thread.start()
 
     def call(self, function):

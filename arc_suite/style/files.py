@@ -15,7 +15,7 @@ from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.style.tracks import Track
 from arc_suite.tasks import terms
 
-FORMAT = "arc_suite tracks 1"  # another number for every change of what a file holds
+FORMAT = "arc_suite tracks 2"  # another number for every change of what a file holds
 
 
 def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
@@ -32,7 +32,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
     for index, track in enumerate(tracks):
         fields = track._asdict()
         del fields["body"]
-        arrays |= _flat(fields, str(index))
+        arrays |= _flat({name: value for name, value in fields.items() if value is not None}, str(index))
     with open(path, "wb") as file:
         np.savez(file, **arrays)
 
@@ -68,7 +68,7 @@ def load(path: str | os.PathLike) -> list[Track]:
                 return [_track(body, arrays, index) for index in range(count)]
         except Exception as error:  # a damaged archive raises whatever its damage leads to
             raise ValueError(f"{path}: not a file of tracks, or a damaged one: {error}") from None
-    raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}")
+    raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
 
 
 def _track(body, arrays, index) -> Track:
@@ -81,6 +81,8 @@ def _track(body, arrays, index) -> Track:
             for key in path[:-1]:
                 mapping = mapping.setdefault(key, {})
             mapping[path[-1]] = array if array.ndim else array.item()
-    low, high = fields["parameters"]["healthy_range"].tolist()
-    fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
-    return Track(body=body, **fields | {"legs": tuple(fields["legs"].tolist())})
+    if "parameters" in fields:
+        low, high = fields["parameters"]["healthy_range"].tolist()
+        fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
+    absent = {"phases": None, "parameters": None, "progress": {}}
+    return Track(body=body, **absent | fields | {"legs": tuple(fields["legs"].tolist())})

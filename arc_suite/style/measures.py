@@ -8,17 +8,17 @@ import numpy as np
 from arc_suite import evaluation
 from arc_suite.style import metrics
 from arc_suite.style.tracks import Track
-from arc_suite.tasks.terms import Parameters
 
 
-def _stride_frequency(parameters: Parameters) -> float:
+def _stride_frequency(track: Track) -> float:
     """One stride a cycle of the clock, Hz; NaN where legs shall always stand or never."""
+    parameters = track.parameters
     return parameters.gait_frequency if 0.0 < parameters.duty_factor < 1.0 else np.nan
 
 
-def _stride_length(parameters: Parameters) -> float:
-    """The way in a stride at the target speed, m; NaN where no stride is prescribed."""
-    return parameters.target_velocity / (_stride_frequency(parameters) or np.nan)
+def _stride_length(track: Track) -> float:
+    """The way in a stride at the target speed, m; NaN where no stride or no speed is prescribed."""
+    return track.target_velocity / (_stride_frequency(track) or np.nan)
 
 
 class Metric(NamedTuple):
@@ -27,12 +27,14 @@ class Metric(NamedTuple):
     Attributes:
         function: of a track.
         unit: shares and indices have none.
-        prescribed: the value that the task asks for, of its parameters; None where it leaves that open.
+        prescribed: the value that the task asks for, of a track; None where it leaves that open.
+        of_gait: whether it compares with the prescribed gait, and is left out in a task without one.
     """
 
     function: Callable[[Track], np.ndarray | float]
     unit: str
-    prescribed: Callable[[Parameters], float] | None = None
+    prescribed: Callable[[Track], float] | None = None
+    of_gait: bool = False
 
 
 class Measurement(NamedTuple):
@@ -45,24 +47,24 @@ class Measurement(NamedTuple):
 METRICS = {
     metric.function.__name__: metric
     for metric in (
-        Metric(metrics.gait_compliance, "", lambda parameters: 1.0),
-        Metric(metrics.duty_factor, "", lambda parameters: parameters.duty_factor),
-        Metric(metrics.phase_error, "cycles", lambda parameters: 0.0),
-        Metric(metrics.phase_scatter, "", lambda parameters: 0.0),
-        Metric(metrics.stride_length, "m", _stride_length),
-        Metric(metrics.stride_frequency, "Hz", _stride_frequency),
+        Metric(metrics.gait_compliance, "", lambda track: 1.0, of_gait=True),
+        Metric(metrics.duty_factor, "", lambda track: track.parameters.duty_factor, of_gait=True),
+        Metric(metrics.phase_error, "cycles", lambda track: 0.0, of_gait=True),
+        Metric(metrics.phase_scatter, "", lambda track: 0.0, of_gait=True),
+        Metric(metrics.stride_length, "m", _stride_length, of_gait=True),
+        Metric(metrics.stride_frequency, "Hz", _stride_frequency, of_gait=True),
         Metric(metrics.foot_slip, "m/m"),
-        Metric(metrics.foot_clearance, "m"),
-        Metric(metrics.speed, "m/s", lambda parameters: parameters.target_velocity),
+        Metric(metrics.foot_clearance, "m", of_gait=True),
+        Metric(metrics.speed, "m/s", lambda track: track.target_velocity),
         Metric(metrics.heading_error, "rad"),
         Metric(metrics.lateral_drift, "m/m"),
         Metric(metrics.torso_pitch, "rad"),
         Metric(metrics.torso_roll, "rad"),
         Metric(metrics.height_variation, "m"),
-        Metric(metrics.posture_deviation, "rad"),
+        Metric(metrics.posture_deviation, "rad", of_gait=True),
         Metric(metrics.action_change, ""),
         Metric(metrics.torque, "N m"),
-        Metric(metrics.asymmetry, "m"),
+        Metric(metrics.asymmetry, "m", of_gait=True),
         Metric(metrics.cost_of_transport, "J/(N m)"),
     )
 }
@@ -74,7 +76,11 @@ def measure(track: Track) -> dict[str, Measurement]:
     A robot's phase error is the mean size of its legs' errors, so that early and late do not
     cancel. Legs whose value is NaN do not count; NaN if that is all of them.
     """
-    return {name: _measurement(track, name, metric.function(track)) for name, metric in METRICS.items()}
+    return {
+        name: _measurement(track, name, metric.function(track))
+        for name, metric in METRICS.items()
+        if track.parameters is not None or not metric.of_gait
+    }
 
 
 def _measurement(track, name, values) -> Measurement:
@@ -90,17 +96,21 @@ def report(tracks: Sequence[Track]) -> dict:
     """The figures of a policy, over tracks of one body and task.
 
     Returns:
-        `return` and `length` as summaries of the evaluation protocol, and under `metrics`, by name,
-        the `unit`, the value `prescribed` or None, the summary of the `robot`, and of each of the `legs`.
+        `return` and `length` as summaries of the evaluation protocol, `progress` likewise by name, and
+        under `metrics`, by name, the `unit`, the value `prescribed` or None, the summary of the `robot`,
+        and of each of the `legs`.
     """
     measured = [measure(track) for track in tracks]
     return {
         "return": evaluation.summary([track.rewards.sum() for track in tracks]),
         "length": evaluation.summary([len(track.times) for track in tracks]),
+        "progress": {
+            name: evaluation.summary([track.progress[name] for track in tracks]) for name in tracks[0].progress
+        },
         "metrics": {
             name: {
                 "unit": metric.unit,
-                "prescribed": metric.prescribed and metric.prescribed(tracks[0].parameters),
+                "prescribed": _prescribed(metric, tracks[0]),
                 "robot": evaluation.summary([measurement[name].value for measurement in measured]),
                 "legs": {
                     leg: evaluation.summary([measurement[name].legs[leg] for measurement in measured])
@@ -108,5 +118,12 @@ def report(tracks: Sequence[Track]) -> dict:
                 },
             }
             for name, metric in METRICS.items()
+            if name in measured[0]
         },
     }
+
+
+def _prescribed(metric: Metric, track: Track) -> float | None:
+    """The value that the task asks for; None where it asks for none."""
+    value = metric.prescribed and metric.prescribed(track)
+    return None if value is None or np.isnan(value) else value

@@ -8,6 +8,7 @@ for, has no course, and its expenses per metre are infinite.
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.style.tracks import Track
 
 TWO_PI = 2.0 * np.pi
@@ -90,7 +91,7 @@ def _between_touchdowns(track, difference) -> np.ndarray:
 
 
 def foot_slip(track: Track) -> np.ndarray:
-    """Way that a foot slides over the floor while it touches, by the way that the torso travels, m/m; (feet,).
+    """Way that a foot slides over the ground while it touches, by the way that the torso travels, m/m; (feet,).
 
     Integral of the horizontal speed of the foot's lowest point, so that rolling does not count (the
     foot slippage of Hwangbo et al., "Learning agile and dynamic motor skills for legged robots",
@@ -101,7 +102,7 @@ def foot_slip(track: Track) -> np.ndarray:
 
 
 def foot_clearance(track: Track) -> np.ndarray:
-    """Greatest height of a foot's lowest point over the floor, mean over the clock's cycles, m; (feet,).
+    """Greatest height of a foot's lowest point over the ground, mean over the clock's cycles, m; (feet,).
 
     The usual peak height of swing, but also defined for a foot that never swings, where it is the
     height it is dragged at. Cycles that the track cuts short do not count unless there is no other.
@@ -113,8 +114,8 @@ def foot_clearance(track: Track) -> np.ndarray:
 
 
 def _heights(track) -> np.ndarray:
-    """(steps, feet) of the feet's lowest points over the floor, m."""
-    return track.foot_positions[..., 2] - track.foot_radii
+    """(steps, feet) of the feet's lowest points over the ground, m."""
+    return track.foot_heights - track.foot_radii
 
 
 def speed(track: Track) -> float:
@@ -147,13 +148,13 @@ def torso_pitch(track: Track) -> float:
 
 def torso_roll(track: Track) -> float:
     """Root mean square of the torso's roll, its turn about its forward axis out of the horizontal, rad."""
-    rotations = _rotations(track)
-    return _rms(np.arctan2(rotations[:, 2, 1], rotations[:, 2, 2]))
+    axes = rotations.matrix(track.quaternions)
+    return _rms(np.arctan2(axes[:, 2, 1], axes[:, 2, 2]))
 
 
 def height_variation(track: Track) -> float:
-    """Standard deviation of the torso's height, m."""
-    return float(track.positions[:, 2].std())
+    """Standard deviation of the torso's height over the ground, m."""
+    return float(track.torso_heights.std())
 
 
 def posture_deviation(track: Track) -> np.ndarray:
@@ -183,7 +184,7 @@ def asymmetry(track: Track) -> np.ndarray:
     half a cycle apart. NaN for a leg that has no counterpart.
     """
     torso = track.positions[:, None]
-    paths = np.einsum("tij,tfi->tfj", _rotations(track), track.foot_positions - torso)
+    paths = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), track.foot_positions - torso)
     cycles = (track.phases[:, None] + track.parameters.phase_offsets) / TWO_PI % 1.0
     bins = (cycles * _BINS).astype(int)
     means = np.full((len(track.legs), _BINS, 3), np.nan)
@@ -207,7 +208,7 @@ def cost_of_transport(track: Track) -> float:
 
 def forward_axes(track: Track) -> np.ndarray:
     """Where the torso faces: its x axis in the world, (steps, 3)."""
-    return _rotations(track)[:, :, 0]
+    return rotations.matrix(track.quaternions)[:, :, 0]
 
 
 def _seconds(track) -> float:
@@ -217,23 +218,13 @@ def _seconds(track) -> float:
 def _travelled(track) -> float:
     """Length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
     way = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
-    return way if way > _NOWHERE * abs(track.parameters.target_velocity) * _seconds(track) else 0.0
+    asked = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
+    return way if way > _NOWHERE * asked else 0.0
 
 
 def _per_metre(track, amount):
     travelled = _travelled(track)
     return amount / travelled if travelled else np.full_like(amount, np.inf)
-
-
-def _rotations(track) -> np.ndarray:
-    """(steps, 3, 3) torso to world."""
-    w, x, y, z = track.quaternions.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.moveaxis(np.array(rows), -1, 0)
 
 
 def _rms(values) -> float:

@@ -167,10 +167,11 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
     """Forward speed over time against the target: its mean over a gait cycle, and within it the range of the steps."""
     figure = Figure(figsize=(_WIDTH, 3.5), layout="constrained")
     axis = figure.subplots()
-    parameters = next(iter(tracks.values())).parameters
-    target, band = parameters.target_velocity, parameters.velocity_band
-    axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0, label="where speed is rewarded")
-    axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)), label=f"target: {target:.2f} m/s")
+    first = next(iter(tracks.values()))
+    if not np.isnan(target := first.target_velocity):
+        band = first.parameters.velocity_band
+        axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0, label="where speed is rewarded")
+        axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)), label=f"target: {target:.2f} m/s")
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x = track.positions[:, 0]
         steps = np.diff(x) / track.time_step if len(x) > 1 else np.array([np.nan])
@@ -228,6 +229,7 @@ def path(tracks: Mapping[str, Track]) -> Figure:
 
 
 PICTURES = {function.__name__: function for function in (gait, reward, speed, path)}
+OF_GAIT = ("gait",)  # pictures that a task without a gait has not
 
 
 def _rows(tracks, height, **shared):
@@ -241,8 +243,9 @@ def _runs(mask):
 
 
 def _steps_in_a_cycle(track) -> float:
-    """Of the gait clock; the whole track if the clock stands."""
-    return 1.0 / (max(track.parameters.gait_frequency, 1.0 / track.times[-1]) * track.time_step)
+    """Control steps in a cycle of the gait clock; in the whole track, if there is none or it stands."""
+    frequency = 0.0 if track.parameters is None else track.parameters.gait_frequency
+    return 1.0 / (max(frequency, 1.0 / track.times[-1]) * track.time_step)
 
 
 def _over_a_cycle(track, values):

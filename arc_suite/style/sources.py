@@ -2,14 +2,15 @@
 
 import functools
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, policies, registry
+from arc_suite import checks, policies
 from arc_suite.cpg import PRESETS
+from arc_suite.envs.dm import load as load_environment
 from arc_suite.robots.spec import Body
 from arc_suite.style.files import load
 from arc_suite.style.tracks import Track, record
@@ -19,34 +20,48 @@ HELP = (
 )
 
 
+class Stage(NamedTuple):
+    """Of what tracks are wanted.
+
+    Attributes:
+        body: that moves.
+        task: name of the task.
+        task_kwargs: its settings, as in `arc_suite.load`.
+    """
+
+    body: Body
+    task: str = "walk"
+    task_kwargs: Mapping[str, Any] = {}
+
+
 class Source(NamedTuple):
     """Something that gives tracks.
 
     Attributes:
         label: by which it is shown.
-        body: whose tracks it has; None if it can walk any.
-        takes: of a body and seeds, the functions that give its tracks, one for each.
+        stage: of what it has tracks; None if it can play any.
+        takes: of a stage and seeds, the functions that give its tracks, one for each.
     """
 
     label: str
-    body: Body | None
-    takes: Callable[[Body, Sequence[int]], list[Callable[[], Track]]]
+    stage: Stage | None
+    takes: Callable[[Stage, Sequence[int]], list[Callable[[], Track]]]
 
 
 def source(name: str, preset: str = "medium") -> Source:
-    """Opens a source, told by its form.
+    """Open a source, told by its form.
 
     Args:
         name: a policy, as `policies.policy` takes it, of which there is a track for every seed; a file
-            of tracks, path/to/file.npz, or the id of a dataset, arc_suite/queen/cpg-medium-v0, whose
-            first episodes there are, as many as seeds, or all.
+            of tracks, path/to/file.npz, or the id of a dataset, arc_suite/queen/walk/cpg-medium-v0,
+            whose first episodes there are, as many as seeds, or all.
         preset: of the demonstrator.
 
     Raises:
         ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened;
             one line. `takes` raises it too, of a policy that does not go with the body, a seed that
-            is none, and tracks of another body; so do a policy whose action is none, and a replay whose
-            rewards are not those recorded.
+            is none, and tracks of another body or task; so do a policy whose action is none, and a
+            replay whose rewards are not those recorded.
         OSError: a file cannot be read; one line.
     """
     checks.name(preset, PRESETS, "preset")
@@ -60,29 +75,23 @@ def source(name: str, preset: str = "medium") -> Source:
 
 
 def _played(name: str, preset: str) -> Source:
-    def play(environment, policy, seed):
-        try:
-            return record(environment, policy, seed)
-        except ValueError as error:
-            raise ValueError(f"policy {name!r}: episode of seed {seed}: {error}") from None
-
-    def takes(body, seeds):
+    def takes(stage, seeds):
         seeds = [checks.seed(seed) for seed in seeds]
-        environment, policy = registry.load(body, "walk"), policies.policy(name, body, preset, seeds[0])
-        return [functools.partial(play, environment, policy, seed) for seed in seeds]
+        environment, policy = load_environment(*stage), policies.policy(name, stage.body, preset)
+        return [functools.partial(record, environment, policy, seed) for seed in seeds]
 
     return Source(f"cpg {preset}" if name == "cpg" else name, None, takes)
 
 
 def _saved(path: str) -> Source:
     tracks = load(path)
-    body = tracks[0].body
+    stage = Stage(tracks[0].body, tracks[0].task)
 
     def takes(wanted, seeds):
-        _check_body(path, body, wanted)
+        _check_stage(path, stage, wanted)
         return [functools.partial(lambda track: track, track) for track in tracks[: len(seeds)]]
 
-    return Source(Path(path).name, body, takes)
+    return Source(Path(path).name, stage, takes)
 
 
 def _replayed(dataset_id: str) -> Source:
@@ -91,6 +100,7 @@ def _replayed(dataset_id: str) -> Source:
     except ImportError as error:
         raise ValueError(str(error)) from None
     dataset = data.open(dataset_id)
+    stage = Stage(dataset.body, dataset.task, dataset.task_kwargs)
 
     def replay(environment, index):
         episode = dataset[index]
@@ -98,22 +108,24 @@ def _replayed(dataset_id: str) -> Source:
         if not np.array_equal(track.rewards, episode.rewards):
             raise ValueError(
                 f"dataset {dataset_id!r}: episode {index} earned {episode.total:.3f} and its replay "
-                f"{track.rewards.sum():.3f}; tools/collect.py --verify={dataset_id} tells more"
+                f"{track.rewards.sum():.3f}; arc-suite collect --verify={dataset_id} tells more"
             )
         return track
 
     def takes(wanted, seeds):
-        _check_body(dataset_id, dataset.body, wanted)
+        _check_stage(dataset_id, stage, wanted)
         if not len(dataset):
             raise ValueError(f"dataset {dataset_id!r} has no episodes")
         environment = dataset.environment()
         return [functools.partial(replay, environment, index) for index in range(min(len(seeds), len(dataset)))]
 
-    return Source(dataset_id, dataset.body, takes)
+    return Source(dataset_id, stage, takes)
 
 
-def _check_body(name: str, body: Body, wanted: Body) -> None:
-    """Raises a ValueError of one line, unless tracks are of the body that is wanted."""
-    if body != wanted:
-        other = "another body of that name" if body.name == wanted.name else body.name
-        raise ValueError(f"{name}: expected tracks of {wanted.name}, got those of {other}")
+def _check_stage(name: str, stage: Stage, wanted: Stage) -> None:
+    """Raise a ValueError of one line, unless tracks are of the body and the task that are wanted."""
+    if stage.body != wanted.body:
+        other = "another body of that name" if stage.body.name == wanted.body.name else stage.body.name
+        raise ValueError(f"{name}: expected tracks of {wanted.body.name}, got those of {other}")
+    if stage.task != wanted.task:
+        raise ValueError(f"{name}: expected tracks of the task {wanted.task}, got those of {stage.task}")

@@ -7,15 +7,18 @@ import mujoco
 import numpy as np
 
 from arc_suite import evaluation
+from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.terms import Parameters, stance_targets, total
+from arc_suite.tasks.clock import wanted_stance
+from arc_suite.tasks.terms import Parameters, total
 
 
 class Track(NamedTuple):
     """A rollout: one row for the end of every control step, SI units, angles in rad.
 
     Attributes:
-        body: what walked.
+        body: what moved.
+        task: name of the task.
         seed: of the episode, with which the actions repeat it.
         time_step: s between rows.
         positions: (steps, 3) of the torso.
@@ -26,13 +29,17 @@ class Track(NamedTuple):
         joint_velocities: (steps, joints)
         actions: (steps, joints), as applied.
         torques: (steps, joints) of the motors, N m.
+        torso_heights: (steps,) of the torso over the ground.
         foot_positions: (steps, feet, 3) of the feet's centres.
+        foot_heights: (steps, feet) of the feet's centres over the ground.
         foot_velocities: (steps, feet, 3) of the lowest points of the feet, world frame.
-        contacts: (steps, feet) whether the floor pushes on the foot.
-        phases: (steps,) of the gait clock.
+        contacts: (steps, feet) whether the ground pushes on the foot.
+        phases: (steps,) of the gait clock, rad; None in a task without a gait.
         terms: the reward's unweighted terms by name, each (steps,).
         weights: signed weight of every term.
-        parameters: of the task: target speed, prescribed schedule, standing pose.
+        progress: the task's figures at the end by name.
+        target_velocity: m/s along world x, that the task asks for all the time; NaN if it does not.
+        parameters: prescribed schedule and standing pose; None in a task without a gait.
         mass: kg, of the whole body.
         gravity: m/s^2, downwards.
         legs: (feet,) names.
@@ -42,6 +49,7 @@ class Track(NamedTuple):
     """
 
     body: Body
+    task: str
     seed: int
     time_step: float
     positions: np.ndarray
@@ -52,13 +60,17 @@ class Track(NamedTuple):
     joint_velocities: np.ndarray
     actions: np.ndarray
     torques: np.ndarray
+    torso_heights: np.ndarray
     foot_positions: np.ndarray
+    foot_heights: np.ndarray
     foot_velocities: np.ndarray
     contacts: np.ndarray
-    phases: np.ndarray
+    phases: np.ndarray | None
     terms: Mapping[str, np.ndarray]
     weights: Mapping[str, float]
-    parameters: Parameters
+    progress: Mapping[str, float]
+    target_velocity: float
+    parameters: Parameters | None
     mass: float
     gravity: float
     legs: tuple[str, ...]
@@ -74,12 +86,12 @@ class Track(NamedTuple):
     @property
     def stance(self) -> np.ndarray:
         """(steps, feet) which feet are in stance: below the threshold of the paper's Section 4."""
-        return self.foot_positions[..., 2] < self.parameters.stance_threshold
+        return self.foot_heights < self.parameters.stance_threshold
 
     @property
     def schedule(self) -> np.ndarray:
         """(steps, feet) which feet the gait wants in stance (the paper's Section 4)."""
-        return stance_targets(self.phases, self.parameters)
+        return wanted_stance(self.phases, self.parameters.duty_factor, self.parameters.phase_offsets)
 
     @property
     def rewards(self) -> np.ndarray:
@@ -87,28 +99,30 @@ class Track(NamedTuple):
         return total(self.terms, self.weights)
 
 
-def record(environment, policy, seed: int, max_steps: int | None = None) -> Track:
-    """Plays one episode of the evaluation protocol and records it.
+def record(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Track:
+    """Play one episode of the evaluation protocol and record it.
 
     Foot positions, velocities and contacts stand one substep behind the torso, as in the reward.
 
     Args:
         environment: of `arc_suite.load`.
-        policy: maps a `TimeStep` to an action.
-        seed: of the episode's initial state.
+        policy: made for one row.
+        seed: of the episode's start.
         max_steps: to stop early.
 
     Returns:
         The track.
     """
-    task, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
-    body, layout = task.body, task.layout
+    run, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
+    task = run.definition
+    body, layout = task.scene.body, task.scene.layout
     feet = [model.body(name).id for name in body.foot_names]
     radii = np.array([leg.foot.radius for leg in body.legs])
     rows, terms = [], []
     for timestep in evaluation.rollout(environment, policy, seed, max_steps):
         if timestep.first():
             continue
+        readings = task.read(data)
         row = {
             "positions": data.qpos[:3],
             "quaternions": data.qpos[3:7],
@@ -118,21 +132,28 @@ def record(environment, policy, seed: int, max_steps: int | None = None) -> Trac
             "joint_velocities": data.qvel[layout.joint_velocities],
             "actions": data.ctrl,
             "torques": data.qfrc_actuator[layout.joint_velocities],
+            "torso_heights": readings.torso_height,
             "foot_positions": data.xpos[feet],
+            "foot_heights": readings.foot_heights,
             "foot_velocities": lowest_point_velocities(model, data, feet, radii),
             "contacts": data.cfrc_ext[feet].any(axis=-1),
-            "phases": task.phase,
         }
+        if task.clock is not None:
+            row["phases"] = task.clock.at(task.clock.phases, run.memory.tick)
         rows.append({name: np.array(value) for name, value in row.items()})
-        terms.append(task.terms)
+        terms.append(run.terms)
+    recorded = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return Track(
         body=body,
+        task=task.name,
         seed=int(seed),
         time_step=environment.control_timestep(),
-        **{name: np.stack([row[name] for row in rows]) for name in rows[0]},
+        **{"phases": None} | recorded,
         terms={name: np.array([row[name] for row in terms]) for name in terms[0]},
         weights=dict(task.settings.weights),
-        parameters=task.settings.parameters,
+        progress={name: float(figure) for name, figure in run.progress.items()},
+        target_velocity=np.nan if task.target_velocity is None else task.target_velocity,
+        parameters=task.parameters,
         mass=float(model.body_mass.sum()),
         gravity=float(-model.opt.gravity[2]),
         legs=tuple(leg.name for leg in body.legs),

@@ -1,5 +1,9 @@
-"""What creatures do: task name -> factory of an environment for a body."""
+"""What bodies are asked to do: name -> task."""
 
-from arc_suite.tasks import walk
+from arc_suite.tasks.contract import Task
+from arc_suite.tasks.steer import Steer
+from arc_suite.tasks.walk import Walk
 
-TASKS = {"walk": walk.walk}
+TASKS = {task.name: task for task in (Walk, Steer)}
+
+__all__ = ["TASKS", "Task"]

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from arc_suite.models.sizing import GRAVITY
-from arc_suite.models.standing import stability_margin, stance
+from arc_suite.models.standing import stability_margin, standing
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 
@@ -64,13 +64,13 @@ def least_margin(body: Body, gait: gaits.Gait) -> float:
     Feet on the ground pass from ahead of where they stand at rest to as far behind while the
     torso moves over them; the centre of mass is taken to rest in the torso.
     """
-    standing = stance(body)
-    ahead = 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * standing.height
+    pose = standing(body)
+    ahead = 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * pose.height
     margins = []
     for time in np.arange(40) / 40.0:
         cycle = (time + np.array(gait.offsets)) % 1.0
         feet = cycle < gait.duty_factor
-        soles = standing.soles[feet, :2]
+        soles = pose.soles[feet, :2]
         soles[:, 0] += ahead * (1.0 - 2.0 * cycle[feet] / gait.duty_factor)
-        margins.append(stability_margin(standing.centre, soles))
+        margins.append(stability_margin(pose.centre, soles))
     return min(margins)

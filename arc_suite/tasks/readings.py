@@ -1,4 +1,4 @@
-"""Reads a simulation into named arrays: the same for one simulation and for a batch of them.
+"""Readings of a simulation as named arrays: the same for one simulation and for a batch of them.
 
 `mujoco.MjData`, dm_control's `physics.data` and `mujoco.batch.Batch` share their field names; a
 batch's fields carry a leading axis. Every array here keeps such leading axes, written `...`.
@@ -8,49 +8,61 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.arenas import Arena
+
+FIELDS = ("qpos", "qvel", "cfrc_ext", "xpos")  # of the simulation, that `read` takes
+
 
 class Layout(NamedTuple):
     """Where a body's quantities lie in the simulation's arrays, looked up by name once."""
 
     pose: slice  # in qpos: torso height, torso quaternion, joint angles
     joint_angles: slice  # in qpos
-    velocities: slice  # in qvel: torso linear and angular, joints
     joint_velocities: slice  # in qvel
-    parts: slice  # in cfrc_ext
+    velocities: slice  # in qvel: torso linear and angular, joints
+    parts: slice  # in cfrc_ext and xpos; the first is the torso
     feet: slice | np.ndarray  # in xpos
 
 
 class Readings(NamedTuple):
     """What a body's simulation shows at one moment, in SI units.
 
+    Contact forces, foot heights and the frame's position are as MuJoCo's last substep computed
+    them, one substep behind the rest, as in the published benchmark.
+
     Attributes:
-        torso_height: (...)
+        posture: (..., 5 + joints): torso height over the ground, torso quaternion, joint angles.
+        torso_position: (..., 3) in the world.
         torso_quaternion: (..., 4), w first.
         joint_angles: (..., joints)
-        linear_velocity: (..., 3) of the torso, world frame.
-        angular_velocity: (..., 3) of the torso, body frame.
-        joint_velocities: (..., joints)
+        velocities: (..., 6 + joints): torso linear (world) and angular (body), joint velocities.
         contact_forces: (..., 6 * parts), torque and force on each part, clipped to [-1, 1].
-        foot_heights: (..., feet)
+        frame_position: (..., 3) of the torso's frame, world.
+        foot_heights: (..., feet) over the ground.
     """
 
-    torso_height: np.ndarray
+    posture: np.ndarray
+    torso_position: np.ndarray
     torso_quaternion: np.ndarray
     joint_angles: np.ndarray
-    linear_velocity: np.ndarray
-    angular_velocity: np.ndarray
-    joint_velocities: np.ndarray
+    velocities: np.ndarray
     contact_forces: np.ndarray
+    frame_position: np.ndarray
     foot_heights: np.ndarray
+
+    @property
+    def torso_height(self):
+        """(...) over the ground."""
+        return component(self.posture, 0)
 
 
 def layout(model, joints, parts, feet) -> Layout:
-    """Finds a body in a compiled model.
+    """Find a body in a compiled model.
 
     Args:
         model: `mujoco.MjModel` whose first joint is the torso's free joint.
         joints: names of the actuated joints, in the order of the model.
-        parts: names of the body's rigid parts, likewise.
+        parts: names of the body's rigid parts, likewise, the torso first.
         feet: names of the feet's bodies.
 
     Returns:
@@ -68,8 +80,8 @@ def layout(model, joints, parts, feet) -> Layout:
     return Layout(
         pose=slice(2, angles.stop),
         joint_angles=angles,
-        velocities=slice(0, velocities.stop),
         joint_velocities=velocities,
+        velocities=slice(0, velocities.stop),
         parts=_span([model.body(name).id for name in parts]),
         feet=_evenly_spaced([model.body(name).id for name in feet]),
     )
@@ -91,7 +103,7 @@ def _evenly_spaced(indices) -> slice | np.ndarray:
 
 
 def component(vectors, index: int):
-    """One component of vectors (..., n): (...).
+    """Return one component of vectors (..., n): (...).
 
     A single vector gives a scalar, with which numpy computes ten times faster than with an array
     of no axes.
@@ -99,28 +111,30 @@ def component(vectors, index: int):
     return vectors[..., index][()]
 
 
-def read(data, layout: Layout) -> Readings:
-    """Takes the readings of a simulation.
-
-    Contact forces and foot heights are as MuJoCo's last substep computed them, one substep behind
-    positions and velocities, as in the published benchmark.
+def read(data, layout: Layout, arena: Arena) -> Readings:
+    """Take the readings of a simulation.
 
     Args:
         data: `MjData`, or anything with its fields under any leading axes.
         layout: of the body in the model.
+        arena: over whose ground heights are.
 
     Returns:
         The readings; arrays may be views of `data`.
     """
-    qpos, qvel = data.qpos, data.qvel
+    qpos, xpos = data.qpos, data.xpos
+    pose, position = qpos[..., layout.pose], qpos[..., 0:3]
+    if not arena.is_level:
+        numpy = qpos.__array_namespace__()
+        pose = numpy.concatenate([arena.clearance(position)[..., None], pose[..., 1:]], axis=-1)
     forces = data.cfrc_ext[..., layout.parts, :]
     return Readings(
-        torso_height=component(qpos, 2),
-        torso_quaternion=qpos[..., 3:7],
-        joint_angles=qpos[..., layout.joint_angles],
-        linear_velocity=qvel[..., 0:3],
-        angular_velocity=qvel[..., 3:6],
-        joint_velocities=qvel[..., layout.joint_velocities],
+        posture=pose,
+        torso_position=position,
+        torso_quaternion=pose[..., 1:5],
+        joint_angles=pose[..., 5:],
+        velocities=data.qvel[..., layout.velocities],
         contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),
-        foot_heights=data.xpos[..., layout.feet, 2],
+        frame_position=xpos[..., layout.parts.start, :],
+        foot_heights=arena.clearance(xpos[..., layout.feet, :]),
     )

@@ -1,7 +1,8 @@
 """The paper's reward (Section 4): ten unweighted terms and their weighted sum.
 
 Each term is a plain function of readings, of what the task remembers of the step, and of the
-task's parameters. Arrays may carry any leading axes: one text serves one environment and a batch.
+task's parameters. Arrays may carry any leading axes: one text serves one environment, a batch, and
+JAX.
 """
 
 from collections.abc import Mapping
@@ -10,24 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.tasks.readings import Readings, component
-
-TWO_PI = 2.0 * np.pi
-
-
-class Step(NamedTuple):
-    """What the task knows of a control step beside the readings.
-
-    Attributes:
-        phase: (...) of the gait clock, rad in [0, 2 pi).
-        forward_velocity: (...) mean of the torso's world x velocity over the step, m/s.
-        action: (..., joints)
-        previous_action: (..., joints)
-    """
-
-    phase: np.ndarray
-    forward_velocity: np.ndarray
-    action: np.ndarray
-    previous_action: np.ndarray
 
 
 class Parameters(NamedTuple):
@@ -54,29 +37,20 @@ class Parameters(NamedTuple):
     default_angles: np.ndarray | float
 
 
-def stance_targets(phase, parameters: Parameters):
-    """Which feet the gait wants on the ground: (..., feet) booleans for a phase (...)."""
-    return (phase[..., None] + parameters.phase_offsets) % TWO_PI < TWO_PI * parameters.duty_factor
-
-
-def stance_errors(readings: Readings, step: Step, parameters: Parameters):
-    """Which feet are on the ground and should not be, or the reverse: (..., feet) booleans."""
-    stance = readings.foot_heights < parameters.stance_threshold
-    return stance != stance_targets(step.phase, parameters)
-
-
 def healthy(torso_height, parameters: Parameters):
-    """Whether a torso's height (...) m lies in its healthy range: (...) booleans."""
+    """Return whether torso heights (...), m, lie in their healthy range: (...) booleans."""
     low, high = parameters.healthy_range
     return (low <= torso_height) & (torso_height <= high)
 
 
-def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
-    """All ten terms, unweighted.
+def terms(readings: Readings, step, parameters: Parameters) -> dict:
+    """Return all ten terms, unweighted.
 
     Args:
         readings: after the control step.
-        step: the control step.
+        step: what the task remembers of it: `forward_velocity` (...), m/s; `wrong_feet` (...), how
+            many are on the ground and should not be, or the reverse; `action` and `previous_action`
+            (..., joints).
         parameters: of the task.
 
     Returns:
@@ -84,15 +58,13 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
         table of weights.
     """
     p = parameters
-    errors = stance_errors(readings, step, p)
-    wrong_feet = errors.sum(axis=-1, dtype=float)
-    roll, pitch = component(readings.angular_velocity, 0), component(readings.angular_velocity, 1)
-    vertical = component(readings.linear_velocity, 2)  # numpy's `vertical**2` rounds otherwise for scalars
+    # Products, since numpy's `x**2` rounds otherwise for scalars.
+    vertical, roll, pitch = (component(readings.velocities, i) for i in (2, 3, 4))
     return {
-        "forward": _positive(1.0 - abs(step.forward_velocity - p.target_velocity) / p.velocity_band),
+        "forward": tent(step.forward_velocity - p.target_velocity, p.velocity_band),
         "healthy": healthy(readings.torso_height, p).astype(float),
-        "gait_bonus": 1.0 - wrong_feet / errors.shape[-1],
-        "gait_cost": wrong_feet,
+        "gait_bonus": 1.0 - step.wrong_feet / len(p.phase_offsets),
+        "gait_cost": step.wrong_feet,
         "control": (step.action**2).sum(axis=-1),
         "smoothness": ((step.action - step.previous_action) ** 2).sum(axis=-1),
         "contact": (readings.contact_forces**2).sum(axis=-1),
@@ -102,16 +74,17 @@ def terms(readings: Readings, step: Step, parameters: Parameters) -> dict:
     }
 
 
-def _positive(x):
-    """`x.clip(0.0)`, several times faster where x is a scalar."""
-    return abs(x) * (x > 0.0)
+def tent(error, band):
+    """Return 1 where an error (...) is 0, falling to 0 where it reaches the band; of any error, infinite ones too."""
+    share = 1.0 - abs(error) / band
+    return share.__array_namespace__().maximum(share, 0.0)
 
 
 def total(terms: Mapping, weights: Mapping):
-    """The reward: the sum of the terms times their signed weights, in the order of the weights."""
+    """Return the reward: the sum of the terms times their signed weights, in the order of the weights."""
     return sum(weight * terms[name] for name, weight in weights.items())
 
 
 def greatest(weights: Mapping) -> float:
-    """The most that a step can earn: bonuses, whose weights are positive, are at most 1, costs at least 0."""
+    """Return the most that a step can earn: bonuses, whose weights are positive, are at most 1, costs at least 0."""
     return sum(weight for weight in weights.values() if weight > 0.0)

@@ -1,15 +1,15 @@
 """Judges many presets of a robot at once, on the vector environment."""
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.cpg.demonstrator import Prescribed, felt
 from arc_suite.cpg.presets import Preset
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.walker import blocks
 
 TERMS = ("posture", "smoothness")  # of the reward, unweighted
 STYLE = (*TERMS, "tilt")  # costs by which presets may not be worse than another
@@ -35,22 +35,32 @@ class Score(NamedTuple):
 class Judge:
     """Plays seeded episodes of presets, each in a row of one vector environment."""
 
-    def __init__(self, body: Body, presets: int, episodes: int, steps: int):
-        """Allocates the rows.
+    def __init__(
+        self,
+        body: Body,
+        presets: int,
+        episodes: int,
+        steps: int,
+        task: str = "walk",
+        task_kwargs: Mapping[str, Any] | None = None,
+    ):
+        """Allocate the rows.
 
         Args:
             body: of the robot.
             presets: how many are judged at once.
             episodes: of each.
             steps: control steps of an episode.
+            task: name of the task; its terms must have those of `TERMS`.
+            task_kwargs: its settings, as in `arc_suite.load`.
         """
         self._body, self._shape, self._steps = body, (presets, episodes), steps
-        self._environment = VectorEnv(body, "walk", presets * episodes)
+        self._environment = VectorEnv(body, task, presets * episodes, task_kwargs=task_kwargs)
 
     def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> Score:
-        """Plays the episodes of these seeds, which are the same for all presets."""
+        """Play the episodes of these seeds, which are the same for all presets."""
         count, episodes = self._shape
-        joints = len(self._body.joint_names)
+        split = self._environment.task.split
         controls = [Prescribed.fit(self._body, preset) for preset in presets]
         control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
         observations, _ = self._environment.reset(seed=[*seeds] * count)
@@ -58,11 +68,11 @@ class Judge:
         totals, lengths, tipping = np.zeros((3, upright.size))
         style = dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
-            actions = control(np.full(upright.size, step), *felt(blocks(observations.astype(float), joints)))
+            actions = control(np.full(upright.size, step), *felt(split(observations)))
             observations, rewards, fallen, _, info = self._environment.step(actions)
             totals += rewards * upright
             lengths += upright
-            uprightness = _uprightness(observations)
+            uprightness = rotations.upright(felt(split(observations))[0])
             terms = info.get("reward_terms", dict.fromkeys(TERMS, 0.0))  # not there if all rows start anew
             costs = {name: terms[name] for name in TERMS} | {"tilt": 1.0 - uprightness**2}
             for name, cost in costs.items():
@@ -77,11 +87,5 @@ class Judge:
         )
 
     def close(self) -> None:
-        """Frees the rows."""
+        """Free the rows."""
         self._environment.close()
-
-
-def _uprightness(observations: np.ndarray) -> np.ndarray:
-    """Cosine of the angle between the torso's axis and the vertical, (rows,)."""
-    _, x, y, _ = observations[:, 1:5].astype(float).T
-    return 1.0 - 2.0 * (x * x + y * y)

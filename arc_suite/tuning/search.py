@@ -6,7 +6,8 @@ than that of the preset from which the search sets out, in the same episodes, an
 in hard starts, those of many that throw this preset about most.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,7 +55,16 @@ class Search:
         candidates: how many a generation has.
     """
 
-    def __init__(self, robot: str, seed: int, episodes: int, steps: int, starts: int):
+    def __init__(
+        self,
+        robot: str,
+        seed: int,
+        episodes: int,
+        steps: int,
+        starts: int,
+        task: str = "walk",
+        task_kwargs: Mapping[str, Any] | None = None,
+    ):
         """Judges `medium`, with leads over its clock too; the best one is where the search sets out.
 
         Args:
@@ -63,6 +73,8 @@ class Search:
             episodes: by which a candidate is judged.
             steps: control steps of each.
             starts: of which the hard ones are taken, at least `HARD`.
+            task: name of the task.
+            task_kwargs: its settings, as in `arc_suite.load`.
 
         Raises:
             ImportError: no package `cma`.
@@ -75,17 +87,18 @@ class Search:
         self._starts = range(self._first, self._first + starts)
         leads = [lead / LEADS for lead in range(LEADS)]
         presets = [medium, *(self._space.preset(self._space.vector(lead)) for lead in leads)]
-        score = _judged(body, presets, range(self._first, self._first + episodes), steps)
+        play = {"task": task, "task_kwargs": task_kwargs}
+        score = _judged(body, presets, range(self._first, self._first + episodes), steps, play)
         self.reward, *by_lead = score.rewards.mean(axis=-1).tolist()
-        tipping = _judged(body, [medium], self._starts, _START_STEPS).tipping[0]
+        tipping = _judged(body, [medium], self._starts, _START_STEPS, play).tipping[0]
         self._hard = [self._starts[index] for index in np.argsort(tipping, stable=True)[-HARD:]]
         self._origin = self._space.vector(leads[np.argmax(by_lead)])
         self._scale = np.array([number.scale for number in self._space.ranges()])
         options = {"randn": np.random.RandomState(seed).randn, "seed": np.nan, "verbose": -9}
         self._strategy = cma.CMAEvolutionStrategy(np.zeros_like(self._origin), SPREAD, options)
         self.candidates = self._strategy.popsize
-        self._judge = Judge(body, self.candidates + 1, episodes, steps)
-        self._judge_of_starts = Judge(body, self.candidates, HARD, _START_STEPS)
+        self._judge = Judge(body, self.candidates + 1, episodes, steps, **play)
+        self._judge_of_starts = Judge(body, self.candidates, HARD, _START_STEPS, **play)
         self._generations = 0
 
     def step(self, fitness: list[float] | None = None) -> Generation | None:
@@ -125,8 +138,8 @@ class Search:
         return Generation(fitness.tolist(), float(rewards[best]), float(tipping[best]), style[best].tolist())
 
 
-def _judged(body, presets, seeds, steps) -> Score:
-    judge = Judge(body, len(presets), len(seeds), steps)
+def _judged(body, presets, seeds, steps, play: Mapping[str, Any]) -> Score:
+    judge = Judge(body, len(presets), len(seeds), steps, **play)
     score = judge(presets, seeds)
     judge.close()
     return score

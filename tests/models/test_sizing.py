@@ -8,7 +8,7 @@ import pytest
 
 from arc_suite import models
 from arc_suite.models.sizing import control_timestep, natural_frequency, sized
-from arc_suite.models.standing import stability_margin, stance
+from arc_suite.models.standing import stability_margin, standing
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import Motor, Simulation
 
@@ -56,7 +56,7 @@ def test_motors_armature_and_damping_follow_the_rules():
         assert gear == pytest.approx(10.0 * np.maximum(load, 0.25 * load.max()), rel=1e-6)
     frequency = natural_frequency(BODY)
     assert frequency == pytest.approx(0.5 / control_timestep(BODY), rel=1e-12)
-    inertias = stance(BODY).inertias
+    inertias = standing(BODY).inertias
     armature = np.maximum(0.3 * inertias, gears.ravel() / (0.35 * frequency**2) - inertias)
     assert model.dof_armature[6:] == pytest.approx(armature, rel=1e-9)
     assert model.dof_damping[6:] == pytest.approx(0.1 * frequency * (inertias + armature), rel=1e-9)
@@ -86,17 +86,17 @@ def test_sizing_keeps_dimensionless_ratios_when_a_body_grows():
 
 def test_a_leg_in_which_nothing_carries_gets_motors_too():
     body = sized(generator.generate(6, 1))
-    gears = {round(leg.joints[0].motor.gear / stance(body).mass, 6) for leg in body.legs}
+    gears = {round(leg.joints[0].motor.gear / standing(body).mass, 6) for leg in body.legs}
     assert len(gears) == 1
     assert min(gears) > 0.01
 
 
 def test_stance_is_measured():
-    standing = stance(BODY)
+    pose = standing(BODY)
     model = compiled(BODY)
-    assert standing.mass == pytest.approx(model.body_mass.sum(), rel=1e-12)
-    assert standing.height == 0.4
-    for leg, sole in zip(BODY.legs, standing.soles, strict=True):
+    assert pose.mass == pytest.approx(model.body_mass.sum(), rel=1e-12)
+    assert pose.height == 0.4
+    for leg, sole in zip(BODY.legs, pose.soles, strict=True):
         assert sole + (0.0, 0.0, leg.foot.radius) == pytest.approx(leg.foot_position, abs=1e-12)
     # The Jacobian of a sole against a small turn of each joint.
     data = mujoco.MjData(model)
@@ -108,8 +108,8 @@ def test_stance_is_measured():
         mujoco.mj_kinematics(model, data)
         moved = data.body("r2_foot").xpos - model.qpos0[:3]
         turned = frame @ _frame(model, "r2_lower").T @ (0.0, 0.0, -BODY.legs[4].foot.radius)
-        numeric = (moved + turned - standing.soles[4]) / 1e-6
-        assert standing.jacobians[4][:, i] == pytest.approx(numeric, abs=1e-5)
+        numeric = (moved + turned - pose.soles[4]) / 1e-6
+        assert pose.jacobians[4][:, i] == pytest.approx(numeric, abs=1e-5)
 
 
 def _frame(model, body):

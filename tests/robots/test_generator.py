@@ -8,7 +8,7 @@ import pytest
 from dm_control import mjcf
 
 from arc_suite import models
-from arc_suite.models.standing import stance
+from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import SpecError
 
@@ -100,7 +100,7 @@ def test_random_bodies_are_sound_and_within_their_ranges(seed):
         assert leg.foot_position[2] - leg.foot.radius == pytest.approx(-height, abs=1e-12)
         out = math.dist(leg.foot_position[:2], leg.mount[:2])
         assert 0.7 * 0.75 - 1e-9 <= out / height <= 1.2 * 1.3 + 1e-9
-    assert stance(body).margin >= 0.08 * height
+    assert standing(body).margin >= 0.08 * height
 
 
 def test_random_bodies_are_of_all_kinds():
@@ -134,8 +134,8 @@ def test_scaled_bodies_have_all_lengths_multiplied():
     body = ROBOTS["queen"]
     double = generator.scaled(body, 2.0)
     assert double.torso.standing_height == 1.5
-    assert stance(double).mass == pytest.approx(8.0 * stance(body).mass, rel=1e-9)
-    np.testing.assert_allclose(stance(double).soles, 2.0 * stance(body).soles, rtol=1e-12)
+    assert standing(double).mass == pytest.approx(8.0 * standing(body).mass, rel=1e-9)
+    np.testing.assert_allclose(standing(double).soles, 2.0 * standing(body).soles, rtol=1e-12)
     assert double.simulation is None  # sized anew
     assert generator.scaled(generator.scaled(generator.generate(4, 2), 2.0), 0.5) == generator.generate(4, 2)
     for factor in (0.0, math.nan, "2", 1e3):

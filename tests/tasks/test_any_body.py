@@ -12,7 +12,7 @@ import pytest
 import arc_suite
 from arc_suite import models, policies
 from arc_suite.cpg import Demonstrator
-from arc_suite.models.standing import stance
+from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS, gaits, generator
 from arc_suite.robots.spec_files import body_to_json, load_body
 from arc_suite.tasks.fitting import fitted_gait, least_margin
@@ -207,7 +207,7 @@ def test_random_actions_upset_no_body(seed):
 
 def test_one_link_legs_are_built_and_stand():
     body = generator.generate(6, 1)
-    assert stance(body).margin > 0.08 * body.torso.standing_height
+    assert standing(body).margin > 0.08 * body.torso.standing_height
     track(body, 4.0)  # no promise that it walks
 
 

@@ -1,0 +1,254 @@
+"""Tasks as dm_env environments: dm_control's `Environment` around any task of the contract."""
+
+import collections
+import math
+
+import dm_env
+import numpy as np
+from dm_control import mujoco
+from dm_control.rl import control
+from dm_env import specs
+
+from arc_suite import checks
+from arc_suite.envs.scene import checked_action, checked_command, prepared
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.simulation.physics import Physics
+from arc_suite.tasks import Task, terms
+
+_FLAT = "observations"  # dm_control's name of a flat observation
+
+
+def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
+    """Open an environment, as `dm_control.suite.load` does.
+
+    Args:
+        domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
+            where that has not been imported yet; or any body; see `registry.body_of`.
+        task_name: walk, steer, or a task of another package likewise.
+        task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
+            or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
+            reward 0); for walk `gait`, `weights`, and every target and threshold, see
+            `arc_suite.tasks.walk.settings`.
+        environment_kwargs: `flat_observation=True` gives one vector in place of named blocks.
+        visualize_reward: let rendered pictures show the reward as a colour.
+
+    Returns:
+        An `Environment`, which is a `dm_control.rl.control.Environment`.
+
+    Raises:
+        ValueError: an unknown name, or a value that does not fit; one line that names it and the
+            nearest valid name.
+        OSError: a file that cannot be read.
+    """
+    settings = dict(checks.mapping("task_kwargs", task_kwargs))
+    options = checks.mapping("environment_kwargs", environment_kwargs)
+    random, on_divergence = settings.pop("random", None), settings.pop("on_divergence", "raise")
+    task, model = prepared(domain_name, task_name, settings)
+    for name in options:
+        checks.name(name, ["flat_observation"], "environment setting")
+    run = TaskRun(task, random, on_divergence, options.get("flat_observation", False))
+    run.visualize_reward = visualize_reward
+    return Environment(Physics.from_body(task.scene.body, task.scene.arena), run)
+
+
+class Environment(control.Environment):
+    """A task in a simulation; steps, resets and specs are those of dm_control."""
+
+    def __init__(self, physics: Physics, run: "TaskRun"):
+        """Put a task's run and its simulation together; `load` makes both."""
+        limit = run.definition.step_limit
+        step = SUBSTEPS * physics.timestep()
+        super().__init__(
+            physics,
+            run,
+            # Half a step short, so that rounding adds none.
+            time_limit=math.inf if limit == math.inf else (limit - 0.5) * step,
+            n_sub_steps=SUBSTEPS,
+            legacy_step=False,  # which would move the contact forces and foot heights one substep on
+        )
+
+    def reset(self, seed: int | None = None) -> dm_env.TimeStep:
+        """Start an episode.
+
+        Args:
+            seed: starts a new stream of random numbers, in which this is the first episode; None
+                for the next episode of the present stream.
+
+        Raises:
+            ValueError: not a seed.
+        """
+        if seed is not None:
+            self.task.random = np.random.RandomState(checks.seed(seed))
+        return super().reset()
+
+    def command(self, name: str, value) -> None:
+        """Set a command of the task from now on, as a player's stick does, until the next episode.
+
+        Args:
+            name: one of the task's `commands`.
+            value: (size,) numbers; None, or NaN in some, for what the task itself would do.
+
+        Raises:
+            ValueError: no such command, or a value of another size; one line.
+        """
+        self.task.set_command(name, value)
+
+    def observation_spec(self):
+        """Return the specs of the observation's blocks by name, or of the flat vector."""
+        return self.task.observation_spec(self.physics)
+
+
+class TaskRun(control.Task):
+    """A task in one simulation, episode after episode, as dm_control's `Task`: it keeps the memory.
+
+    Attributes:
+        definition: the task, a value of the contract.
+        memory: of the present episode; None before the first.
+        terms: the unweighted terms of the latest reward by name; empty before the first step.
+        visualize_reward: whether rendered pictures show the reward as a colour.
+    """
+
+    def __init__(self, task: Task, random=None, on_divergence: str = "raise", flat: bool = False):
+        """Prepare to run.
+
+        Args:
+            task: what to do.
+            random: a `RandomState`, or what one is seeded with.
+            on_divergence: what a step does whose physics diverges: "raise" an error, or "terminate"
+                the episode with reward 0.
+            flat: whether observations are one vector.
+
+        Raises:
+            ValueError: an unknown `on_divergence`, or not a seed.
+        """
+        if not isinstance(random, np.random.RandomState):
+            random = np.random.RandomState(None if random is None else checks.seed(random))
+        self.definition = task
+        self.memory = None
+        self.terms = {}
+        self.visualize_reward = False
+        self.random = random
+        self._on_divergence = checks.name(on_divergence, ("raise", "terminate"), "on_divergence")
+        self._flat = flat
+        self._readings = None
+        self._starting = False  # between a reset and its observation
+        self._motors = (len(task.scene.body.joint_names),)
+
+    @property
+    def random(self) -> np.random.RandomState:
+        """What starts of episodes are drawn from; a new one begins a new stream of episodes."""
+        return self._random
+
+    @random.setter
+    def random(self, value: np.random.RandomState):
+        self._random, self._carry, self._stream_begins = value, self.definition.first(), True
+
+    @property
+    def body(self):
+        """What moves."""
+        return self.definition.scene.body
+
+    @property
+    def settings(self):
+        """The numbers of the task."""
+        return self.definition.settings
+
+    @property
+    def progress(self) -> dict[str, float]:
+        """How well the episode has gone so far, figures by name."""
+        return self.definition.progress(self.memory)
+
+    def set_command(self, name: str, value) -> None:
+        """Set a live command; see `Environment.command`."""
+        value = checked_command(self.definition, name, value)
+        if self.memory is None:
+            raise ValueError(f"command {name!r}: no episode has begun; reset first")
+        self.memory = self.memory._replace(**{name: value})
+
+    def action_spec(self, physics):
+        """Return the spec of one control in [-1, 1] for each motor."""
+        return mujoco.action_spec(physics)
+
+    def observation_spec(self, physics):
+        """Return the specs of the observation's blocks by name, or of the flat vector."""
+        sizes = {_FLAT: self.definition.size} if self._flat else self.definition.blocks
+        return collections.OrderedDict((name, specs.Array((size,), float, name)) for name, size in sizes.items())
+
+    def initialize_episode(self, physics):
+        """Draw how the episode starts, and write it."""
+        if self.memory is not None and not self._stream_begins:
+            self._carry = self.definition.carry(self.memory)
+        self._stream_begins = False
+        start = self.definition.start(self._random, self._carry)
+        data = physics.data.ptr
+        data.qpos[:], data.qvel[:] = start.qpos, start.qvel
+        if start.mocap_pos is not None:
+            data.mocap_pos[:] = start.mocap_pos
+        physics.shown_reward = None
+        self.memory, self._starting = start.memory, True
+
+    def before_step(self, action, physics):
+        """Apply the action, clipped to [-1, 1].
+
+        Raises:
+            ValueError: the action has another shape or holds NaN; nothing has changed then.
+        """
+        action = checked_action(action, self._motors)
+        self.memory, inputs = self.definition.before(self.memory, action)
+        data = physics.data.ptr
+        data.ctrl[:] = inputs.ctrl
+        if inputs.kick is not None:
+            data.qvel[:] += inputs.kick
+
+    def after_step(self, physics):
+        """Take the readings, and what is to be remembered of the step.
+
+        Raises:
+            PhysicsError: the physics diverged and is not to terminate the episode; one line that
+                names robot, time and cause.
+        """
+        if physics.divergence is not None and self._on_divergence == "raise":
+            raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
+        self._readings = self.definition.read(physics.data.ptr)
+        self.memory = self.definition.after(self.memory, self._readings)
+
+    def get_reward(self, physics):
+        """Return the weighted sum of the terms, which stay in `terms`."""
+        weights = self.settings.weights
+        self.terms = self.definition.terms(self.memory, self._latest(physics))
+        if physics.divergence is not None:
+            self.terms = dict.fromkeys(self.terms, np.float64(0.0))
+        reward = terms.total(self.terms, weights)
+        if self.visualize_reward:
+            physics.shown_reward = reward / (terms.greatest(weights) or 1.0)
+        return reward
+
+    def get_observation(self, physics):
+        """Return the observation's blocks by name, views of one vector; or that vector, as `observations`."""
+        readings = self._begin(physics) if self._starting else self._latest(physics)
+        vector = self.definition.vector(self.definition.observe(self.memory, readings))
+        return collections.OrderedDict({_FLAT: vector}) if self._flat else self.definition.split(vector)
+
+    def get_termination(self, physics):
+        """Return 0 where the task is failed or the physics has diverged, 1 where it cuts the episode off, else None."""
+        if physics.divergence is not None:
+            return 0.0
+        terminated, truncated = self.definition.ended(self.memory, self._latest(physics))
+        self._readings = None  # nobody asks once more before the simulation moves, but for users who have moved it
+        return 0.0 if terminated else 1.0 if truncated else None
+
+    def _latest(self, physics):
+        """The readings of the latest step."""
+        return self._readings or self.definition.read(physics.data.ptr)
+
+    def _begin(self, physics):
+        """The readings of the start, of which the memory takes down what the first step needs."""
+        self._starting, data = False, physics.data.ptr
+        readings = self.definition.read(data)
+        lifted = self.definition.lift(self.memory, readings)
+        if lifted is not None:
+            data.qpos[:] = lifted
+            physics.after_reset()
+            readings = self.definition.read(data)
+        self.memory, self._readings = self.definition.begin(self.memory, readings), None
+        return readings

@@ -1,0 +1,92 @@
+"""Tasks made ready to run: a body, an arena and their compiled model, for whatever drives them."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from arc_suite import checks, registry
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.simulation.model import compiled
+from arc_suite.tasks.contract import STEPS, Scene, Task
+from arc_suite.tasks.readings import layout
+
+
+def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> tuple[Task, mujoco.MjModel]:
+    """Return a task, and the model of its simulation.
+
+    Args:
+        domain_name: a body; see `registry.body_of`.
+        task_name: see `registry.task_of`.
+        task_kwargs: settings of the task, and for every task `time_limit` (s, may be infinite; 1000
+            control steps by default) and `arena` (a name, or an `Arena`).
+
+    Raises:
+        ValueError: an unknown name, or a value that does not fit; one line that names it.
+        OSError: a file that cannot be read.
+    """
+    body, kind = registry.body_of(domain_name), registry.task_of(task_name)
+    settings = dict(checks.mapping("task_kwargs", task_kwargs))
+    time_limit, arena = settings.pop("time_limit", None), settings.pop("arena", None)
+    settings = kind.fitted(body, settings)
+    arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
+    model = compiled(body, arena)
+    step = SUBSTEPS * model.opt.timestep
+    scene = Scene(
+        body=body,
+        arena=arena,
+        layout=layout(model, body.joint_names, body.part_names, body.foot_names),
+        standing=model.qpos0.copy(),
+        control_timestep=step,
+    )
+    return kind(scene, settings, _step_limit(time_limit, step)), model
+
+
+def _step_limit(time_limit, step: float) -> float:
+    """Control steps that fill a time limit, s; a step that rounding alone would add is not taken."""
+    if time_limit is None:
+        return STEPS
+    if time_limit == math.inf:
+        return math.inf
+    return max(1, math.ceil(checks.number("time_limit", time_limit, 1e-9) / step - 1e-6))
+
+
+def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the action as float64, clipped to [-1, 1].
+
+    Args:
+        action: of the shape.
+        shape: (..., motors)
+
+    Raises:
+        ValueError: another shape, not numbers, or NaN; one line that names the index.
+    """
+    try:
+        array = np.asarray(action, dtype=float)
+    except (TypeError, ValueError):
+        numbers = " x ".join(map(str, shape))
+        raise ValueError(f"action: expected {numbers} numbers, got {type(action).__name__}") from None
+    if array.shape != shape:
+        raise ValueError(f"action: expected shape {shape}, got {array.shape}")
+    invalid = np.isnan(array)
+    if np.count_nonzero(invalid):
+        index = np.argwhere(invalid)[0]
+        raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
+    return array.clip(-1.0, 1.0)
+
+
+def checked_command(task: Task, name: str, value, rows: tuple[int, ...] = ()) -> np.ndarray:
+    """Return the value of a live command as floats, (*rows, size); None stands for what the task itself would do.
+
+    Raises:
+        ValueError: the task has no such command, or the value has another size; one line.
+    """
+    if not task.commands:
+        raise ValueError(f"command {name!r}: task {task.name} has no commands")
+    size = task.commands[checks.name(name, task.commands, "command")]
+    numbers = np.full(size, np.nan) if value is None else np.asarray(value, dtype=float)
+    if numbers.shape not in ((size,), (*rows, size)) or np.isinf(numbers).any():
+        raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
+    return np.broadcast_to(numbers, (*rows, size)).copy()

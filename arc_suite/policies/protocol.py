@@ -1,0 +1,152 @@
+"""The protocol of acting, made for rows: who acts in the rows of a batch, or in one environment as a batch of one."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Protocol
+
+import dm_env
+import numpy as np
+
+from arc_suite.envs.scene import checked_action
+
+
+class Policy(Protocol):
+    """Who acts in the rows of a batch, each row an episode of its own.
+
+    What it does in an episode depends on nothing but the episode's seed, observations and rewards.
+    """
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some rows, given by their indices."""
+
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
+        """Return the actions of a control step.
+
+        Args:
+            observation: blocks by name, each (rows, size).
+            rewards: (rows,) of the step before; of a first step there is none, and it counts for nothing.
+
+        Returns:
+            (rows, joints), to be clipped to [-1, 1].
+        """
+
+
+class Script:
+    """Actions that do not depend on what happens."""
+
+    def __init__(self, script: Callable[[int], Iterable[np.ndarray]], rows: int, joints: int):
+        """Take a function of a seed that gives the actions (joints,) of its episode; past their end, 0."""
+        self._script = script
+        self._scripts: list[Iterator] = [iter(())] * rows
+        self._zero = np.zeros(joints)
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some rows."""
+        for row, seed in zip(rows, seeds, strict=True):
+            self._scripts[row] = iter(self._script(seed))
+
+    def act(self, observation, rewards) -> np.ndarray:
+        """Return the next actions."""
+        return np.stack([next(script, self._zero) for script in self._scripts])
+
+
+class Sum:
+    """The sum of what two policies do."""
+
+    def __init__(self, first: Policy, second: Policy):
+        """Take the policies."""
+        self._policies = first, second
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some rows."""
+        for policy in self._policies:
+            policy.begin(rows, seeds)
+
+    def act(self, observation, rewards) -> np.ndarray:
+        """Return the sum of the actions."""
+        return sum(policy.act(observation, rewards) for policy in self._policies)
+
+
+class Mixture:
+    """Policies that take turns from seed to seed."""
+
+    def __init__(self, policies: Sequence[Policy], rows: int):
+        """Take the policies; the episode of seed s is that of the one at s modulo their number."""
+        self._policies = policies
+        self._chosen = np.zeros(rows, int)
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some rows."""
+        self._chosen[rows] = np.asarray(seeds) % len(self._policies)
+        for policy in self._policies:
+            policy.begin(rows, seeds)
+
+    def act(self, observation, rewards) -> np.ndarray:
+        """Return the actions."""
+        actions = np.stack([policy.act(observation, rewards) for policy in self._policies])
+        return actions[self._chosen, np.arange(len(self._chosen))]
+
+
+class Individuals:
+    """Plain functions of a dm_env `TimeStep`, one made anew for every episode.
+
+    A function gets what it would get in the environment of `arc_suite.load`: named blocks, in the
+    precision in which they come.
+    """
+
+    def __init__(self, make: Callable[[], Callable], rows: int, joints: int, name: str = "policy"):
+        """Take what makes a function of a `TimeStep`.
+
+        Args:
+            make: takes nothing.
+            rows: of the batch.
+            joints: of an action.
+            name: with which an error begins.
+        """
+        self._make, self._name, self._joints = make, name, joints
+        self._functions, self._seeds, self._clock = [None] * rows, [0] * rows, [0] * rows
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some rows."""
+        for row, seed in zip(rows, seeds, strict=True):
+            self._functions[row], self._seeds[row], self._clock[row] = self._make(), seed, 0
+
+    def act(self, observation, rewards) -> np.ndarray:
+        """Return the actions.
+
+        Raises:
+            ValueError: one of another shape, not of numbers, or with NaN; one line that tells the
+                episode and the step.
+        """
+        actions = np.zeros((len(self._functions), self._joints))
+        for row, function in enumerate(self._functions):
+            if function is None:
+                continue
+            blocks = {name: block[row].astype(float) for name, block in observation.items()}
+            first = self._clock[row] == 0
+            timestep = dm_env.restart(blocks) if first else dm_env.transition(float(rewards[row]), blocks)
+            try:
+                actions[row] = checked_action(function(timestep), (self._joints,))
+            except ValueError as error:
+                where = f"episode of seed {self._seeds[row]}, step {self._clock[row]}"
+                raise ValueError(f"{self._name}: {where}: {error}") from None
+            self._clock[row] += 1
+        return actions
+
+
+def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarray]:
+    """Return a policy for one environment: a function of a `TimeStep` with named blocks, to an action (joints,).
+
+    The first `TimeStep` of an episode begins it.
+
+    Args:
+        policy: made for one row.
+        seed: of its episodes.
+    """
+
+    def act(timestep: dm_env.TimeStep) -> np.ndarray:
+        if timestep.first():
+            policy.begin([0], [seed])
+        blocks = {name: block[None] for name, block in timestep.observation.items()}
+        return policy.act(blocks, np.array([timestep.reward or 0.0]))[0]
+
+    return act

@@ -1,0 +1,35 @@
+"""Quaternions (..., 4), w first, as functions of arrays of NumPy or JAX with any leading axes."""
+
+
+def upright(quaternion):
+    """Return the cosine (...) of the angle between a body's up axis and the vertical."""
+    x, y = quaternion[..., 1], quaternion[..., 2]
+    return 1.0 - 2.0 * (x * x + y * y)
+
+
+def yaw(quaternion):
+    """Return the angle (...) of a body's forward axis to world x, seen from above, rad in [-pi, pi]."""
+    w, x, y, z = (quaternion[..., i] for i in range(4))
+    numpy = quaternion.__array_namespace__()
+    return numpy.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def turned(quaternion, angle):
+    """Return orientations (..., 4) turned by an angle (...) about world z, rad."""
+    numpy = quaternion.__array_namespace__()
+    cosine, sine = numpy.cos(0.5 * angle), numpy.sin(0.5 * angle)
+    w, x, y, z = (quaternion[..., i] for i in range(4))
+    parts = (cosine * w - sine * z, cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w)
+    return numpy.stack(parts, axis=-1)
+
+
+def matrix(quaternion):
+    """Return rotation matrices (..., 3, 3) from a body's frame to the world."""
+    w, x, y, z = (quaternion[..., i] for i in range(4))
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    numpy = quaternion.__array_namespace__()
+    return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)

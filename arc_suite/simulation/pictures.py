@@ -1,0 +1,116 @@
+"""Pictures of a body in an arena: the decorated model, posed as a simulation stands."""
+
+import functools
+
+import mujoco
+import numpy as np
+from dm_control import mujoco as dm_mujoco
+
+from arc_suite import checks, models
+from arc_suite.arenas import FLAT, Arena
+from arc_suite.models import looks
+from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
+from arc_suite.robots.spec import Body
+from arc_suite.simulation import opengl
+
+
+class Decorated(dm_mujoco.Physics):
+    """A body with its looks in an arena; it takes poses, and nothing steps it."""
+
+    @classmethod
+    def from_body(cls, body: Body, arena: Arena = FLAT) -> "Decorated":
+        """Compile the decorated body in an arena."""
+        decorated = cls.from_xml_string(models.assemble(body, arena, decorated=True).to_xml_string())
+        decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
+        buffer = decorated.model.vis.global_
+        buffer.offwidth = buffer.offheight = 1  # it grows with the pictures that are asked for
+        return decorated
+
+    def pose(self, qpos: np.ndarray, share: float | None = None, mocap_pos: np.ndarray | None = None) -> None:
+        """Take a pose, and show a reward.
+
+        Args:
+            qpos: (nq,) positions of the simulation to look at.
+            share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None
+                leaves it its own colour.
+            mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
+        """
+        model, data = self.model.ptr, self.data.ptr
+        data.qpos[:] = qpos
+        if mocap_pos is not None:
+            data.mocap_pos[:] = mocap_pos
+        for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
+            update(model, data)
+        model.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
+
+    def render(self, height, width, camera_id, **kwargs):
+        """Draw the pose; arguments as in dm_control."""
+        buffer = self.model.vis.global_
+        buffer.offheight, buffer.offwidth = max(height, buffer.offheight), max(width, buffer.offwidth)
+        return super().render(height, width, camera_id, **kwargs)
+
+    @property
+    def contexts(self):
+        """The OpenGL contexts that draw all pictures of this process."""
+        return opengl.contexts(self.model)
+
+
+# Drawn from by whoever asks for a picture of the same body; used in OpenGL's thread alone.
+_shared = functools.lru_cache(maxsize=8)(Decorated.from_body)
+
+
+def picture(
+    body: Body,
+    arena: Arena,
+    qpos: np.ndarray,
+    height: int,
+    width: int,
+    camera_id: int | str,
+    share: float | None = None,
+    mocap_pos: np.ndarray | None = None,
+    **kwargs,
+) -> np.ndarray:
+    """Draw the decorated body in a pose.
+
+    Args:
+        body: the spec.
+        arena: where it stands.
+        qpos: (nq,) its positions.
+        height: pixels.
+        width: pixels.
+        camera_id: a camera's name or index, -1 for a free one.
+        share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None for none.
+        mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
+        **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
+
+    Returns:
+        (height, width, 3) uint8; with `depth`, (height, width) float32, m.
+
+    Raises:
+        ValueError: no such camera, or an impossible size; one line.
+        RenderingUnavailable: no OpenGL here.
+    """
+    for name, size, limit in (("height", height, MAX_HEIGHT), ("width", width, MAX_WIDTH)):
+        if size not in range(1, limit + 1):
+            raise ValueError(f"{name}: expected an integer from 1 to {limit}, got {size!r}")
+
+    def draw():
+        decorated = _shared(body, arena)
+        check_camera(decorated.model.ptr, camera_id)
+        decorated.pose(qpos, share, mocap_pos)
+        return decorated.render(height, width, camera_id, **kwargs)
+
+    return opengl.call(draw)
+
+
+def check_camera(model: mujoco.MjModel, camera_id: int | str) -> None:
+    """Check that a model has a camera: a name, an index, or -1 for the free one.
+
+    Raises:
+        ValueError: it has not; one line that names the nearest.
+    """
+    cameras = [model.camera(index).name for index in range(model.ncam)]
+    if isinstance(camera_id, str):
+        checks.name(camera_id, cameras, "camera")
+    elif camera_id not in range(-1, len(cameras)):
+        raise ValueError(f"no camera {camera_id}: expected -1 (free) to {len(cameras) - 1}, or one of {cameras}")

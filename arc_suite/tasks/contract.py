@@ -1,0 +1,253 @@
+"""The contract of a task: frozen values and pure functions of arrays, which every driver can run.
+
+A task says how an episode starts, what is remembered of it, what a policy observes, what a step
+earns and when it ends. It holds no state and touches no simulation: memory is a value that comes in
+and goes out, and what is to be written is returned. Arrays may carry any leading axes `...`: none
+for one environment, one for the rows of a batch. Where a function is needed it comes from the
+array's own namespace, so that the same text runs under NumPy and JAX.
+
+An episode, as a driver runs it, for one environment or with a leading axis for all rows:
+
+    start = task.start(random, carry)            # all randomness of the episode
+    ... the driver resets the simulation to start.qpos and start.qvel ...
+    readings = task.read(data)
+    qpos = task.lift(start.memory, readings)     # if not None: written, and read again
+    memory = task.begin(start.memory, readings)
+    while not ended:
+        memory, inputs = task.before(memory, action)
+        ... the driver writes the inputs and runs the simulation for a control step ...
+        readings = task.read(data)
+        memory = task.after(memory, readings)
+        terms, blocks = task.terms(memory, readings), task.observe(memory, readings)
+        terminated, truncated = task.ended(memory, readings)
+    carry = task.carry(memory)
+"""
+
+import collections
+import dataclasses
+import functools
+import itertools
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from arc_suite.arenas import FLAT, Arena
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import readings as reading
+from arc_suite.tasks.clock import Clock
+from arc_suite.tasks.readings import Layout, Readings
+from arc_suite.tasks.terms import Parameters
+
+STEPS = 1000  # control steps of an episode
+
+_CLEAR = 0.01  # of the standing height, by which a lift brings feet clear of the ground
+
+
+class Scene(NamedTuple):
+    """What a task is made for.
+
+    Attributes:
+        body: what moves.
+        arena: where.
+        layout: of the body in the simulation's arrays.
+        standing: (nq,) the pose in which it stands: torso position and quaternion, joint angles.
+        control_timestep: s between two actions.
+    """
+
+    body: Body
+    arena: Arena
+    layout: Layout
+    standing: np.ndarray
+    control_timestep: float
+
+
+class Start(NamedTuple):
+    """How one episode starts; no leading axes.
+
+    Attributes:
+        qpos: (nq,) positions.
+        qvel: (nv,) velocities.
+        memory: a NamedTuple of numbers and arrays, replaced from step to step and never written in place.
+        mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
+    """
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+    memory: Any
+    mocap_pos: np.ndarray | None = None
+
+
+class Inputs(NamedTuple):
+    """What a control step writes into the simulation.
+
+    Attributes:
+        ctrl: (..., motors) in [-1, 1].
+        kick: (..., nv) added to qvel before the first substep; None for no kick.
+    """
+
+    ctrl: np.ndarray
+    kick: np.ndarray | None = None
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Task(ABC):
+    """What a body is asked to do: a frozen value, checked when it is made.
+
+    Attributes:
+        scene: what it is made for.
+        settings: its numbers, with a field `weights`: the signed weight of every term by name.
+        step_limit: control steps of an episode, may be infinite.
+        name: by which `arc_suite.load` and ids know the task.
+        version: raised with any change of dynamics, reward or observation.
+        reads: fields of the simulation that `read` takes.
+        commands: what may be set from outside while an episode runs, such as by a player's stick:
+            size by name of a field of the memory; NaN stands for what the task itself would do.
+    """
+
+    scene: Scene
+    settings: Any
+    step_limit: float = STEPS
+
+    name: ClassVar[str]
+    version: ClassVar[int] = 0
+    reads: ClassVar[tuple[str, ...]] = reading.FIELDS
+    commands: ClassVar[Mapping[str, int]] = {}
+
+    @classmethod
+    @abstractmethod
+    def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Any:
+        """Return the settings for a body, some of them overridden.
+
+        Raises:
+            ValueError: an unknown name, or a value that does not fit; one line that names it.
+        """
+
+    @classmethod
+    def arena(cls, body: Body, settings) -> Arena:
+        """Return where the task takes place unless the caller chooses another arena."""
+        return FLAT
+
+    @property
+    @abstractmethod
+    def blocks(self) -> Mapping[str, int]:
+        """The size of every block of the observation by name, in the order of the vector."""
+
+    @property
+    def clock(self) -> Clock | None:
+        """The clock of the prescribed gait, at whose `tick` the memory's field of that name stands; None for none."""
+        return None
+
+    @property
+    def parameters(self) -> Parameters | None:
+        """What the task prescribes of a walk: its gait and its standing pose; None where it prescribes none."""
+        return None
+
+    @property
+    def target_velocity(self) -> float | None:
+        """The velocity along world x that is asked for all the time, m/s; None where it changes or is not."""
+        return None
+
+    def first(self) -> Any:
+        """Return the carry with which a new stream of episodes begins."""
+        return None
+
+    @abstractmethod
+    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+        """Draw how an episode starts, and everything else that is random in it.
+
+        The number of draws is fixed and does not depend on what is drawn, so that an episode is a
+        function of its seed, the carry and its actions.
+
+        Args:
+            random: what to draw from.
+            carry: of the episode before, or `first()`.
+        """
+
+    def read(self, data) -> Readings:
+        """Take the readings of `MjData`, or of anything with its fields under leading axes."""
+        return reading.read(data, self.scene.layout, self.scene.arena)
+
+    def lift(self, memory, readings: Readings) -> np.ndarray | None:
+        """Return the positions (..., nq) that bring every foot clear of the ground at the start of an episode.
+
+        None on level ground, which pushes out what starts in it; any other ground holds it fast.
+        """
+        if self.scene.arena.is_level:
+            return None
+        radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
+        clear = radii + _CLEAR * self.scene.body.torso.standing_height
+        numpy = readings.foot_heights.__array_namespace__()
+        rise = (clear - readings.foot_heights).max(axis=-1).clip(0.0)
+        x, y, z = (readings.torso_position[..., i] for i in range(3))
+        position = numpy.stack([x, y, z + rise], axis=-1)
+        return numpy.concatenate([position, readings.torso_quaternion, readings.joint_angles], axis=-1)
+
+    @abstractmethod
+    def begin(self, memory, readings: Readings) -> Any:
+        """Return the memory from which the first step starts, given the readings after the reset."""
+
+    @abstractmethod
+    def before(self, memory, action) -> tuple[Any, Inputs]:
+        """Return the memory and what to write before a control step, given the action (..., joints)."""
+
+    @abstractmethod
+    def after(self, memory, readings: Readings) -> Any:
+        """Return the memory after a control step."""
+
+    @abstractmethod
+    def terms(self, memory, readings: Readings) -> dict:
+        """Return the reward's unweighted terms by name, each (...)."""
+
+    @abstractmethod
+    def observe(self, memory, readings: Readings) -> dict:
+        """Return the observation's blocks by name, each (..., size), in the order of `blocks`."""
+
+    @abstractmethod
+    def ended(self, memory, readings: Readings) -> tuple:
+        """Return whether the episode is terminated and whether it is truncated, (...) booleans each."""
+
+    def progress(self, memory) -> dict:
+        """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""
+        return {}
+
+    def carry(self, memory) -> Any:
+        """Return what the next episode of the stream starts from, given the memory at an episode's end."""
+        return None
+
+    @functools.cached_property
+    def size(self) -> int:
+        """Of the observation as a vector."""
+        return sum(self.blocks.values())
+
+    def vector(self, blocks: Mapping[str, np.ndarray], dtype=None) -> np.ndarray:
+        """Return observed blocks as one vector (..., size), in new memory.
+
+        Raises:
+            ValueError: they are not those that the task declares; one line.
+        """
+        if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
+            observed = {name: block.shape[-1] for name, block in blocks.items()}
+            raise ValueError(f"observation of {self.name}: expected blocks {dict(self.blocks)}, got {observed}")
+        return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
+
+    def split(self, vector: np.ndarray) -> collections.OrderedDict:
+        """Return an observation vector (..., size) as named blocks, views of it.
+
+        Raises:
+            ValueError: a vector of another size; one line.
+        """
+        if vector.shape[-1:] != (self.size,):
+            raise ValueError(f"observation: expected {self.size} numbers, got shape {vector.shape}")
+        return collections.OrderedDict((name, vector[..., part]) for name, part in self._parts.items())
+
+    @functools.cached_property
+    def _declared(self) -> list[tuple[str, int]]:
+        return list(self.blocks.items())
+
+    @functools.cached_property
+    def _parts(self) -> dict[str, slice]:
+        """Where each block lies in the vector."""
+        ends = itertools.accumulate(self.blocks.values())
+        return {name: slice(end - size, end) for (name, size), end in zip(self.blocks.items(), ends, strict=True)}

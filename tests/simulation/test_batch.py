@@ -1,0 +1,112 @@
+"""Rows of a batch: what one simulation does, to the bit, and what only rows can."""
+
+import mujoco
+import numpy as np
+import pytest
+from fixtures.obstacles import Obstacle
+from numpy.testing import assert_array_equal
+
+from arc_suite.arenas import ARENAS
+from arc_suite.robots import ROBOTS
+from arc_suite.simulation.batch import Batch
+from arc_suite.simulation.model import compiled
+from arc_suite.simulation.physics import Physics
+
+ROWS = 3
+ALL = np.ones(ROWS, bool)
+SOME = np.array([True, False, True])
+
+
+def starts(model, seed=0):
+    """Positions and velocities of rows that are about to fall."""
+    random = np.random.RandomState(seed)
+    qpos = np.tile(model.qpos0, (ROWS, 1))
+    qpos[:, 7:] += random.uniform(-0.2, 0.2, (ROWS, model.nq - 7))
+    return qpos, random.uniform(-0.5, 0.5, (ROWS, model.nv))
+
+
+def begin(physics, qpos, qvel):
+    with physics.reset_context():
+        physics.data.qpos[:], physics.data.qvel[:] = qpos, qvel
+
+
+def assert_same(batch, row, physics):
+    for name, array in vars(batch.data).items():
+        assert array[row].tobytes() == getattr(physics.data.ptr, name).tobytes(), name
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("arena", ARENAS)
+def test_rows_are_simulations(arena, threads):
+    body = ROBOTS["leaper"]
+    arena = ARENAS[arena](body)
+    singles = [Physics.from_body(body, arena) for _ in range(ROWS)]
+    batch = Batch(compiled(body, arena), ROWS, threads)
+    states = starts(compiled(body, arena))
+    batch.reset(ALL, *states)
+    for physics, *state in zip(singles, *states, strict=True):
+        begin(physics, *state)
+    for action in np.random.RandomState(1).uniform(-1.0, 1.0, (20, ROWS, batch.data.ctrl.shape[1])):
+        batch.data.ctrl[...] = action
+        assert not batch.step(25, ALL).any()
+        for row, physics in enumerate(singles):
+            physics.set_control(action[row])
+            physics.step(25)
+            assert_same(batch, row, physics)
+
+
+def test_data_has_the_fields_asked_for_and_those_that_are_written():
+    model = compiled(ROBOTS["tick"])
+    batch = Batch(model, ROWS, fields=("site_xpos", "qvel"))
+    assert set(vars(batch.data)) == {"qpos", "qvel", "ctrl", "site_xpos"}
+    batch.reset(ALL, *starts(model))
+    assert batch.data.site_xpos.any()
+    assert set(vars(batch.part(SOME))) == set(vars(batch.data))
+    assert_array_equal(batch.part(SOME).site_xpos, batch.data.site_xpos[[0, 2]])
+
+
+def test_rows_are_placed_elsewhere_and_the_others_stay():
+    body = ROBOTS["tick"]
+    model = compiled(body)
+    batch, (qpos, qvel) = Batch(model, ROWS, 2), starts(model)
+    batch.reset(ALL, qpos, qvel)
+    before = {name: array.copy() for name, array in vars(batch.data).items()}
+    qpos[:, 2] += 0.3
+    batch.place(SOME, qpos[SOME])
+    for name, array in vars(batch.data).items():
+        assert_array_equal(array[1], before[name][1])
+    for row in (0, 2):
+        physics = Physics.from_body(body)
+        begin(physics, before["qpos"][row], qvel[row])
+        physics.data.qpos[:] = qpos[row]
+        physics.forward()
+        assert_same(batch, row, physics)
+        assert not np.array_equal(batch.data.xpos[row], before["xpos"][row])
+
+
+def test_obstacles_stand_where_a_reset_puts_them():
+    body = ROBOTS["tick"]
+    model = compiled(body, Obstacle())
+    batch = Batch(model, ROWS, 2)
+    post = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "post")
+    batch.reset(ALL, *starts(model))
+    assert_array_equal(batch.data.xpos[:, post], [(5.0, 0.0, 0.5)] * ROWS)
+    places = np.array([[(1.0, 2.0, 0.5)], [(3.0, 4.0, 0.5)]])
+    batch.reset(SOME, *(state[SOME] for state in starts(model)), mocap_pos=places)
+    assert_array_equal(batch.data.xpos[:, post], [(1.0, 2.0, 0.5), (5.0, 0.0, 0.5), (3.0, 4.0, 0.5)])
+    batch.step(25, ALL)
+    assert_array_equal(batch.data.xpos[:, post], [(1.0, 2.0, 0.5), (5.0, 0.0, 0.5), (3.0, 4.0, 0.5)])
+    batch.reset(ALL, *starts(model))
+    assert_array_equal(batch.data.xpos[:, post], [(5.0, 0.0, 0.5)] * ROWS)
+
+
+def test_sensors_are_back_after_an_exception():
+    model = compiled(ROBOTS["tick"])
+    batch, twin = Batch(model, ROWS, 1), Batch(model, ROWS, 1)
+    with pytest.raises(ValueError):
+        batch.step(25, np.ones(ROWS + 1, bool))
+    for rows in (batch, twin):
+        rows.reset(ALL, *starts(model))
+        rows._simulations.step(ALL, 100)  # until feet touch
+    assert_array_equal(batch.data.cfrc_ext, twin.data.cfrc_ext)
+    assert batch.data.cfrc_ext.any()

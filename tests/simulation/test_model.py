@@ -1,0 +1,178 @@
+"""The simulated model does what the written one does, to the bit, with other contacts and another integrator."""
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import arc_suite
+from arc_suite import models
+from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.arenas.flat import Flat
+from arc_suite.cpg import Demonstrator
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.generator import random_body
+from arc_suite.simulation.model import compiled, euler_suffices, list_contacts
+
+BODIES = ROBOTS | {f"random {seed}": random_body(seed) for seed in range(4)}
+EULER, IMPLICITFAST = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+STATE = ("time", "qpos", "qvel", "qacc_warmstart", "cfrc_ext", "xpos", "sensordata")
+CONTACT = ("geom", "pos", "frame", "dist", "includemargin", "dim", "friction", "solref", "solimp")
+
+
+def written(body, arena=FLAT):
+    return mujoco.MjModel.from_xml_string(models.assemble(body, arena).to_xml_string())
+
+
+def walk(body):
+    """Start and actions of a demonstrator's walk."""
+    environment, demonstrator = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body)
+    timestep, start, actions = environment.reset(), environment.physics.get_state(), []
+    for _ in range(40):
+        actions.append(demonstrator(timestep))
+        timestep = environment.step(actions[-1])
+    return start, actions
+
+
+def fall(body):
+    """Start, in the air and turned anyhow, and actions at random."""
+    model, random = written(body), np.random.RandomState(1)
+    qpos = model.qpos0.copy()
+    qpos[2] *= 1.5
+    qpos[3:7] = random.standard_normal(4)
+    qpos[3:7] /= np.linalg.norm(qpos[3:7])
+    return np.concatenate([qpos, np.zeros(model.nv)]), random.uniform(-1.0, 1.0, (40, model.nu))
+
+
+@pytest.mark.parametrize("course", [walk, fall])
+@pytest.mark.parametrize("arena", ARENAS)
+@pytest.mark.parametrize("body", BODIES)
+def test_same_bits_as_the_written_model(body, arena, course):
+    start, actions = course(BODIES[body])
+    arena = ARENAS[arena](BODIES[body])
+    plain, fast = written(BODIES[body], arena), compiled(BODIES[body], arena)
+    assert (plain.npair, plain.opt.integrator) == (0, IMPLICITFAST)
+    assert fast.npair > 0
+    assert (fast.opt.integrator, fast.geom_contype.any(), fast.geom_conaffinity.any()) == (EULER, False, False)
+    runs = [(model, mujoco.MjData(model)) for model in (plain, fast)]
+    for model, data in runs:
+        data.qpos[:], data.qvel[:] = np.split(start, [model.nq])
+    contacts = 0
+    for action in actions:
+        for model, data in runs:
+            data.ctrl[:] = action.clip(-1.0, 1.0)
+            mujoco.mj_step(model, data, 25)
+        (_, one), (_, other) = runs
+        contacts += one.ncon
+        assert one.ncon == other.ncon
+        for names, first, second in ((STATE, one, other), (CONTACT, one.contact, other.contact)):
+            for name in names:
+                assert np.array(getattr(first, name)).tobytes() == np.array(getattr(second, name)).tobytes(), name
+    assert contacts > 0
+
+
+def test_contacts_are_mixed_as_mujoco_mixes_them():
+    random, geoms = np.random.RandomState(0), []
+    for index in range(40):
+        place = 'type="plane" size="9 9 1"' if index < 2 else 'size="0.1"'
+        solref = random.choice(["0.02 1", "0.05 0.7", "-900 -20"])
+        friction = " ".join(map(str, random.uniform(0.1, 1.0, 3)))
+        geoms.append(
+            f'<geom name="g{index}" {place} contype="{int(index > 1)}" conaffinity="{int(index < 2)}" '
+            f'priority="{random.choice([0, 0, 1])}" solmix="{random.choice([0.5, 1.0, 2.0])}" '
+            f'condim="{random.choice([1, 3, 4, 6])}" friction="{friction}" solref="{solref}" '
+            f'solimp="0.9 {random.uniform(0.91, 0.99)} 0.001" '
+            f'margin="{random.uniform(0.0, 0.01)}" gap="{random.uniform(0.0, 0.001)}"/>'
+        )
+    bodies = [f'<body pos="{index} 0 0.099"><freejoint/>{geom}</body>' for index, geom in enumerate(geoms[2:])]
+    spec = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{''.join(geoms[:2] + bodies)}</worldbody></mujoco>")
+    plain = spec.compile()
+    list_contacts(spec, plain)
+    paired = spec.compile()
+    assert paired.npair == 2 * 38
+    found = []
+    for model in (plain, paired):
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        found.append(data.contact)
+    assert len(found[0].geom) == 2 * 38
+    for name in CONTACT:
+        assert_array_equal(getattr(found[1], name), getattr(found[0], name), err_msg=name)
+
+
+@dataclasses.dataclass(frozen=True)
+class Crowded(Flat):
+    @property
+    def lists_contacts(self):
+        return False
+
+
+def test_an_arena_may_keep_masks():
+    model, plain = compiled(ROBOTS["tick"], Crowded()), written(ROBOTS["tick"])
+    assert model.npair == 0
+    assert_array_equal(model.geom_contype, plain.geom_contype)
+    assert_array_equal(model.geom_conaffinity, plain.geom_conaffinity)
+
+
+def test_models_are_the_callers_own():
+    one = compiled(ROBOTS["tick"])
+    one.pair_friction[:] = 0.0
+    assert compiled(ROBOTS["tick"]).pair_friction.all()
+
+
+def final_state(model, integrator):
+    """Of a short fall with strong actions."""
+    model.opt.integrator = integrator
+    data = mujoco.MjData(model)
+    for action in np.random.RandomState(0).uniform(-1.0, 1.0, (5, model.nu)):
+        data.ctrl[:] = action
+        mujoco.mj_step(model, data, 25)
+    return data.qvel.tobytes()
+
+
+def undamped(model):
+    model.dof_damping[:] = 0.0
+
+
+def in_water(model):
+    model.opt.density = 1000.0
+
+
+def in_syrup(model):
+    model.opt.viscosity = 1.0
+
+
+def without_damping_in_euler(model):
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
+
+
+def servos(model):
+    model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
+    model.actuator_biasprm[:, 2] = -5.0
+
+
+def motors_that_weaken(model):
+    model.actuator_gaintype[:] = mujoco.mjtGain.mjGAIN_AFFINE
+    model.actuator_gainprm[:, 2] = -0.1
+
+
+@pytest.mark.parametrize("change", [undamped, in_water, in_syrup, without_damping_in_euler, servos, motors_that_weaken])
+def test_where_euler_is_another_integrator_it_is_not_taken(change):
+    model = written(ROBOTS["queen"])
+    assert euler_suffices(model)
+    assert final_state(model, EULER) == final_state(model, IMPLICITFAST)
+    change(model)
+    assert not euler_suffices(model)
+    assert final_state(model, EULER) != final_state(model, IMPLICITFAST)
+
+
+def test_a_body_without_damping_keeps_its_integrator():
+    body = ROBOTS["tick"]
+    legs = tuple(
+        leg.replace(links=tuple(k.replace(joint=k.joint and k.joint.replace(damping=0.0)) for k in leg.links))
+        for leg in body.legs
+    )
+    assert compiled(body).opt.integrator == EULER
+    assert compiled(body.replace(name="loose", legs=legs)).opt.integrator == IMPLICITFAST

@@ -1,0 +1,53 @@
+"""One simulation: its arena, its copies, and what an interrupted step leaves."""
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from arc_suite.arenas import FLAT
+from arc_suite.arenas.bumps import fitted
+from arc_suite.robots import ROBOTS
+from arc_suite.simulation.physics import Physics
+
+BODY = ROBOTS["tick"]
+
+
+def copied(physics):
+    return physics.copy()
+
+
+def pickled(physics):
+    return pickle.loads(pickle.dumps(physics))
+
+
+@pytest.mark.parametrize("twin_of", [copied, copy.deepcopy, pickled])
+def test_copies_go_on_in_the_same_arena(twin_of):
+    physics = Physics.from_body(BODY, fitted(BODY))
+    physics.set_control(np.linspace(-1.0, 1.0, physics.model.nu))
+    physics.step(100)
+    twin = twin_of(physics)
+    assert (twin.body, twin.arena) == (BODY, fitted(BODY))
+    assert_array_equal(twin.data.cfrc_ext, physics.data.cfrc_ext)
+    twin.step(25), physics.step(25)
+    for field in ("qpos", "cfrc_ext", "xpos"):
+        assert_array_equal(getattr(twin.data, field), getattr(physics.data, field))
+    assert_array_equal(twin.render(48, 64), physics.render(48, 64))
+
+
+def test_flat_ground_is_the_default():
+    physics = Physics.from_body(BODY)
+    assert physics.arena == FLAT
+    assert physics.model.name2id("floor", "geom") == 0
+    assert physics.model.nhfield == 0
+    assert Physics.from_body(BODY, fitted(BODY)).model.nhfield == 1
+
+
+def test_an_interrupted_step_leaves_sensors_on():
+    physics = Physics.from_body(BODY)
+    flags = physics.model.opt.disableflags
+    with pytest.raises(TypeError):
+        physics.step(2.5)
+    assert physics.model.opt.disableflags == flags

@@ -1,0 +1,61 @@
+"""Pictures of states: drawn without a simulation, and the same as of one."""
+
+import numpy as np
+import pytest
+from fixtures.obstacles import Obstacle
+from numpy.testing import assert_array_equal
+
+from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.robots import ROBOTS
+from arc_suite.simulation.model import compiled
+from arc_suite.simulation.physics import Physics
+from arc_suite.simulation.pictures import check_camera, picture
+
+BODY = ROBOTS["queen"]
+
+
+@pytest.mark.parametrize("share", [None, 0.1])
+@pytest.mark.parametrize("arena", ARENAS)
+def test_a_state_looks_like_the_simulation_in_it(arena, share):
+    arena = ARENAS[arena](BODY)
+    physics = Physics.from_body(BODY, arena)
+    physics.step(50)
+    physics.shown_reward = share
+    qpos = physics.position().copy()
+    for depth in (False, True):
+        drawn = picture(BODY, arena, qpos, 60, 80, "profile", share, depth=depth)
+        assert_array_equal(drawn, physics.render(60, 80, "profile", depth=depth))
+        assert drawn.std() > 0.1
+
+
+def test_the_ground_and_the_reward_are_seen():
+    qpos = compiled(BODY).qpos0
+    views = [picture(BODY, arena(BODY), qpos, 60, 80, "tracking") for arena in ARENAS.values()]
+    views.append(picture(BODY, FLAT, qpos, 60, 80, "tracking", share=0.0))
+    for index, view in enumerate(views[1:], 1):
+        assert not np.array_equal(view, views[index - 1])
+
+
+def test_obstacles_are_seen_where_they_stand():
+    def drawn(*place):
+        return picture(BODY, Obstacle(), qpos, 60, 80, "tracking", mocap_pos=np.array([place]))
+
+    qpos = compiled(BODY, Obstacle()).qpos0
+    near, far = drawn(0.0, 2.0, 0.5), drawn(90.0, 90.0, 0.5)
+    assert not np.array_equal(near, far)
+    assert_array_equal(drawn(0.0, 2.0, 0.5), near)
+    physics = Physics.from_body(BODY, Obstacle())
+    physics.data.mocap_pos[:] = (0.0, 2.0, 0.5)
+    assert_array_equal(physics.render(60, 80), near)
+
+
+def test_cameras_are_checked_on_a_model():
+    model = compiled(BODY)
+    for camera in ("tracking", "portrait", "profile", 0, 2, -1):
+        check_camera(model, camera)
+    with pytest.raises(ValueError, match=r"^unknown camera 'profil'; did you mean 'profile'\? \(there are: "):
+        check_camera(model, "profil")
+    with pytest.raises(ValueError, match=r"^no camera 3: expected -1 \(free\) to 2, or one of "):
+        check_camera(model, 3)
+    with pytest.raises(ValueError, match=r"^no camera 3: "):
+        picture(BODY, FLAT, model.qpos0, 60, 80, 3)

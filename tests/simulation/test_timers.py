@@ -1,0 +1,154 @@
+"""MuJoCo's clock is out while our own steps run, and back after them, whatever happens."""
+
+import concurrent.futures
+import multiprocessing
+import os
+import pathlib
+import subprocess
+import sys
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite.robots import ROBOTS
+from arc_suite.simulation import timers
+from arc_suite.simulation.batch import Batch
+from arc_suite.simulation.model import compiled
+from arc_suite.simulation.physics import Physics
+
+ROOT = pathlib.Path(__file__).parents[2]
+BODY = ROBOTS["tick"]
+STEP = mujoco.mjtTimer.mjTIMER_STEP
+
+
+@pytest.fixture
+def clock():
+    """The C variable, which holds after a test what it held before."""
+    variable = timers._clock_variable()
+    before = variable.value
+    assert before is not None
+    yield variable
+    after, variable.value = variable.value, before
+    assert after == before
+
+
+def seconds_of_steps():
+    """What MuJoCo measures of steps that are not ours: > 0 if there is a clock."""
+    model = compiled(BODY)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 10)
+    return data.timer[STEP].duration
+
+
+def test_our_steps_read_no_clock_and_others_do(clock):
+    physics = Physics.from_body(BODY)
+    physics.step(25)
+    assert physics.data.ptr.timer[STEP].number >= 25
+    assert physics.data.ptr.timer[STEP].duration == 0.0
+    assert seconds_of_steps() > 0.0
+    Batch(compiled(BODY), 2, 2).step(25, np.ones(2, bool))
+    assert seconds_of_steps() > 0.0
+
+
+def test_an_exception_puts_the_clock_back(clock):
+    physics = Physics.from_body(BODY)
+    with pytest.raises(TypeError):
+        physics.step(2.5)
+    assert seconds_of_steps() > 0.0
+    with pytest.raises(ValueError):
+        Batch(compiled(BODY), 2, 2).step(25, np.ones(3, bool))
+    assert seconds_of_steps() > 0.0
+
+
+def test_the_last_of_several_threads_puts_it_back(clock):
+    inside, leave = threading.Barrier(3), [threading.Event(), threading.Event()]
+
+    def stay(event):
+        with timers.off:
+            inside.wait(20)
+            event.wait(20)
+
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        stays = [pool.submit(stay, event) for event in leave]
+        inside.wait(20)
+        for event, thread in zip(leave, stays, strict=True):
+            assert clock.value is None
+            event.set()
+            thread.result()
+    assert clock.value is not None
+
+
+def test_a_clock_of_the_users_own_stays(clock):
+    ticks, physics = iter(range(10**6)), Physics.from_body(BODY)
+    mujoco.set_mjcb_time(lambda: float(next(ticks)))
+    own = clock.value
+    physics.step(25)
+    assert clock.value == own
+    mujoco.set_mjcb_time(None)  # installs that of the bindings again
+    assert physics.data.ptr.timer[STEP].duration >= 25
+
+
+def test_one_installed_meanwhile_stays(clock):
+    with timers.off:
+        mujoco.set_mjcb_time(lambda: 0.0)
+        own = clock.value
+    assert clock.value == own
+    mujoco.set_mjcb_time(None)
+
+
+def test_none_is_put_in_where_there_was_none(clock):
+    before, clock.value = clock.value, None
+    Physics.from_body(BODY).step(25)
+    told, clock.value = clock.value, before
+    assert told is None
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_fork_in_the_midst_of_steps_leaves_none_behind(clock):
+    def in_child(sender):
+        told = [clock.value]
+        with timers.off:
+            told.append(clock.value)
+        sender.send([*told, clock.value])
+
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    child = multiprocessing.get_context("fork").Process(target=in_child, args=(sender,))
+    before = clock.value
+    with timers.off:
+        child.start()
+    assert receiver.poll(20)
+    assert receiver.recv() == [before, None, before]
+    child.join(20)
+    assert child.exitcode == 0
+
+
+SCRIPT = """
+import ctypes, mujoco, pathlib
+variable = None
+if {reachable}:
+    library = next(pathlib.Path(mujoco.__file__).parent.glob("*mujoco.*"))
+    variable = ctypes.c_void_p.in_dll(ctypes.CDLL(str(library)), "mjcb_time")
+else:
+    def refuse(self, name, *args, **kwargs):
+        raise OSError(name)
+    ctypes.CDLL.__init__ = refuse
+before = variable and variable.value
+import arc_suite
+assert (variable and variable.value) == before
+from arc_suite.robots import ROBOTS
+from arc_suite.simulation.physics import Physics
+physics = Physics.from_body(ROBOTS["tick"])
+physics.step(25)
+assert (variable and variable.value) == before
+print(before is not None, physics.data.ptr.timer[int(mujoco.mjtTimer.mjTIMER_STEP)].duration > 0.0)
+"""
+
+
+@pytest.mark.parametrize(("reachable", "told"), [(True, "True False"), (False, "False True")])
+def test_import_changes_nothing_and_without_the_symbol_all_works(reachable, told):
+    environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
+    command = [sys.executable, "-c", SCRIPT.format(reachable=reachable)]
+    done = subprocess.run(command, env=environ, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.strip(), done.stderr) == (0, told, "")
