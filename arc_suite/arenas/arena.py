@@ -39,5 +39,5 @@ class Arena(ABC):
 
     @property
     def lists_contacts(self) -> bool:
-        """Whether listing every pair of geoms that may touch is faster than looking for them: for few geoms of ground."""
+        """Whether a list of all pairs of geoms that may touch is faster than a search: if the ground is few geoms."""
         return True
