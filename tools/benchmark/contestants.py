@@ -1,18 +1,20 @@
 """What is compared: ways to run a control step of one robot's walk."""
 
 import contextlib
+import operator
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium
 import mujoco
 
-from arc_suite import registry
+import arc_suite
+from arc_suite.envs.scene import prepared
+from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import timers
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks.walk import SUBSTEPS
 from benchmark import ordinary
 
 FULL = "mj_step, full model"
@@ -40,6 +42,7 @@ class Contestant(NamedTuple):
         workers: threads or processes that do so.
         reset: starts; returns an observation.
         step: maps an action (rows, motors), or (motors,) where there is one row, to an observation.
+        blocks: maps an observation to its blocks by name, as a demonstrator takes them.
         close: frees everything.
     """
 
@@ -48,6 +51,7 @@ class Contestant(NamedTuple):
     workers: int
     reset: Callable[[], Any]
     step: Callable[[Any], Any]
+    blocks: Callable[[Any], Mapping]
     close: Callable[[], None]
 
 
@@ -60,18 +64,20 @@ def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
     yield _mujoco(LEAN, robot, lean, timers.off)
     yield _mujoco(SILENT, robot, silent, timers.off)
     yield _dm_env(robot)
-    yield _gymnasium(GYM, gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_FOREVER))
-    yield _gymnasium(ORDINARY, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_FOREVER))
+    own = gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_FOREVER)
+    yield _gymnasium(GYM, robot, own)
+    yield _gymnasium(ORDINARY, robot, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_FOREVER))
 
 
-def ordinary_vectors(ordinary_id: str, workers: Sequence[int]) -> Iterator[Contestant]:
+def ordinary_vectors(robot: str, ordinary_id: str, workers: Sequence[int]) -> Iterator[Contestant]:
     """Gymnasium's own vector environments of ordinary ones: as many processes as rows, or none at all."""
     forever = {"terminate_when_unhealthy": False, **_FOREVER}
     for rows in workers:
         envs = gymnasium.make_vec(ordinary_id, rows, vectorization_mode="async", **forever)
-        yield _gymnasium(ASYNC, envs, rows, rows)
+        yield _gymnasium(ASYNC, robot, envs, rows, rows)
     rows = min(workers)
-    yield _gymnasium(SYNC, gymnasium.make_vec(ordinary_id, rows, vectorization_mode="sync", **forever), rows)
+    envs = gymnasium.make_vec(ordinary_id, rows, vectorization_mode="sync", **forever)
+    yield _gymnasium(SYNC, robot, envs, rows)
 
 
 def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator[Contestant]:
@@ -82,7 +88,7 @@ def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator
         envs = gymnasium.make_vec(
             f"arc_suite/{robot}-walk-v0", number, num_threads=few, task_kwargs=_TASK_KWARGS, **_FOREVER
         )
-        yield _gymnasium(VECTOR, envs, number, few)
+        yield _gymnasium(VECTOR, robot, envs, number, few)
 
 
 def reference(rows: Sequence[int]) -> int:
@@ -102,7 +108,7 @@ def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant
     observation = {"posture": data.qpos[2:], "velocities": data.qvel}  # live
 
     def reset():
-        environment = registry.load(robot, "walk", {"random": 0})
+        environment = arc_suite.load(robot, "walk", {"random": 0})
         environment.reset()
         data.qpos[:], data.qvel[:] = environment.physics.position(), environment.physics.velocity()
         return observation
@@ -113,15 +119,22 @@ def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant
             mujoco.mj_step(model, data, SUBSTEPS)
         return observation
 
-    return Contestant(name, 1, 1, reset, step, lambda: None)
+    return Contestant(name, 1, 1, reset, step, lambda observation: observation, lambda: None)
 
 
 def _dm_env(robot: str) -> Contestant:
-    environment = registry.load(robot, "walk", {"random": 0, **_TASK_KWARGS})
-    return Contestant(DM_ENV, 1, 1, environment.reset, environment.step, environment.physics.free)
+    environment = arc_suite.load(robot, "walk", {"random": 0, **_TASK_KWARGS})
+    blocks = operator.attrgetter("observation")
+    return Contestant(DM_ENV, 1, 1, environment.reset, environment.step, blocks, environment.physics.free)
 
 
-def _gymnasium(name: str, env, rows: int = 1, workers: int = 1) -> Contestant:
-    return Contestant(
-        name, rows, workers, lambda: env.reset(seed=0)[0], lambda action: env.step(action)[0], lambda: env.close()
-    )
+def _gymnasium(name: str, robot: str, env, rows: int = 1, workers: int = 1) -> Contestant:
+    task, _ = prepared(robot, "walk")  # the ordinary environment observes the same vector
+
+    def reset():
+        return env.reset(seed=0)[0]
+
+    def step(action):
+        return env.step(action)[0]
+
+    return Contestant(name, rows, workers, reset, step, task.split, env.close)

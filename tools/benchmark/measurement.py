@@ -82,7 +82,7 @@ class _Field:
         # Processes fork before there are any threads.
         self._contestants: list[Contestant] = []
         for group in (
-            contestants.ordinary_vectors(ordinary_id, workers),
+            contestants.ordinary_vectors(robot, ordinary_id, workers),
             contestants.singles(robot, ordinary_id),
             contestants.vectors(robot, rows, threads),
         ):
@@ -116,7 +116,7 @@ class _Field:
         contestant, policy, observation = self._contestants[index], self._policies[index], self._observations[index]
         seconds = 0.0
         for _ in range(steps):
-            action = policy(observation)
+            action = policy.act(contestant.blocks(observation))
             started = time.perf_counter()
             observation = contestant.step(action)
             seconds += time.perf_counter() - started

@@ -5,7 +5,8 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.mujoco import MujocoEnv
 
-from arc_suite import models, registry
+import arc_suite
+from arc_suite import models
 from arc_suite.robots import ROBOTS
 
 
@@ -51,9 +52,10 @@ class OrdinaryEnv(MujocoEnv):
             **kwargs: of `MujocoEnv`.
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
-        settings = registry.load(robot, "walk").task.settings
+        settings = arc_suite.load(robot, "walk").task.settings
         self._weights, self._numbers = settings.weights, settings.parameters
         self._base_noise, self._joint_noise = settings.base_noise, settings.joint_noise
+        self._torso = self.model.body("torso").id
         self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
         self._terminate_when_unhealthy = terminate_when_unhealthy
         self._begin()
@@ -75,9 +77,9 @@ class OrdinaryEnv(MujocoEnv):
 
     def step(self, action):
         action = np.clip(action, -1.0, 1.0)
-        x_before = self.data.qpos[0]
+        x_before = self.data.xpos[self._torso, 0]
         self.do_simulation(action, self.frame_skip)
-        x_velocity = (self.data.qpos[0] - x_before) / self.dt
+        x_velocity = (self.data.xpos[self._torso, 0] - x_before) / self.dt
         self._phase = (self._phase + 2 * np.pi * self._numbers.gait_frequency * self.dt) % (2 * np.pi)
 
         observation = self._get_obs()
