@@ -3,14 +3,18 @@
 import pathlib
 import re
 
+import gymnasium
 import pytest
+import test_layers
 
 import arc_suite
 from arc_suite import data
+from arc_suite.cli import main
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import walk
 
-README = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
+ROOT = pathlib.Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
@@ -50,13 +54,31 @@ def test_table_of_robots(robot):
 
 
 def test_table_of_terms():
-    for name, weight in walk.WEIGHTS.items():
+    for name, weight in (walk.BONUSES | walk.COSTS).items():
         rows = re.findall(rf"^\| `{name}` \| (-?[\d.]+)[ ;]", README, re.MULTILINE)
         assert float(rows[-1]) == weight, name
 
 
 def test_ids_are_registered():
-    import gymnasium
-
     for name in re.findall(r"`(arc_suite/[a-z]+-walk-v0)`", README):
         assert name in gymnasium.registry
+
+
+def test_every_program_is_told_of():
+    for path in (ROOT / "tools").glob("*.py"):
+        assert f"tools/{path.name}" in README or f"make {path.stem.replace('_', '-')}" in README, path
+    for name in main.PROGRAMS:
+        assert re.search(rf"(tools/(walk_)?{name}\.py|arc_suite\.{name}|arc-suite {name})\b", README), name
+
+
+def test_the_map_names_every_room():
+    (text,) = re.findall(r"```\n(tools/.*?)```", README, re.DOTALL)
+    named = set(re.findall(r"\b(\w+)(?:/|\.py)", text)) - {"tools", "arc_suite"}
+    assert named == set(test_layers.HEIGHTS) - {"__main__"}
+
+
+def test_links_lead_somewhere():
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", README)
+    assert len(targets) > 10
+    for target in targets:
+        assert (ROOT / target).exists(), target
