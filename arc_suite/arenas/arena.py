@@ -39,5 +39,5 @@ class Arena(ABC):
 
     @property
     def lists_contacts(self) -> bool:
-        """Whether it pays to list all pairs of geoms that may touch: for ground of few geoms."""
+        """Whether a list of all pairs of geoms that may touch is faster than a search: if the ground is few geoms."""
         return True

@@ -1,4 +1,4 @@
-"""The OpenGL there is to render with: chosen on import, opened at the first picture, shared by all.
+"""OpenGL: chosen on import, opened at the first picture, one context for all pictures of a process.
 
 A context is large and slow to make, so that all pictures of a process come out of one, drawn one
 after the other: in a thread of its own, where it disturbs nobody else's context and whose end
@@ -30,11 +30,11 @@ _lock = threading.Lock()
 
 
 class RenderingUnavailable(RuntimeError):
-    """No picture can be made here; the message says why, and what to do about it."""
+    """No picture can be made here; the message says why, and the remedy."""
 
 
 def select_backend() -> None:
-    """Chooses the best OpenGL there is and imports MuJoCo, without opening anything.
+    """Choose the best OpenGL there is and import MuJoCo, without opening anything.
 
     `MUJOCO_GL` is set to egl if the user has not set it, there is no display and libEGL loads; a
     user's own value stays. dm_control, which would open OpenGL when it is imported and refuse to be
@@ -53,7 +53,7 @@ def select_backend() -> None:
 
 
 def _postpone_backend() -> None:
-    """Puts an empty module in the place of dm_control's backend, which becomes the real one when it is asked."""
+    """Put an empty module in the place of dm_control's backend; it becomes the real one when it is asked."""
     import dm_control
 
     module = types.ModuleType(_BACKEND)
@@ -71,7 +71,7 @@ def _postpone_backend() -> None:
 
 @contextlib.contextmanager
 def _environment():
-    """Undoes what libraries do to the environment's variables, and keeps Mesa from warning on standard error."""
+    """Undo what libraries do to the environment's variables, and keep Mesa from warning on standard error."""
     before = {name: os.environ.get(name) for name in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL")}
     os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
@@ -85,7 +85,7 @@ def _environment():
 
 @contextlib.contextmanager
 def _strict_glfw():
-    """Lets GLFW raise what it warns of by default, which makes dm_control go on to the next backend."""
+    """Let GLFW raise what it warns of by default, which makes dm_control go on to the next backend."""
     import glfw
 
     before, glfw.ERROR_REPORTING = glfw.ERROR_REPORTING, "raise"
@@ -96,12 +96,12 @@ def _strict_glfw():
 
 
 def has_display() -> bool:
-    """Whether windows can be expected to open: always on macOS and Windows, elsewhere with X11 or Wayland."""
+    """Return whether windows can be expected to open: on macOS and Windows, elsewhere with X11 or Wayland."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def require_window() -> None:
-    """Makes sure that a window can be opened, where MuJoCo's viewer would end the process.
+    """Check that a window can be opened; MuJoCo's viewer would end the process if not.
 
     Raises:
         RenderingUnavailable: it cannot; why, and the remedy.
@@ -124,7 +124,7 @@ def _loads(library: str) -> bool:
 
 
 def call(function):
-    """Calls a function, which may use `contexts`, where OpenGL is current.
+    """Call a function, which may use `contexts`, in OpenGL's thread.
 
     Args:
         function: takes nothing. One at a time is called.
@@ -145,7 +145,7 @@ def call(function):
 
 
 def contexts(model):
-    """The contexts with which dm_control draws a model; only within a function given to `call`.
+    """Return the contexts with which dm_control draws a model; only within a function given to `call`.
 
     Args:
         model: dm_control's `MjModel`; its `vis.global_` says how large pictures can be.
@@ -161,7 +161,7 @@ def contexts(model):
 
 
 def driver() -> str:
-    """Who draws, and which OpenGL that is; after the first picture."""
+    """Return the names of OpenGL's renderer and version; after the first picture."""
 
     def ask():
         from OpenGL import GL
@@ -235,7 +235,7 @@ class _Renderer:
         return engine.Contexts(gl=self._gl, mujoco=drawing)
 
     def close(self):
-        """Frees the contexts in their thread, before the interpreter takes apart what that needs."""
+        """Free the contexts in their thread, before the interpreter takes apart what that needs."""
         gl = self._gl
         if self._forks == forks.count:
             with contextlib.suppress(Exception):  # another library may have closed the display already
@@ -256,7 +256,7 @@ class _Renderer:
 
 
 def _backend():
-    """dm_control's backend, opened."""
+    """Return dm_control's backend, opened."""
     module = sys.modules[_BACKEND]
     # Imported before us and without a display, dm_control has settled for a GLFW that cannot open.
     if module.BACKEND == "glfw" and not _wants_glfw():
@@ -276,7 +276,7 @@ def _wants_glfw() -> bool:
 
 @contextlib.contextmanager
 def _errors():
-    """Turns whatever goes wrong while OpenGL is opened into one line.
+    """Turn whatever goes wrong while OpenGL is opened into one line.
 
     Raises:
         RenderingUnavailable: why there is no picture, and the remedy.

@@ -24,6 +24,10 @@ class Physics(dm_mujoco.Physics):
     state. Only the last of its substeps computes sensors, and with them `cfrc_ext`, so that the
     result is bit-equal to plain substeps and cheaper.
 
+    The model lists its contacts as pairs of geoms where its arena says so (`model.npair` > 0): at run
+    time, write `pair_friction`, `pair_solref`, `pair_solimp`, `pair_margin` and `pair_gap`; those of
+    geoms, and `contype` and `conaffinity`, reach no contact. Steps leave `data.timer` at 0; see `timers`.
+
     Attributes:
         body: what is simulated.
         arena: where.

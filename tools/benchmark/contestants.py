@@ -1,5 +1,6 @@
 """What is compared: ways to run a control step of one robot's walk."""
 
+import contextlib
 import os
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
@@ -7,8 +8,10 @@ from typing import Any, NamedTuple
 import gymnasium
 import mujoco
 
-from arc_suite import models, registry
+from arc_suite import registry
 from arc_suite.robots import ROBOTS
+from arc_suite.simulation import timers
+from arc_suite.simulation.model import compiled
 from arc_suite.tasks.walk import SUBSTEPS
 from benchmark import ordinary
 
@@ -50,10 +53,12 @@ class Contestant(NamedTuple):
 
 def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
     """Plain MuJoCo and the environments of one row."""
-    lean = models.assemble(ROBOTS[robot]).to_xml_string()
-    yield _mujoco(FULL, robot, ordinary.full_model(robot).to_xml_string())
-    yield _mujoco(LEAN, robot, lean)
-    yield _mujoco(SILENT, robot, lean, mujoco.mjtDisableBit.mjDSBL_SENSOR)
+    lean, silent = compiled(ROBOTS[robot]), compiled(ROBOTS[robot])
+    silent.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
+    full = mujoco.MjModel.from_xml_string(ordinary.full_model(robot).to_xml_string())
+    yield _mujoco(FULL, robot, full, contextlib.nullcontext())
+    yield _mujoco(LEAN, robot, lean, timers.off)
+    yield _mujoco(SILENT, robot, silent, timers.off)
     yield _dm_env(robot)
     yield _gymnasium(GYM, gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_FOREVER))
     yield _gymnasium(ORDINARY, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_FOREVER))
@@ -91,10 +96,8 @@ def all_threads() -> list[int]:
     return sorted({2**power for power in range(most.bit_length()) if 2**power <= most} | {most})
 
 
-def _mujoco(name: str, robot: str, xml: str, disableflags: int = 0) -> Contestant:
-    """25 times mj_step, and nothing else."""
-    model = mujoco.MjModel.from_xml_string(xml)
-    model.opt.disableflags |= disableflags
+def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant:
+    """25 times mj_step within a context, and nothing else."""
     data = mujoco.MjData(model)
     observation = {"posture": data.qpos[2:], "velocities": data.qvel}  # live
 
@@ -106,7 +109,8 @@ def _mujoco(name: str, robot: str, xml: str, disableflags: int = 0) -> Contestan
 
     def step(action):
         data.ctrl[:] = action
-        mujoco.mj_step(model, data, SUBSTEPS)
+        with context:
+            mujoco.mj_step(model, data, SUBSTEPS)
         return observation
 
     return Contestant(name, 1, 1, reset, step, lambda: None)
