@@ -17,7 +17,7 @@ def census(*arguments):
 
 def test_bodies_walk():
     done = census(*BODIES, "--count=3")
-    assert done.returncode == 0, done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert lines[0].split() == ["legs", "3", "links", "all"]
     assert lines[1].split()[:2] == ["6", "3/3"]

@@ -108,6 +108,7 @@ def test_datasets_without_minari_say_what_to_install(tmp_path):
     assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
 
 
+@pytest.mark.slow
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr
@@ -142,7 +143,8 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
         (
             ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],
-            "policy 'own_walkers:broken': episode of seed 0: action[0]: expected a number from -1 to 1, got nan",
+            "policy 'own_walkers:broken': episode of seed 0, step 0: "
+            "action[0]: expected a number from -1 to 1, got nan",
         ),
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),

@@ -2,6 +2,9 @@
 
 import pathlib
 import re
+import shlex
+import subprocess
+import sys
 
 import gymnasium
 import pytest
@@ -16,6 +19,11 @@ from arc_suite.tasks import walk
 ROOT = pathlib.Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "examples").glob("*.md"))]
+_COMMAND = re.compile(r"(?:^|`)((?:python (?:tools/|-m arc_suite)|arc-suite )[^`\n]*(?:\n[^`\n]+(?=`))?)", re.MULTILINE)
+SCHEMATIC = {"arc-suite PROGRAM --help", "arc-suite PROGRAM", "python -m arc_suite PROGRAM"}
+COMMANDS = sorted({" ".join(text.split()) for page in PAGES for text in _COMMAND.findall(page.read_text())} - SCHEMATIC)
 
 
 @pytest.fixture
@@ -32,8 +40,19 @@ def test_code(block, dataset):
     exec(compile(block, "README.md", "exec"), {})
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_is_understood(command):
+    """The program, its flags and their values are; what it does then, its own tests say."""
+    program, *arguments = shlex.split(command)
+    if program == "arc-suite":  # not on the path of every environment; the test of the wheel runs it
+        arguments = ["-m", "arc_suite", *arguments]
+    done = subprocess.run([sys.executable, *arguments, "--version"], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_there_is_code():
     assert len(BLOCKS) >= 2
+    assert len(COMMANDS) >= 20
 
 
 @pytest.mark.parametrize("robot", arc_suite.TASKS_BY_DOMAIN)

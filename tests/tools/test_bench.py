@@ -33,6 +33,7 @@ def small_run(tmp_path_factory):
     return result, folder
 
 
+@pytest.mark.slow
 def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run):
     result, folder = small_run
     lines = result.stdout.splitlines()
@@ -65,6 +66,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run)
     assert is_a_plot(folder / "plot.png")
 
 
+@pytest.mark.slow
 def test_robots_of_any_name_are_plotted_and_in_the_tables(small_run, tmp_path):
     results = json.loads((small_run[1] / "results.json").read_text())
     results["robots"] |= {name: results["robots"]["queen"] for name in ("hopper", "crawler")}

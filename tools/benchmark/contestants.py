@@ -1,16 +1,14 @@
 """What is compared: ways to run a control step of one robot's walk."""
 
 import contextlib
-import operator
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import gymnasium
 import mujoco
 
 import arc_suite
-from arc_suite.envs.scene import prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import timers
@@ -42,7 +40,6 @@ class Contestant(NamedTuple):
         workers: threads or processes that do so.
         reset: starts; returns an observation.
         step: maps an action (rows, motors), or (motors,) where there is one row, to an observation.
-        blocks: maps an observation to its blocks by name, as a demonstrator takes them.
         close: frees everything.
     """
 
@@ -51,7 +48,6 @@ class Contestant(NamedTuple):
     workers: int
     reset: Callable[[], Any]
     step: Callable[[Any], Any]
-    blocks: Callable[[Any], Mapping]
     close: Callable[[], None]
 
 
@@ -64,20 +60,18 @@ def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
     yield _mujoco(LEAN, robot, lean, timers.off)
     yield _mujoco(SILENT, robot, silent, timers.off)
     yield _dm_env(robot)
-    own = gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_FOREVER)
-    yield _gymnasium(GYM, robot, own)
-    yield _gymnasium(ORDINARY, robot, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_FOREVER))
+    yield _gymnasium(GYM, gymnasium.make(f"arc_suite/{robot}-walk-v0", task_kwargs=_TASK_KWARGS, **_FOREVER))
+    yield _gymnasium(ORDINARY, gymnasium.make(ordinary_id, terminate_when_unhealthy=False, **_FOREVER))
 
 
-def ordinary_vectors(robot: str, ordinary_id: str, workers: Sequence[int]) -> Iterator[Contestant]:
+def ordinary_vectors(ordinary_id: str, workers: Sequence[int]) -> Iterator[Contestant]:
     """Gymnasium's own vector environments of ordinary ones: as many processes as rows, or none at all."""
     forever = {"terminate_when_unhealthy": False, **_FOREVER}
     for rows in workers:
         envs = gymnasium.make_vec(ordinary_id, rows, vectorization_mode="async", **forever)
-        yield _gymnasium(ASYNC, robot, envs, rows, rows)
+        yield _gymnasium(ASYNC, envs, rows, rows)
     rows = min(workers)
-    envs = gymnasium.make_vec(ordinary_id, rows, vectorization_mode="sync", **forever)
-    yield _gymnasium(SYNC, robot, envs, rows)
+    yield _gymnasium(SYNC, gymnasium.make_vec(ordinary_id, rows, vectorization_mode="sync", **forever), rows)
 
 
 def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator[Contestant]:
@@ -88,7 +82,7 @@ def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator
         envs = gymnasium.make_vec(
             f"arc_suite/{robot}-walk-v0", number, num_threads=few, task_kwargs=_TASK_KWARGS, **_FOREVER
         )
-        yield _gymnasium(VECTOR, robot, envs, number, few)
+        yield _gymnasium(VECTOR, envs, number, few)
 
 
 def reference(rows: Sequence[int]) -> int:
@@ -119,22 +113,15 @@ def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant
             mujoco.mj_step(model, data, SUBSTEPS)
         return observation
 
-    return Contestant(name, 1, 1, reset, step, lambda observation: observation, lambda: None)
+    return Contestant(name, 1, 1, reset, step, lambda: None)
 
 
 def _dm_env(robot: str) -> Contestant:
     environment = arc_suite.load(robot, "walk", {"random": 0, **_TASK_KWARGS})
-    blocks = operator.attrgetter("observation")
-    return Contestant(DM_ENV, 1, 1, environment.reset, environment.step, blocks, environment.physics.free)
+    return Contestant(DM_ENV, 1, 1, environment.reset, environment.step, environment.physics.free)
 
 
-def _gymnasium(name: str, robot: str, env, rows: int = 1, workers: int = 1) -> Contestant:
-    task, _ = prepared(robot, "walk")  # the ordinary environment observes the same vector
-
-    def reset():
-        return env.reset(seed=0)[0]
-
-    def step(action):
-        return env.step(action)[0]
-
-    return Contestant(name, rows, workers, reset, step, task.split, env.close)
+def _gymnasium(name: str, env, rows: int = 1, workers: int = 1) -> Contestant:
+    return Contestant(
+        name, rows, workers, lambda: env.reset(seed=0)[0], lambda action: env.step(action)[0], lambda: env.close()
+    )

@@ -5,9 +5,9 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.mujoco import MujocoEnv
 
-import arc_suite
 from arc_suite import models
 from arc_suite.robots import ROBOTS
+from arc_suite.tasks import walk
 
 
 def full_model(robot: str):
@@ -52,7 +52,7 @@ class OrdinaryEnv(MujocoEnv):
             **kwargs: of `MujocoEnv`.
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
-        settings = arc_suite.load(robot, "walk").task.settings
+        settings = walk.settings(ROBOTS[robot], {})
         self._weights, self._numbers = settings.weights, settings.parameters
         self._base_noise, self._joint_noise = settings.base_noise, settings.joint_noise
         self._torso = self.model.body("torso").id
