@@ -104,7 +104,7 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
         (("legs", 2, "name"), "l1", "legs: the name 'l1' occurs twice"),
         (("legs", 2, "links"), [], "legs[2].links: expected 1 to 16 Links, got 0"),
         (("legs", 2, "links", 1), None, "legs[2].links[1]: expected an object with the fields of a Link, got null"),
-        (("legs", 3, "foot", "radius"), True, "legs[3].foot.radius: expected a number, got True"),
+        (("legs", 3, "foot", "radius"), True, "legs[3].foot.radius: expected a number from 1e-06 to 100, got True"),
         (("legs", 3, "foot", "radius"), 1e-5, "legs: r2_foot: expected a radius from 0.0009, got 1e-05"),
         (("simulation", "timestep"), 0.05, "simulation.contact_time: expected at least two timesteps, got 0.023094"),
         (("legs",), [], "legs: expected 1 to 64 Legs, got 0"),
