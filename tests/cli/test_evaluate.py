@@ -4,16 +4,15 @@ import importlib.metadata
 import json
 import pathlib
 import re
-import subprocess
-import sys
 
+import programs
 import pytest
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "evaluate.py"
 
 
 def evaluate(*arguments):
-    return subprocess.run([sys.executable, TOOL, *arguments], capture_output=True, text=True)
+    return programs.run(TOOL, *arguments)
 
 
 def test_table_of_all_robots():
