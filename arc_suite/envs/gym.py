@@ -13,6 +13,7 @@ from shimmy.utils.dm_env import dm_env_step2gym_step
 from arc_suite import checks
 from arc_suite.envs.dm import load
 from arc_suite.simulation import opengl, pictures
+from arc_suite.tasks import Task
 
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
@@ -84,6 +85,11 @@ class Env(DmControlCompatibilityV0):
         self._window = None
         self._stepping = False  # between a reset and the end of its episode
         self._closed = False
+
+    @property
+    def task(self) -> Task:
+        """What is asked, a value of `arc_suite.tasks`; its `split` gives an observation's blocks by name."""
+        return self._env.task.definition
 
     @property
     def np_random(self) -> np.random.Generator:

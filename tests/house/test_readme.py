@@ -4,11 +4,14 @@ import pathlib
 import re
 import shlex
 
+import gymnasium
 import programs
 import pytest
+import test_layers
 
 import arc_suite
 from arc_suite import data
+from arc_suite.cli import main
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import walk
 
@@ -75,7 +78,25 @@ def test_table_of_terms():
 
 
 def test_ids_are_registered():
-    import gymnasium
-
     for name in re.findall(r"`(arc_suite/[a-z]+-walk-v0)`", README):
         assert name in gymnasium.registry
+
+
+def test_every_program_is_told_of():
+    for path in (ROOT / "tools").glob("*.py"):
+        assert f"tools/{path.name}" in README or f"make {path.stem.replace('_', '-')}" in README, path
+    for name in main.PROGRAMS:
+        assert re.search(rf"(tools/(walk_)?{name}\.py|arc_suite\.{name}|arc-suite {name})\b", README), name
+
+
+def test_the_map_names_every_room():
+    (text,) = re.findall(r"```\n(tools/.*?)```", README, re.DOTALL)
+    named = set(re.findall(r"\b(\w+)(?:/|\.py)", text)) - {"tools", "arc_suite"}
+    assert named == set(test_layers.HEIGHTS) - {"__main__"}
+
+
+def test_links_lead_somewhere():
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", README)
+    assert len(targets) > 10
+    for target in targets:
+        assert (ROOT / target).exists(), target

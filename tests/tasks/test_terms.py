@@ -1,10 +1,11 @@
 """The ten terms, recomputed by hand from raw simulation data."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
@@ -41,7 +42,7 @@ def by_hand(robot, model, data, x_before, phase, action, previous_action):
     bodies = [i for i in range(model.nbody) if model.body(i).name != "world"]
     joints = [model.joint(i) for i in range(model.njnt) if model.joint(i).name != "root"]
     terms = {
-        "forward": max(0.0, 1 - abs((data.qpos[0] - x_before) / DT - f["target"]) / f["sigma"]),
+        "forward": max(0.0, 1 - abs((data.body("torso").xpos[0] - x_before) / DT - f["target"]) / f["sigma"]),
         "healthy": float(f["z"][0] <= data.qpos[2] <= f["z"][1]),
         "gait_bonus": 1 - wrong / feet,
         "gait_cost": float(wrong),
@@ -78,7 +79,10 @@ def test_terms_and_reward_against_the_formulas(robot):
     seen = {name: set() for name in environment.task.settings.weights}
     for steps in range(1, 121):
         action = (demonstrator(timestep) + noise.normal(0, 0.2, model.nu)).clip(-1, 1)
-        x_before, phase = float(data.qpos[0]), (phase + 2 * PI * FIGURES[robot]["frequency"] * DT) % (2 * PI)
+        x_before, phase = (
+            float(data.body("torso").xpos[0]),
+            (phase + 2 * PI * FIGURES[robot]["frequency"] * DT) % (2 * PI),
+        )
         timestep = environment.step(action)
         terms, reward = by_hand(robot, model, data, x_before, phase, action, previous)
         assert environment.task.terms.keys() == terms.keys()
@@ -100,20 +104,28 @@ def test_healthy_term_is_zero_after_a_fall():
     assert timestep.discount == 0.0
 
 
+class Step(NamedTuple):
+    """What terms take of a task's memory."""
+
+    forward_velocity: np.ndarray
+    wrong_feet: np.ndarray
+    action: np.ndarray
+    previous_action: np.ndarray
+
+
 def test_terms_of_a_batch_are_the_terms_of_its_rows():
     rng = np.random.default_rng(0)
     settings = arc_suite.load("leaper", "walk").task.settings
-    shapes = Readings((), (4,), (12,), (3,), (3,), (12,), (126,), (4,))
+    shapes = Readings((17,), (3,), (4,), (12,), (18,), (126,), (3,), (4,))
     for axes in ((5,), (2, 3)):
         readings = Readings(*(rng.normal(0, 0.3, axes + shape) for shape in shapes))
-        phase, velocity = rng.uniform(0, 6, axes), rng.normal(0.5, 0.3, axes)
-        actions, previous = rng.uniform(-1, 1, (2, *axes, 12))
-        step = terms.Step(phase, velocity, actions, previous)
+        velocity, wrong_feet = rng.normal(0.5, 0.3, axes), rng.integers(0, 5, axes).astype(float)
+        step = Step(velocity, wrong_feet, *rng.uniform(-1, 1, (2, *axes, 12)))
         batch = terms.terms(readings, step, settings.parameters)
         for index in np.ndindex(*axes):
             row = terms.terms(
                 Readings(*(array[index] for array in readings)),
-                terms.Step(*(array[index] for array in step)),
+                Step(*(array[index] for array in step)),
                 settings.parameters,
             )
             for name, value in row.items():
@@ -122,15 +134,16 @@ def test_terms_of_a_batch_are_the_terms_of_its_rows():
 
 
 def test_velocity_tent_has_compact_support():
-    settings = arc_suite.load("queen", "walk").task.settings
-    readings = Readings(*(np.zeros(shape) for shape in ((), (4,), (18,), (3,), (3,), (18,), (150,), (6,))))
-    zeros = np.zeros(18)
-
     def forward(velocity):
-        step = terms.Step(np.float64(0), np.float64(velocity), zeros, zeros)
-        return terms.terms(readings, step, settings.parameters)["forward"]
+        return terms.tent(np.float64(velocity) - 0.5, 0.3)
 
     assert forward(0.5) == 1.0
     assert_allclose(forward(0.65), 0.5)
     assert_allclose(forward(0.35), 0.5)
     assert forward(0.81) == forward(0.19) == forward(-0.5) == 0.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_infinite_velocity_earns_nothing():
+    for velocities in (np.float64(np.inf), np.float64(-np.inf), np.array([np.inf, -np.inf])):
+        assert_array_equal(terms.tent(velocities - 0.5, 0.3), 0.0)
