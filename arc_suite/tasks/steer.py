@@ -15,10 +15,10 @@ from arc_suite.tasks.readings import Readings
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
 COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
-_FIELDS = ("place", "motion", "ends", "schedule", "command", "tracking")
+_OWN = [(field, np.ndarray) for field in ("place", "motion", "ends", "schedule", "command", "tracking")]
 
 
-class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *((name, np.ndarray) for name in _FIELDS)])):
+class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *_OWN])):
     """What is remembered beside the walk's; velocities are (forward, left, turning) in units of `Steer.units`.
 
     Attributes:
@@ -78,8 +78,7 @@ class Steer(walk.Walk):
         numpy = place.__array_namespace__()
         sine, cosine = numpy.sin(heading), numpy.cos(heading)
         x, y, turn = ((place - memory.place)[..., i] for i in range(3))
-        turn = (turn + math.pi) % (2.0 * math.pi) - math.pi
-        way = numpy.stack([cosine * x + sine * y, cosine * y - sine * x, turn], axis=-1)
+        way = numpy.stack([cosine * x + sine * y, cosine * y - sine * x, rotations.wrapped(turn)], axis=-1)
         leak = min(self.parameters.gait_frequency * step, 1.0)
         motion = memory.motion + leak * (way / (step * self.units) - memory.motion)
         memory = super().after(memory, readings)._replace(place=place, motion=motion)
@@ -109,7 +108,7 @@ class Steer(walk.Walk):
     def observe(self, memory: Memory, readings: Readings) -> dict:
         """Return walk's blocks, and the command and the motion side by side."""
         command = memory.motion.__array_namespace__().concatenate([self.wanted(memory), memory.motion], axis=-1)
-        return {**super().observe(memory, readings), "command": command}
+        return super().observe(memory, readings) | {"command": command}
 
     def progress(self, memory: Memory) -> dict:
         """Return the mean `tracking`, and `gait_compliance`."""
