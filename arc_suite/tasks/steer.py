@@ -43,9 +43,8 @@ def draw_command(random: np.random.RandomState) -> np.ndarray:
 class Steer(walk.Walk):
     """Following a velocity command."""
 
-    name = "steer"
+    name, target_velocity = "steer", None
     commands = {"command": 3}
-    target_velocity = None
     bonuses = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
 
     @functools.cached_property
@@ -60,12 +59,12 @@ class Steer(walk.Walk):
         return np.array((speed, speed, speed / np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean()))
 
     def start(self, random: np.random.RandomState, carry: Any) -> Start:
-        """Draw walk's start, then the yaw, then for each command how long it is held and what it is."""
+        """Draw walk's start, then the yaw, then how long each command is held, then what they are."""
         start = super().start(random, carry)
         start.qpos[3:7] = rotations.turned(start.qpos[3:7], random.uniform(-math.pi, math.pi))
-        drawn = [(random.randint(SHORTEST, LONGEST), draw_command(random)) for _ in range(COMMANDS)]
-        held, schedule = (np.array(values) for values in zip(*drawn, strict=True))
-        own = (np.zeros(3), np.zeros(3), held.cumsum(), schedule, np.full(3, np.nan), np.float64(0.0))
+        ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
+        schedule = np.array([draw_command(random) for _ in range(COMMANDS)])
+        own = (np.zeros(3), np.zeros(3), ends, schedule, np.full(3, np.nan), np.float64(0.0))
         return start._replace(memory=Memory(*start.memory, *own))
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
@@ -80,7 +79,7 @@ class Steer(walk.Walk):
         x, y, turn = ((place - memory.place)[..., i] for i in range(3))
         way = numpy.stack([cosine * x + sine * y, cosine * y - sine * x, rotations.wrapped(turn)], axis=-1)
         leak = min(self.parameters.gait_frequency * step, 1.0)
-        motion = memory.motion + leak * (way / (step * self.units) - memory.motion)
+        motion = (1.0 - leak) * memory.motion + leak * way / (step * self.units)
         memory = super().after(memory, readings)._replace(place=place, motion=motion)
         return memory._replace(tracking=memory.tracking + self.tracked(memory))
 
