@@ -1,5 +1,6 @@
 """Datasets: Minari opens them, they replay to the bit, and they depend on nothing but seeds and settings."""
 
+import hashlib
 import pathlib
 import subprocess
 import sys
@@ -10,7 +11,9 @@ import numpy as np
 import pytest
 from datasets import ID, QUEEN, SHORT, TICK, collect, digests, quiet, verify
 
-from arc_suite import data, evaluation, policies, registry, style, versions
+import arc_suite
+from arc_suite import data, evaluation, policies, style, versions
+from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots.spec_files import load_body
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -87,7 +90,8 @@ def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
 def test_metadata():
     collect(ID, data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20), 3)
     dataset = data.open(ID)
-    assert (dataset.body, dataset.steps, len(dataset)) == (QUEEN, 20, 3)
+    assert dataset.settings == data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
+    assert len(dataset) == 3
     about = dataset.metadata["arc_suite"]
     assert about["versions"] == versions.recorded()
     assert len(about["model_sha256"]) == 64
@@ -98,6 +102,12 @@ def test_metadata():
         "noise": 0.1,
         "seed": 7,
         "steps": 20,
+        "task": "walk",
+        "task_kwargs": {},
+        "task_version": 0,
+        "presets_sha256": [
+            hashlib.sha256(repr(TUNINGS["queen"][name]).encode()).hexdigest() for name in ("slow", "fast")
+        ],
     }
     summaries = dataset.summaries()
     assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 7, 8, 9
@@ -117,15 +127,22 @@ def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
     assert minari.get_normalized_score(dataset, 4.0 * 30) == 1.0
 
 
-def rounded(policy):
-    return lambda timestep: policy(timestep).astype(np.float32)
+class Rounded:
+    """A policy whose actions are rounded as those of datasets."""
+
+    def __init__(self, policy):
+        self.policy = policy
+        self.begin = policy.begin
+
+    def act(self, observation, rewards):
+        return self.policy.act(observation, rewards).astype(np.float32)
 
 
 def test_an_episode_is_what_the_single_environment_plays():
     collect(ID, data.Settings(TICK, "random", (), **SHORT), 2)
     for episode in data.open(ID):
-        random = policies.policy("random", "tick", seed=episode.seed)
-        steps = evaluation.rollout(registry.load(TICK, "walk"), rounded(random), episode.seed, max_steps=20)
+        random = Rounded(policies.policy("random", "tick"))
+        steps = evaluation.rollout(arc_suite.load(TICK, "walk"), random, episode.seed, max_steps=20)
         np.testing.assert_array_equal(episode.rewards, [timestep.reward for timestep in steps][1:])
 
 
@@ -186,12 +203,13 @@ def test_noise_is_normal_and_differs_from_episode_to_episode():
 
 def test_ids_by_default_are_minaris():
     named = {
-        "arc_suite/queen/cpg-medium-v0": data.Settings(QUEEN),
-        "arc_suite/tick/random-v0": data.Settings(TICK, "random", ()),
-        "arc_suite/queen/cpg-medium-fast-noise0_1-v0": data.Settings(QUEEN, presets=("medium", "fast"), noise=0.1),
-        "arc_suite/spider/my_package_policies_make-50steps-v0": data.Settings(
+        "arc_suite/queen/walk/cpg-medium-v0": data.Settings(QUEEN),
+        "arc_suite/tick/steer/random-v0": data.Settings(TICK, "random", (), task="steer"),
+        "arc_suite/queen/walk/cpg-medium-fast-noise0_1-v0": data.Settings(QUEEN, presets=("medium", "fast"), noise=0.1),
+        "arc_suite/spider/walk/my_package_policies_make-50steps-v0": data.Settings(
             SPIDER, "my_package.policies:make", (), steps=50
         ),
+        "arc_suite/queen/walk/cpg-medium-set59ccfc0d-v0": data.Settings(QUEEN, task_kwargs={"arena": "bumps"}),
     }
     for dataset_id, settings in named.items():
         assert settings.dataset_id() == dataset_id

@@ -89,7 +89,7 @@ def test_another_version_or_model_is_refused(root):
         verify(ID)
     with pytest.raises(ValueError, match="is another: its mujoco is '3.16.0', and not '3.17"):
         collect(ID, settings, 3)
-    with pytest.raises(ValueError, match=f"^dataset '{ID}' holds walks of queen, and not of tick$"):
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' holds episodes of queen, and not of tick$"):
         verify(ID, TICK)
     edited(root, lambda metadata: metadata.pop("arc_suite"))
     for use in (verify, data.open, lambda dataset_id: collect(dataset_id, settings, 3)):
@@ -147,7 +147,7 @@ def test_unknown_ids():
     with pytest.raises(ValueError) as error:
         data.open("arc_suite/test/same-v0")
     assert str(error.value) == f"unknown dataset 'arc_suite/test/same-v0'; did you mean {ID!r}? (there are: {ID})"
-    other = "arc_suite/queen/cpg-medium-v0"
+    other = "arc_suite/queen/walk/cpg-medium-v0"
     for wrong, example in ((ID[:-3], ID), (f"{ID}/inner-v0", other), ("../some-v0", other), ("", other)):
         with pytest.raises(ValueError) as error:
             data.open(wrong)
