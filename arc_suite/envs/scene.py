@@ -86,7 +86,10 @@ def checked_command(task: Task, name: str, value, rows: tuple[int, ...] = ()) ->
     if not task.commands:
         raise ValueError(f"command {name!r}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
-    numbers = np.full(size, np.nan) if value is None else np.asarray(value, dtype=float)
+    try:
+        numbers = np.full(size, np.nan) if value is None else np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        numbers = np.array(np.inf)
     if numbers.shape not in ((size,), (*rows, size)) or np.isinf(numbers).any():
         raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
     return np.broadcast_to(numbers, (*rows, size)).copy()

@@ -112,9 +112,9 @@ class Steer(walk.Walk):
         return {**super().observe(memory, readings), "command": command}
 
     def progress(self, memory: Memory) -> dict:
-        """Return the mean `tracking`, and the gait's mean `compliance`."""
+        """Return the mean `tracking`, and `gait_compliance`."""
         steps = memory.tick + (memory.tick == 0)
-        return {"tracking": memory.tracking / steps, "compliance": super().progress(memory)["compliance"]}
+        return {"tracking": memory.tracking / steps, "gait_compliance": super().progress(memory)["gait_compliance"]}
 
 
 def _place(readings: Readings):

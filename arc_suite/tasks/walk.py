@@ -286,9 +286,9 @@ class Walk(Task):
         return ~terms.healthy(readings.torso_height, self.parameters), False
 
     def progress(self, memory: Memory) -> dict:
-        """Return the mean forward `speed`, m/s, and gait `compliance`, the mean share of feet as prescribed."""
+        """Return the mean forward `speed`, m/s, and `gait_compliance`, the mean share of feet as prescribed."""
         steps = memory.tick + (memory.tick == 0)
         return {
             "speed": memory.distance / (steps * self.scene.control_timestep),
-            "compliance": 1.0 - memory.wrong_in_all / (steps * len(self.parameters.phase_offsets)),
+            "gait_compliance": 1.0 - memory.wrong_in_all / (steps * len(self.parameters.phase_offsets)),
         }

@@ -9,35 +9,15 @@ import sys
 import pytest
 
 import arc_suite
+from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.walk import SETTINGS, walk
+from arc_suite.tasks.walk import SETTINGS, Walk
 
 ROOT = pathlib.Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "adding_a_robot.md").read_text()
 REGISTERING, USING = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
-
-# The same from a package: a task of its own kind stands beside the guide's.
-STAND = """
-from dm_control.rl import control
-from dm_control.suite import base
-from arc_suite.simulation.physics import Physics
-
-class Stand(base.Task):
-    def initialize_episode(self, physics):
-        physics.data.qpos[7:] = self.random.uniform(-0.1, 0.1, physics.model.nq - 7)
-    def get_observation(self, physics):
-        return {"angles": physics.position()[7:]}
-    def get_reward(self, physics):
-        return 1.0
-
-def stand(body, random=None, environment_kwargs=None):
-    physics = Physics.from_body(body)
-    return control.Environment(physics, Stand(random), 1.0, control_timestep=0.05, **(environment_kwargs or {}))
-
-arc_suite.register(tasks={"stand": stand})
-"""
 
 
 @pytest.fixture
@@ -45,7 +25,7 @@ def package(tmp_path):
     """Writes the package `creatures` and returns a function that runs code beside it."""
     (tmp_path / "creatures").mkdir()
     (tmp_path / "creatures" / "__init__.py").write_text("")
-    (tmp_path / "creatures" / "hopper.py").write_text(REGISTERING + STAND)
+    (tmp_path / "creatures" / "hopper.py").write_text(REGISTERING)
     (tmp_path / "hopper.py").write_text(REGISTERING)
 
     def run(code):
@@ -75,7 +55,7 @@ def test_guides_robot_walks(package):
         "environment = arc_suite.load('hopper', 'walk')\n"
         "for preset in ('slow', 'medium', 'fast'):\n"
         "    episode = evaluation.run(environment, Demonstrator('hopper', preset), seed=0, max_steps=200)\n"
-        "    print(episode.length, episode.speed > 0.1)\n"
+        "    print(episode.length, episode.progress['speed'] > 0.1)\n"
     )
     assert package(code) == ["200 True"] * 3
 
@@ -84,9 +64,9 @@ def test_every_face(package):
     code = """
 import arc_suite, gymnasium, numpy as np
 from creatures import hopper
-assert arc_suite.ALL_TASKS == tuple((d, t) for d in arc_suite.TASKS_BY_DOMAIN for t in ("walk", "stroll", "stand"))
+assert arc_suite.ALL_TASKS == tuple((d, t) for d in arc_suite.TASKS_BY_DOMAIN for t in ("walk", "steer", "stroll"))
 assert list(arc_suite.TASKS_BY_DOMAIN) == ["queen", "bastion", "tick", "leaper", "hopper"]
-for task in ("walk", "stroll", "stand"):
+for task in ("walk", "steer", "stroll"):
     env_id = f"arc_suite/hopper-{task}-v0"
     env = gymnasium.make(env_id, render_mode="rgb_array", width=32, height=24)
     first, again = env.reset(seed=1)[0], env.reset(seed=1)[0]
@@ -95,8 +75,7 @@ for task in ("walk", "stroll", "stand"):
     env.reset(seed=1)
     stepped = env.step(action)
     assert env.render().shape == (24, 32, 3)
-    modes = ["sync", "async"] if task == "stand" else ["vector_entry_point", "sync", "async"]
-    for mode in modes:
+    for mode in ("vector_entry_point", "sync", "async"):
         envs = gymnasium.make_vec(env_id, num_envs=2, vectorization_mode=mode)
         assert np.array_equal(envs.reset(seed=1)[0][0], first), mode
         observations, rewards, *_ = envs.step(np.stack([action, action]))
@@ -104,8 +83,7 @@ for task in ("walk", "stroll", "stand"):
         envs.close()
 for call in (
     lambda: arc_suite.load("hoper", "walk"),
-    lambda: arc_suite.load("hopper", "stan"),
-    lambda: gymnasium.make_vec("arc_suite/hopper-stand-v0", num_envs=2),
+    lambda: arc_suite.load("hopper", "strol"),
     lambda: arc_suite.load("nowhere:hopper", "walk"),
 ):
     try:
@@ -115,8 +93,7 @@ for call in (
 """
     assert package(code) == [
         "unknown domain 'hoper'; did you mean 'hopper'? (there are: queen, bastion, tick, leaper, hopper)",
-        "unknown task 'stan'; did you mean 'stand'? (there are: walk, stroll, stand)",
-        "task 'creatures.hopper:stand' has no batched form; use vectorization_mode 'sync' or 'async'",
+        "unknown task 'strol'; did you mean 'stroll'? (there are: walk, steer, stroll)",
         "domain 'hopper': cannot import nowhere: No module named 'nowhere'",
     ]
 
@@ -139,10 +116,10 @@ if __name__ == "__main__":
 def test_names_import_what_they_name(package):
     code = """
 import arc_suite, gymnasium
-print(arc_suite.load("creatures.hopper:hopper", "creatures.hopper:stand").reset().observation["angles"].shape)
+print(arc_suite.load("creatures.hopper:hopper", "creatures.hopper:stroll").reset().observation["gait_clock"].shape)
 print(gymnasium.make("creatures.hopper:arc_suite/hopper-walk-v0").reset()[0].shape)
 """
-    assert package(code) == ["(8,)", "(107,)"]
+    assert package(code) == ["(2,)", "(107,)"]
 
 
 TICK = ROBOTS["tick"]
@@ -150,10 +127,20 @@ OTHER = TICK.replace(name="other")
 ROW = SETTINGS["tick"]
 
 
+class Other(Walk):
+    """Another task of a name that is taken."""
+
+
+class Misnamed(Walk):
+    """A task whose name no id can have."""
+
+    name = "walk-slowly"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "nothing to register: give a body, tasks or both"),
+        ({}, "nothing to register: give a body, tasks or arenas"),
         ({"walk": ROW}, "walk, tuning and look belong to a body, and none is given"),
         ({"body": "other"}, "body: expected a spec.Body, got 'other'"),
         ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),
@@ -189,17 +176,43 @@ ROW = SETTINGS["tick"]
             {"body": OTHER, "tuning": {"medium": TUNINGS["queen"]["medium"]}},
             "tuning: other has no slow and no fast",
         ),
-        ({"tasks": {"walk": walk}}, "task 'walk' is already registered"),
-        ({"tasks": {"walk-slowly": walk}}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
-        ({"tasks": {"stand": None}}, "task 'stand': expected a function that makes an environment, got None"),
-        ({"body": OTHER, "walk": ROW, "tasks": {"walk": walk}}, "task 'walk' is already registered"),
+        ({"tasks": (Other,)}, "task 'walk' is already registered"),
+        ({"tasks": (Misnamed,)}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
+        (
+            {"tasks": (len,)},
+            "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in function len>",
+        ),
+        ({"body": OTHER, "walk": ROW, "tasks": (Other,)}, "task 'walk' is already registered"),
+        ({"arenas": {"flat": lambda body: None}}, "arena 'flat' is already registered"),
     ],
 )
 def test_mistakes_are_one_line_and_register_nothing(arguments, message):
-    tables = (ROBOTS, SETTINGS, TUNINGS, TASKS)
+    tables = (ROBOTS, SETTINGS, TUNINGS, TASKS, ARENAS)
     before = [dict(table) for table in tables]
     with pytest.raises(ValueError) as error:
         arc_suite.register(**arguments)
     assert str(error.value).startswith(message)
     assert "\n" not in str(error.value)
     assert [dict(table) for table in tables] == before
+
+
+def test_the_module_is_named_and_not_guessed(package):
+    """A wrapper around `register` changes nothing of what other processes import."""
+    code = """
+import arc_suite, gymnasium
+from arc_suite.tasks.walk import Walk
+class Amble(Walk):
+    name = "amble"
+def wrapper(**kwargs):
+    arc_suite.register(**kwargs)
+wrapper(module="creatures.hopper", tasks=(Amble,))
+print(gymnasium.spec("arc_suite/queen-amble-v0").kwargs)
+class Saunter(Walk):
+    name = "saunter"
+arc_suite.register(tasks=(Saunter,))
+print(gymnasium.spec("arc_suite/queen-saunter-v0").kwargs)
+"""
+    assert package(code) == [
+        "{'domain_name': 'queen', 'task_name': 'creatures.hopper:amble'}",
+        "{'domain_name': 'queen', 'task_name': 'saunter'}",
+    ]

@@ -1,13 +1,17 @@
 """The ten terms, recomputed by hand from raw simulation data."""
 
 import math
+from typing import NamedTuple
 
+import mujoco
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
+from arc_suite import models
 from arc_suite.cpg import Demonstrator
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import terms
 from arc_suite.tasks.readings import Readings
 
@@ -41,7 +45,7 @@ def by_hand(robot, model, data, x_before, phase, action, previous_action):
     bodies = [i for i in range(model.nbody) if model.body(i).name != "world"]
     joints = [model.joint(i) for i in range(model.njnt) if model.joint(i).name != "root"]
     terms = {
-        "forward": max(0.0, 1 - abs((data.qpos[0] - x_before) / DT - f["target"]) / f["sigma"]),
+        "forward": max(0.0, 1 - abs((data.body("torso").xpos[0] - x_before) / DT - f["target"]) / f["sigma"]),
         "healthy": float(f["z"][0] <= data.qpos[2] <= f["z"][1]),
         "gait_bonus": 1 - wrong / feet,
         "gait_cost": float(wrong),
@@ -78,7 +82,10 @@ def test_terms_and_reward_against_the_formulas(robot):
     seen = {name: set() for name in environment.task.settings.weights}
     for steps in range(1, 121):
         action = (demonstrator(timestep) + noise.normal(0, 0.2, model.nu)).clip(-1, 1)
-        x_before, phase = float(data.qpos[0]), (phase + 2 * PI * FIGURES[robot]["frequency"] * DT) % (2 * PI)
+        x_before, phase = (
+            float(data.body("torso").xpos[0]),
+            (phase + 2 * PI * FIGURES[robot]["frequency"] * DT) % (2 * PI),
+        )
         timestep = environment.step(action)
         terms, reward = by_hand(robot, model, data, x_before, phase, action, previous)
         assert environment.task.terms.keys() == terms.keys()
@@ -100,20 +107,28 @@ def test_healthy_term_is_zero_after_a_fall():
     assert timestep.discount == 0.0
 
 
+class Step(NamedTuple):
+    """What terms take of a task's memory."""
+
+    forward_velocity: np.ndarray
+    wrong_feet: np.ndarray
+    action: np.ndarray
+    previous_action: np.ndarray
+
+
 def test_terms_of_a_batch_are_the_terms_of_its_rows():
     rng = np.random.default_rng(0)
     settings = arc_suite.load("leaper", "walk").task.settings
-    shapes = Readings((), (4,), (12,), (3,), (3,), (12,), (126,), (4,))
+    shapes = Readings((17,), (3,), (4,), (12,), (18,), (126,), (3,), (4,))
     for axes in ((5,), (2, 3)):
         readings = Readings(*(rng.normal(0, 0.3, axes + shape) for shape in shapes))
-        phase, velocity = rng.uniform(0, 6, axes), rng.normal(0.5, 0.3, axes)
-        actions, previous = rng.uniform(-1, 1, (2, *axes, 12))
-        step = terms.Step(phase, velocity, actions, previous)
+        velocity, wrong_feet = rng.normal(0.5, 0.3, axes), rng.integers(0, 5, axes).astype(float)
+        step = Step(velocity, wrong_feet, *rng.uniform(-1, 1, (2, *axes, 12)))
         batch = terms.terms(readings, step, settings.parameters)
         for index in np.ndindex(*axes):
             row = terms.terms(
                 Readings(*(array[index] for array in readings)),
-                terms.Step(*(array[index] for array in step)),
+                Step(*(array[index] for array in step)),
                 settings.parameters,
             )
             for name, value in row.items():
@@ -122,15 +137,42 @@ def test_terms_of_a_batch_are_the_terms_of_its_rows():
 
 
 def test_velocity_tent_has_compact_support():
-    settings = arc_suite.load("queen", "walk").task.settings
-    readings = Readings(*(np.zeros(shape) for shape in ((), (4,), (18,), (3,), (3,), (18,), (150,), (6,))))
-    zeros = np.zeros(18)
-
     def forward(velocity):
-        step = terms.Step(np.float64(0), np.float64(velocity), zeros, zeros)
-        return terms.terms(readings, step, settings.parameters)["forward"]
+        return terms.tent(np.float64(velocity) - 0.5, 0.3)
 
     assert forward(0.5) == 1.0
     assert_allclose(forward(0.65), 0.5)
     assert_allclose(forward(0.35), 0.5)
     assert forward(0.81) == forward(0.19) == forward(-0.5) == 0.0
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_infinite_velocity_earns_nothing():
+    for velocities in (np.float64(np.inf), np.float64(-np.inf), np.array([np.inf, -np.inf])):
+        assert_array_equal(terms.tent(velocities - 0.5, 0.3), 0.0)
+
+
+@pytest.mark.parametrize("robot", FIGURES)
+def test_reward_is_the_published_one_from_recorded_states(robot):
+    """An independent simulation of the written model by plain `mj_step`, from state to state of an episode."""
+    environment = arc_suite.load(robot, "walk", {"random": 5})
+    model = mujoco.MjModel.from_xml_string(models.assemble(ROBOTS[robot]).to_xml_string())
+    data = mujoco.MjData(model)
+    demonstrator, noise = Demonstrator(robot), np.random.RandomState(1)
+    timestep = environment.reset()
+    data.qpos[:], data.qvel[:] = environment.physics.position(), environment.physics.velocity()
+    mujoco.mj_forward(model, data)
+    data.qacc_warmstart[:] = environment.physics.data.ptr.qacc_warmstart
+    previous, phase = np.zeros(model.nu), 0.0
+    for _ in range(100):
+        action = (demonstrator(timestep) + noise.normal(0, 0.2, model.nu)).clip(-1, 1)
+        x_before, phase = (
+            float(data.body("torso").xpos[0]),
+            (phase + 2 * PI * FIGURES[robot]["frequency"] * DT) % (2 * PI),
+        )
+        data.ctrl[:] = action
+        mujoco.mj_step(model, data, 25)
+        timestep = environment.step(action)
+        _, reward = by_hand(robot, model, data, x_before, phase, action, previous)
+        assert_allclose(timestep.reward, reward, rtol=1e-12, atol=1e-12)
+        previous = action

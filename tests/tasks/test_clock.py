@@ -1,0 +1,50 @@
+"""The gait's clock: phases added up in double precision, by tick."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from arc_suite.envs.scene import prepared
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks.clock import Clock, wanted_stance
+
+TWO_PI = 2.0 * math.pi
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_phases_are_summed_step_by_step(robot):
+    task, _ = prepared(robot, "walk")
+    phase, turn = 0.0, TWO_PI * task.parameters.gait_frequency * 0.05
+    for tick in range(1001):
+        assert task.clock.phases[tick] == phase
+        assert_array_equal(task.clock.at(task.clock.circle, tick), [np.sin(phase), np.cos(phase)])
+        wanted = wanted_stance(np.float64(phase), task.parameters.duty_factor, task.parameters.phase_offsets)
+        assert_array_equal(task.clock.at(task.clock.stance, tick), wanted)
+        phase = (phase + turn) % TWO_PI
+
+
+def test_edges_fall_where_summed_phases_put_them():
+    """The tables of any other way to compute a phase differ: that is why it is added up once."""
+    task, _ = prepared("queen", "walk")
+    ticks = np.arange(1001)
+    multiplied = wanted_stance(ticks * (TWO_PI * 1.5 * 0.05) % TWO_PI, 0.6, task.parameters.phase_offsets)
+    assert (multiplied != task.clock.stance).any(axis=-1).sum() == 44
+
+
+def test_ticks_of_a_batch_are_those_of_its_rows():
+    clock = Clock.made(1.3, 0.6, np.array([0.0, 1.0, 2.0]), 0.05, 1000)
+    ticks = np.array([[0, 7], [1000, 500]])
+    for index in np.ndindex(2, 2):
+        assert_array_equal(clock.at(clock.stance, ticks)[index], clock.at(clock.stance, int(ticks[index])))
+
+
+@pytest.mark.parametrize("frequency", [1.5, 1.2345])
+def test_an_endless_episode_goes_round_without_a_jump(frequency):
+    clock = Clock.made(frequency, 0.6, np.zeros(1), 0.05, math.inf)
+    period, turn = len(clock.phases), TWO_PI * frequency * 0.05
+    before, after = clock.at(clock.phases, period - 1), clock.at(clock.phases, period)
+    assert after == 0.0
+    jump = (after - before - turn + math.pi) % TWO_PI - math.pi
+    assert abs(jump) < 1e-3 * turn

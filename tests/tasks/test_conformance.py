@@ -1,0 +1,175 @@
+"""Conformance of every task of the registry: what users of dm_control's suite rely on."""
+
+import copy
+import io
+import unittest
+
+import mujoco
+import numpy as np
+import pytest
+from absl.testing import absltest
+from dm_control.rl import control
+from dm_env import specs
+from dm_env.test_utils import EnvironmentTestMixin
+from numpy.testing import assert_array_equal
+
+import arc_suite
+
+JOINTS = {"queen": 18, "bastion": 12, "tick": 18, "leaper": 12}
+every_task = pytest.mark.parametrize(("domain", "task"), arc_suite.ALL_TASKS)
+
+
+def load(domain, task, random=0, **task_kwargs):
+    return arc_suite.load(domain, task, {"random": random, **task_kwargs})
+
+
+def flat(timestep):
+    return np.concatenate(list(timestep.observation.values()))
+
+
+def random_actions(environment, count, seed=0):
+    """Actions too weak for a robot to fall within a few dozen steps."""
+    return np.random.RandomState(seed).uniform(-0.3, 0.3, (count, *environment.action_spec().shape))
+
+
+@every_task
+def test_dm_env_contract(domain, task):
+    class Contract(EnvironmentTestMixin, absltest.TestCase):
+        def make_object_under_test(self):
+            return load(domain, task)
+
+    suite = absltest.TestLoader().loadTestsFromTestCase(Contract)
+    result = unittest.TextTestRunner(stream=io.StringIO()).run(suite)
+    assert result.testsRun >= 4
+    assert result.wasSuccessful(), result.failures + result.errors
+
+
+@every_task
+def test_specs_are_those_of_the_declared_blocks(domain, task):
+    environment = load(domain, task)
+    assert isinstance(environment, control.Environment)
+    action = environment.action_spec()
+    assert isinstance(action, specs.BoundedArray)
+    assert action.shape == (JOINTS[domain],)
+    assert (action.minimum == -1).all() and (action.maximum == 1).all()
+    declared = {name: (size,) for name, size in environment.task.definition.blocks.items()}
+    timestep = environment.reset()
+    assert {name: block.shape for name, block in timestep.observation.items()} == declared
+    assert {name: spec.shape for name, spec in environment.observation_spec().items()} == declared
+    for name, spec in environment.observation_spec().items():
+        spec.validate(timestep.observation[name])
+    assert flat(timestep).shape == (environment.task.definition.size,)
+
+
+@every_task
+def test_flat_observation_is_the_blocks_in_order(domain, task):
+    blocks = load(domain, task)
+    vector = arc_suite.load(domain, task, {"random": 0}, {"flat_observation": True})
+    assert_array_equal(vector.reset().observation["observations"], flat(blocks.reset()))
+    for action in random_actions(blocks, 5):
+        assert_array_equal(vector.step(action).observation["observations"], flat(blocks.step(action)))
+
+
+@every_task
+def test_physics_is_25_plain_steps_of_2_ms(domain, task):
+    environment = load(domain, task)
+    environment.reset()
+    model = environment.physics.model.ptr
+    plain = mujoco.MjData(model)
+    assert model.opt.timestep == 0.002
+    for action in random_actions(environment, 20):
+        mujoco.mj_copyData(plain, model, environment.physics.data.ptr)
+        plain.ctrl[:] = action
+        mujoco.mj_step(model, plain, 25)
+        environment.step(action)
+        data = environment.physics.data.ptr
+        for field in ("qpos", "qvel", "cfrc_ext", "xpos", "sensordata", "qacc_warmstart", "time"):
+            assert_array_equal(getattr(data, field), getattr(plain, field), err_msg=field)
+        mujoco.mj_rnePostConstraint(model, plain)
+        assert_array_equal(data.cfrc_ext, plain.cfrc_ext)
+
+
+@every_task
+def test_same_seed_same_episode_and_resets_differ(domain, task):
+    one, two, other = load(domain, task), load(domain, task), load(domain, task, random=1)
+    first, third = one.reset(), other.reset()
+    assert_array_equal(flat(first), flat(two.reset()))
+    assert not np.array_equal(flat(first), flat(third))
+    for action in random_actions(one, 20):
+        a, b = one.step(action), two.step(action)
+        assert a.reward == b.reward
+        assert_array_equal(flat(a), flat(b))
+    again = one.reset()
+    assert not np.array_equal(flat(first), flat(again))
+    assert_array_equal(flat(again), flat(two.reset()))
+
+
+@every_task
+def test_observations_share_no_memory(domain, task):
+    environment = load(domain, task)
+    timestep = environment.reset()
+    kept = flat(timestep).copy()
+    for action in random_actions(environment, 3):
+        following = environment.step(action)
+        for name, block in timestep.observation.items():
+            assert not np.shares_memory(block, following.observation[name])
+            assert not any(np.shares_memory(block, field) for field in (environment.physics.data.ptr.qpos,))
+    assert_array_equal(flat(timestep), kept)
+
+
+@every_task
+def test_action_out_of_range_is_clipped(domain, task):
+    one, two = load(domain, task), load(domain, task)
+    one.reset(), two.reset()
+    action = random_actions(one, 1)[0] * 10
+    a, b = one.step(action), two.step(action.clip(-1, 1))
+    assert a.reward == b.reward
+    assert_array_equal(flat(a), flat(b))
+    assert one.step(np.full(JOINTS[domain], np.inf)).reward == two.step(np.ones(JOINTS[domain])).reward
+
+
+@every_task
+def test_bad_action_is_refused_and_changes_nothing(domain, task):
+    one, two = load(domain, task), load(domain, task)
+    one.reset(), two.reset()
+    n = JOINTS[domain]
+    action = random_actions(one, 1)[0]
+    one.step(action), two.step(action)
+    poisoned = action.copy()
+    poisoned[4] = np.nan
+    for bad, message in (
+        (poisoned, r"^action\[4\]: expected a number from -1 to 1, got nan$"),
+        (np.zeros(n + 1), rf"^action: expected shape \({n},\), got \({n + 1},\)$"),
+        (np.zeros((2, n)), rf"^action: expected shape \({n},\), got \(2, {n}\)$"),
+        (0.5, rf"^action: expected shape \({n},\), got \(\)$"),
+        (["a"] * n, rf"^action: expected {n} numbers, got list$"),
+        (None, rf"^action: expected shape \({n},\), got \(\)$"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            one.step(bad)
+    for following in random_actions(one, 3, seed=1):
+        a, b = one.step(following), two.step(following)
+        assert a.reward == b.reward
+        assert_array_equal(flat(a), flat(b))
+
+
+@every_task
+def test_episode_is_1000_steps_of_50_ms(domain, task):
+    environment = load(domain, task, healthy_range=(-10.0, 10.0))
+    timestep, length = environment.reset(), 0
+    action = np.zeros(JOINTS[domain])
+    while not timestep.last():
+        timestep = environment.step(action)
+        length += 1
+    assert length == 1000
+    assert environment.control_timestep() == 0.05
+
+
+@every_task
+def test_a_copy_is_independent_and_equal(domain, task):
+    environment = load(domain, task)
+    environment.reset()
+    environment.step(np.zeros(JOINTS[domain]))
+    copied = copy.deepcopy(environment)
+    for action in random_actions(environment, 10):
+        assert_array_equal(flat(environment.step(action)), flat(copied.step(action)))

@@ -1,0 +1,254 @@
+"""The contract: every task of the registry, on every robot, another body and every arena, keeps it."""
+
+import types
+
+import gymnasium
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import arc_suite
+from arc_suite.arenas import ARENAS
+from arc_suite.envs.scene import prepared
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.simulation.batch import Batch
+from arc_suite.tasks import TASKS
+from arc_suite.tasks.contract import Inputs
+from arc_suite.tasks.walk import Walk
+
+BODIES = {**ROBOTS, "random": generator.random_body(3)}
+every_task = pytest.mark.parametrize("task_name", TASKS)
+every_body = pytest.mark.parametrize("body", BODIES)
+every_arena = pytest.mark.parametrize("arena", ARENAS)
+
+
+def frozen(memory):
+    """The memory with arrays that refuse to be written."""
+    for field in memory:
+        if isinstance(field, np.ndarray):
+            field.flags.writeable = False
+    return memory
+
+
+def started(task, seed=0):
+    """A simulation of one row at the start of an episode, its data, and the memory."""
+    _, model = prepared(task.scene.body, task.name, {"arena": task.scene.arena})
+    batch = Batch(model, 1, 1, task.reads)
+    start = task.start(np.random.RandomState(seed), task.first())
+    row = np.ones(1, bool)
+    batch.reset(row, start.qpos[None], start.qvel[None])
+    memory = frozen(start.memory)
+    lifted = task.lift(memory, task.read(read_only(batch, task)))
+    if lifted is not None:
+        batch.place(row, lifted[None])
+    return batch, frozen(task.begin(memory, task.read(read_only(batch, task))))
+
+
+def read_only(batch, task):
+    """The fields that a task declares, of the first row, which nobody can write."""
+    fields = {name: getattr(batch.data, name)[0].copy() for name in task.reads}
+    for field in fields.values():
+        field.flags.writeable = False
+    return types.SimpleNamespace(**fields)
+
+
+@every_task
+@every_body
+@every_arena
+def test_functions_are_pure_and_read_what_is_declared(task_name, body, arena):
+    task, _ = prepared(BODIES[body], task_name, {"arena": arena})
+    batch, memory = started(task)
+    rng = np.random.RandomState(1)
+    for _ in range(5):
+        action = rng.uniform(-0.3, 0.3, len(task.scene.body.joint_names))
+        action.flags.writeable = False
+        before, inputs = task.before(memory, action)
+        batch.data.ctrl[0] = inputs.ctrl
+        batch.step(25, np.ones(1, bool))
+        readings = task.read(read_only(batch, task))
+        memory = frozen(task.after(frozen(before), readings))
+        for function in (task.after, task.terms, task.observe, task.ended):
+            arguments = (before if function == task.after else memory), readings
+            for once, again in zip(leaves(function(*arguments)), leaves(function(*arguments)), strict=True):
+                assert_array_equal(once, again)
+        assert type(memory) is type(before)
+        assert task.terms(memory, readings).keys() == task.settings.weights.keys()
+        assert {name: block.shape for name, block in task.observe(memory, readings).items()} == {
+            name: (size,) for name, size in task.blocks.items()
+        }
+        assert all(np.shape(figure) == () for figure in task.progress(memory).values())
+
+
+def leaves(value):
+    if isinstance(value, dict):
+        value = list(value.values())
+    return [np.asarray(item) for item in value]
+
+
+@every_task
+@every_body
+def test_the_number_of_draws_is_fixed(task_name, body):
+    """Whatever is drawn, and whatever the settings are, the stream is at the same place afterwards."""
+    task, _ = prepared(BODIES[body], task_name)
+    numbers = []
+    for seed in range(20):
+        random = Counting(seed)
+        task.start(random, task.first())
+        numbers.append(random.draws)
+    assert len(set(numbers)) == 1 and numbers[0] > 0
+
+
+class Counting(np.random.RandomState):
+    """Counts the numbers that are drawn, as every draw of an array asks for its size."""
+
+    draws = 0
+
+    def uniform(self, *arguments, **keywords):
+        return self._counted(super().uniform(*arguments, **keywords))
+
+    def standard_normal(self, *arguments, **keywords):
+        return self._counted(super().standard_normal(*arguments, **keywords))
+
+    def randint(self, *arguments, **keywords):
+        return self._counted(super().randint(*arguments, **keywords))
+
+    def _counted(self, drawn):
+        self.draws += np.size(drawn)
+        return drawn
+
+
+@every_task
+@every_body
+@every_arena
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, arena, threads):
+    """Over several episodes, among rows that fall or stand still at other times."""
+    settings = {"arena": arena, "time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}
+    rows = VectorEnv(BODIES[body], task_name, 3, threads, task_kwargs=settings)
+    single = gymnasium.make(SINGLE, domain_name=BODIES[body], task_name=task_name, task_kwargs=settings)
+    observations, observation = rows.reset(seed=40)[0], single.reset(seed=41)[0]
+    assert_array_equal(observations[1], observation)
+    random, ended, episodes = np.random.RandomState(0), False, 0
+    for step in range(45):
+        action = random.uniform(-1.0, 1.0, rows.single_action_space.shape).astype(np.float32)
+        if step == 6:  # a row that starts in mid-episode of the others
+            rows.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
+        observations, rewards, terminated, truncated, infos = rows.step(np.stack([0.1 * action, action, -action]))
+        if ended:
+            (observation, _), ended, episodes = single.reset(), False, episodes + 1
+        else:
+            observation, reward, *ends, info = single.step(action)
+            ended = any(ends)
+            assert (rewards[1], terminated[1], truncated[1]) == (reward, *ends)
+            for group, figures in info.items():
+                assert {name: infos[group][name][1] for name in figures} == figures
+        assert_array_equal(observations[1], observation)
+    assert episodes >= 2
+    rows.close()
+
+
+SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take the place of
+
+
+@every_task
+def test_settings_check_themselves(task_name):
+    for settings, message in (
+        ({"targt_velocity": 1.0}, "unknown setting of walk 'targt_velocity'; did you mean 'target_velocity'?"),
+        ({"weights": {"helthy": 1.0}}, "unknown weight 'helthy'; did you mean 'healthy'?"),
+        ({"arena": "bump"}, "unknown arena 'bump'; did you mean 'bumps'? (there are: flat, bumps)"),
+        ({"time_limit": 0}, "time_limit: expected a finite number from 1e-09 to inf, got 0"),
+    ):
+        with pytest.raises(ValueError) as error:
+            arc_suite.load("tick", task_name, settings)
+        assert str(error.value).startswith(message) and "\n" not in str(error.value)
+
+
+class Careless(Walk):
+    """Appends three numbers to the observation without declaring them."""
+
+    name = "careless"
+
+    def observe(self, memory, readings):
+        observed = super().observe(memory, readings)
+        return observed | {"gait_clock": np.concatenate([observed["gait_clock"], np.zeros(3)], axis=-1)}
+
+
+class Misplaced(Walk):
+    """Has the blocks in another order than it declares."""
+
+    name = "misplaced"
+
+    def observe(self, memory, readings):
+        return dict(reversed(super().observe(memory, readings).items()))
+
+
+class Silent(Walk):
+    """Leaves out a block that it declares."""
+
+    name = "silent"
+
+    def observe(self, memory, readings):
+        observed = super().observe(memory, readings)
+        return {name: observed[name] for name in list(observed)[:-1]}
+
+
+@pytest.mark.parametrize(
+    ("task", "observed"),
+    [
+        (Careless, "{'posture': 17, 'velocities': 18, 'contact_forces': 126, 'gait_clock': 5}"),
+        (Misplaced, "{'gait_clock': 2, 'contact_forces': 126, 'velocities': 18, 'posture': 17}"),
+        (Silent, "{'posture': 17, 'velocities': 18, 'contact_forces': 126}"),
+    ],
+)
+def test_blocks_other_than_declared_are_impossible(monkeypatch, task, observed):
+    monkeypatch.setitem(TASKS, task.name, task)
+    declared = "{'posture': 17, 'velocities': 18, 'contact_forces': 126, 'gait_clock': 2}"
+    environment = arc_suite.load("leaper", task.name)
+    with pytest.raises(ValueError) as error:
+        environment.reset()
+    assert str(error.value) == f"observation of {task.name}: expected blocks {declared}, got {observed}"
+
+
+class Kicked(Walk):
+    """Kicks the torso upwards in the first steps; an episode's length is where the next one starts."""
+
+    name = "kicked"
+
+    def first(self):
+        return 100
+
+    def start(self, random, carry):
+        start = super().start(random, carry)
+        start.qpos[0] = carry
+        return start
+
+    def before(self, memory, action):
+        memory, inputs = super().before(memory, action)
+        kick = np.zeros((*action.shape[:-1], 6 + action.shape[-1]))
+        kick[..., 2] = 0.5 * (memory.tick < 3)
+        return memory, Inputs(inputs.ctrl, kick)
+
+    def carry(self, memory):
+        return int(memory.tick)
+
+
+def test_kicks_and_carries_are_the_same_in_rows(monkeypatch):
+    monkeypatch.setitem(TASKS, "kicked", Kicked)
+    settings = {"time_limit": 0.5}
+    rows = VectorEnv("leaper", "kicked", 2, 1, task_kwargs=settings)
+    plain, single = (arc_suite.load("leaper", name, {"random": 4, **settings}) for name in ("walk", "kicked"))
+    rows.reset(seed=3)
+    plain.reset()
+    assert single.reset() is not None and single.physics.position()[0] == 100.0
+    for step in range(1, 12):
+        plain.step(np.zeros(12))
+        timestep = single.step(np.zeros(12))
+        observations, *_ = rows.step(np.zeros((2, 12)))
+        assert_array_equal(observations[1], np.concatenate(list(timestep.observation.values())).astype(np.float32))
+        if step == 5:
+            assert single.physics.position()[2] > plain.physics.position()[2] + 0.02
+    assert timestep.first() and single.physics.position()[0] == 10.0, "the carry of ten steps"
+    assert single.reset(seed=4) is not None and single.physics.position()[0] == 100.0, "a seed begins a new stream"
+    rows.reset(seed=3)
+    assert_array_equal(rows.batch.data.qpos[:, 0], 100.0)

@@ -1,0 +1,155 @@
+"""Steer: commands that are drawn, held, set from outside and obeyed."""
+
+import gymnasium
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import arc_suite
+from arc_suite import rotations
+from arc_suite.tasks import steer
+
+
+def commands(environment):
+    return environment.task.definition.wanted(environment.task.memory)
+
+
+def test_commands_are_within_their_ranges_and_one_in_ten_stops():
+    random = np.random.RandomState(0)
+    drawn = np.array([steer.draw_command(random) for _ in range(4000)])
+    stops = ~drawn.any(axis=-1)
+    assert 0.07 < stops.mean() < 0.13
+    sizes = np.hypot(drawn[:, 0], drawn[:, 1]) + abs(drawn[:, 2])
+    assert sizes.max() <= 1.0 + 1e-12 and sizes[~stops].min() >= 0.2
+    assert (drawn[~stops, 1] == 0.0).mean() == pytest.approx(0.5, abs=0.05)
+    assert (drawn[~stops, 2] == 0.0).mean() == pytest.approx(0.3, abs=0.05)
+    assert drawn[:, 0].min() < -0.4 and drawn[:, 0].max() > 0.9
+
+
+def test_the_schedule_holds_each_command_and_begins_again():
+    environment = arc_suite.load("tick", "steer", {"random": 0})
+    environment.reset()
+    memory, task = environment.task.memory, environment.task.definition
+    held = np.diff(memory.ends, prepend=0)
+    assert held.min() >= 60 and held.max() <= 160
+    for command, end, length in zip(memory.schedule, memory.ends, held, strict=True):
+        for tick in (end - length, end - 1):
+            assert_array_equal(task.wanted(memory._replace(tick=int(tick))), command)
+    assert_array_equal(task.wanted(memory._replace(tick=int(memory.ends[-1]))), memory.schedule[0])
+
+
+def test_the_command_is_observed_and_changes_on_schedule():
+    environment = arc_suite.load("tick", "steer", {"random": 2})
+    timestep, seen = environment.reset(), []
+    for _ in range(200):
+        assert_array_equal(timestep.observation["command"][:3], commands(environment))
+        seen.append(tuple(timestep.observation["command"][:3]))
+        timestep = environment.step(np.zeros(18))
+    assert len(set(seen)) >= 2
+
+
+def test_motion_is_measured_in_the_frame_of_the_heading():
+    environment = arc_suite.load("tick", "steer", {"random": 0, "base_noise": 0.0, "joint_noise": 0.0})
+    environment.reset()
+    task, memory = environment.task.definition, environment.task.memory
+    heading = 2.0
+    place = np.array([5.0, -3.0, heading])
+    memory = memory._replace(place=place, motion=np.zeros(3))
+    readings = task.read(environment.physics.data.ptr)
+    forward, left, turn = 0.4, -0.1, 0.2  # units a step
+    step = task.scene.control_timestep * task.units
+    moved = place[:2] + forward * step[0] * np.array([np.cos(heading), np.sin(heading)])
+    moved += left * step[1] * np.array([-np.sin(heading), np.cos(heading)])
+    readings = readings._replace(
+        frame_position=np.array([*moved, 0.2]),
+        torso_quaternion=rotations.turned(np.array([1.0, 0.0, 0.0, 0.0]), heading + turn * step[2]),
+    )
+    leak = task.parameters.gait_frequency * task.scene.control_timestep
+    assert_allclose(task.after(memory, readings).motion, leak * np.array([forward, left, turn]), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "motion", "tracking"),
+    [
+        ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), 1.0),
+        ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0),
+        ((1.0, 0.0, 0.0), (0.625, 0.0, 0.0), 0.5),
+        ((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), 0.0),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0),
+        ((0.6, 0.0, 0.4), (0.6, 0.0, 0.4 - 0.1875), 0.5),
+    ],
+)
+def test_tracking_is_the_product_of_course_and_turning(wanted, motion, tracking):
+    environment = arc_suite.load("queen", "steer", {"random": 0})
+    environment.reset()
+    memory = environment.task.memory._replace(command=np.array(wanted), motion=np.array(motion))
+    assert_allclose(environment.task.definition.tracked(memory), tracking, atol=1e-12)
+
+
+def test_a_live_command_takes_the_place_of_the_schedule_until_the_next_episode():
+    environment = arc_suite.load("leaper", "steer", {"random": 1, "time_limit": 1.0})
+    environment.reset()
+    scheduled = commands(environment).copy()
+    environment.command("command", (0.5, np.nan, -0.25))
+    timestep = environment.step(np.zeros(12))
+    assert_array_equal(timestep.observation["command"][:3], [0.5, scheduled[1], -0.25])
+    environment.command("command", None)
+    assert_array_equal(commands(environment), scheduled)
+    environment.command("command", (1.0, 0.0, 0.0))
+    environment.reset()
+    assert np.isnan(environment.task.memory.command).all()
+
+
+def test_live_commands_of_rows_are_those_of_single_environments():
+    envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
+    env = gymnasium.make("arc_suite/tick-steer-v0")
+    envs.reset(seed=5), env.reset(seed=6)
+    command = np.array([0.3, 0.1, -0.2])
+    envs.command("command", command, rows=np.array([False, True, False]))
+    env.unwrapped.command("command", command)
+    for _ in range(5):
+        observations, rewards, *_ = envs.step(np.zeros(envs.action_space.shape))
+        observation, reward, *_ = env.step(np.zeros(18, np.float32))
+        assert_array_equal(observations[1], observation)
+        assert rewards[1] == reward
+    blocks = envs.task.split(observations)
+    assert_array_equal(blocks["command"][1, :3], command.astype(np.float32))
+    assert not np.array_equal(blocks["command"][0, :3], blocks["command"][1, :3])
+    envs.close()
+
+
+@pytest.mark.parametrize(
+    ("task", "name", "value", "message"),
+    [
+        ("walk", "command", (1, 0, 0), "command 'command': task walk has no commands"),
+        ("steer", "comand", (1, 0, 0), "unknown command 'comand'; did you mean 'command'? (there are: command)"),
+        ("steer", "command", (1, 0), "command 'command': expected 3 finite numbers, got (1, 0)"),
+        ("steer", "command", (1, 0, np.inf), "command 'command': expected 3 finite numbers, got (1, 0, inf)"),
+        ("steer", "command", "go", "command 'command': expected 3 finite numbers, got 'go'"),
+    ],
+)
+def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, message):
+    single = arc_suite.load("tick", task)
+    single.reset()
+    rows = gymnasium.make_vec(f"arc_suite/tick-{task}-v0", num_envs=2)
+    rows.reset(seed=0)
+    for environment in (single, rows):
+        with pytest.raises(ValueError) as error:
+            environment.command(name, value)
+        assert str(error.value) == message
+    rows.close()
+
+
+def test_an_obedient_body_earns_what_a_standing_one_does_not():
+    """With the command straight ahead, a demonstrator that walks straight is far better than none."""
+    from arc_suite.cpg import Demonstrator
+
+    totals = {}
+    for name, policy in (("tuned", Demonstrator("tick", "tuned")), ("none", lambda timestep: np.zeros(18))):
+        environment = arc_suite.load("tick", "steer", {"random": 0})
+        timestep, totals[name] = environment.reset(), 0.0
+        for _ in range(300):
+            environment.command("command", (1.0, 0.0, 0.0))
+            timestep = environment.step(policy(timestep))
+            totals[name] += environment.task.terms["tracking"]
+    assert totals["tuned"] > 150.0 > 10.0 > totals["none"]
