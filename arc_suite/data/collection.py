@@ -79,8 +79,8 @@ def collect(
 
 
 def _check(settings: Settings, episodes: int) -> None:
-    if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
-        raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
+    checks.number("noise", settings.noise, 0.0)
+    checks.integer("steps", settings.steps, 1)
     checks.seed(settings.seed)
     checks.seed(settings.seed + episodes - 1)
     _policy(settings, rows=1)  # finds out whether there is such a policy

@@ -19,6 +19,7 @@ from arc_suite.robots import ROBOTS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
 ID = "arc_suite/test/some-v0"
+slowly = functools.partial(pytest.param, marks=pytest.mark.slow)
 SETTINGS = data.Settings(ROBOTS["tick"], "random", (), steps=4)
 
 collect = functools.partial(data.collect, progress=functools.partial(tqdm, disable=True))
@@ -84,7 +85,10 @@ def killed_at(count, **arguments):
     return process.exitcode == 9
 
 
-@pytest.mark.parametrize("scenario", ["new", "new after another", "more episodes", "overwrite", "overwrite twice"])
+@pytest.mark.parametrize(
+    "scenario",
+    ["new", "more episodes", *(slowly(name) for name in ("new after another", "overwrite", "overwrite twice"))],
+)
 def test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it(root, scenario):
     old = SETTINGS._replace(seed=9)
     collect("arc_suite/test/old-v0", old, 3)
@@ -140,7 +144,7 @@ def last_line(text):
 @pytest.mark.parametrize(
     ("accident", "status", "line"),
     [
-        ("kill", -signal.SIGKILL, None),
+        slowly("kill", -signal.SIGKILL, None),
         ("interrupt", 130, f"collect.py: interrupted; 5 of 8 episodes of {ID!r} are kept"),
         (
             "nan",
@@ -211,3 +215,11 @@ def test_a_damaged_part_is_named_and_overwrite_mends_it(root):
                 collect(ID, SETTINGS, 6)
         collect(ID, SETTINGS, 6, overwrite=True)
         assert len(digests()) == 6
+
+
+def test_a_folder_that_cannot_be_made_is_named(root):
+    (root / ID).mkdir(parents=True)
+    (root / ID / "data").touch()
+    with pytest.raises(OSError) as error:
+        collect(ID, data.Settings(ROBOTS["queen"]), 1)
+    assert str(error.value) == f"cannot make folder {root / ID / 'data'}: file exists"
