@@ -1,6 +1,7 @@
 """Checks of names, seeds and numbers, whose errors are one line with one wording."""
 
 import difflib
+import json
 import math
 import operator
 from collections.abc import Iterable, Mapping
@@ -98,3 +99,15 @@ def mapping(what: str, value: Any) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise ValueError(f"{what}: expected a mapping of names to values, got {value!r}")
     return value
+
+
+def json_text(what: str, value: Any) -> str:
+    """Return the value as JSON, with the keys of mappings in order.
+
+    Raises:
+        ValueError: it holds something that JSON cannot; one line.
+    """
+    try:
+        return json.dumps(value, sort_keys=True)
+    except TypeError as error:
+        raise ValueError(f"{what}: expected values that JSON can hold: {error}") from None

@@ -1,4 +1,4 @@
-"""Collecting a dataset."""
+"""Collects datasets: plays the episodes that are missing, and keeps what is finished whatever happens."""
 
 import contextlib
 import math
@@ -34,7 +34,7 @@ def collect(
     overwrite: bool = False,
     progress: Callable = tqdm,
 ) -> int:
-    """Collects the episodes that a dataset does not have yet.
+    """Collect the episodes that a dataset does not have yet.
 
     Args:
         dataset_id: Minari's.
@@ -46,7 +46,7 @@ def collect(
         progress: makes progress bars as `tqdm` does.
 
     Returns:
-        How many episodes were missing.
+        The number of episodes that were missing.
 
     Raises:
         ValueError: settings that do not fit, a dataset that is damaged or has other settings, or a
@@ -55,8 +55,8 @@ def collect(
         KeyboardInterrupt: likewise.
     """
     _check(settings, episodes)
+    provenance, specification = settings.provenance(), settings.environment_spec().to_json()
     with Storage.opened(dataset_id, overwrite) as storage:
-        provenance, specification = settings.provenance(), settings.environment_spec().to_json()
         if storage.metadata is not None:
             difference = _difference(storage.metadata, provenance, specification)
             if difference and storage.kept and not overwrite:
@@ -79,11 +79,11 @@ def collect(
 
 
 def _check(settings: Settings, episodes: int) -> None:
-    if not (math.isfinite(settings.noise) and settings.noise >= 0.0):
-        raise ValueError(f"noise: expected a number from 0, got {settings.noise}")
+    checks.number("noise", settings.noise, 0.0)
+    checks.integer("steps", settings.steps, 1)
     checks.seed(settings.seed)
     checks.seed(settings.seed + episodes - 1)
-    _policy(settings, rows=1).begin([0], [settings.seed])  # finds out whether there is such a policy
+    _policy(settings, rows=1)  # finds out whether there is such a policy
 
 
 def _policy(settings: Settings, rows: int) -> policies.Policy:
@@ -91,12 +91,15 @@ def _policy(settings: Settings, rows: int) -> policies.Policy:
 
 
 def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
-    """The first difference between what a dataset was and would be collected with, in words."""
+    """Return in words the first difference between what a dataset was and would be collected with; None for none."""
     was = metadata["arc_suite"]
     for group in ("settings", "versions"):
         for name, value in provenance[group].items():
-            if was[group].get(name) != value:
-                return f"its {name} is {was[group].get(name)!r}, and not {value!r}"
+            if was[group].get(name) == value:
+                continue
+            if name == "presets_sha256":
+                return f"its presets {' and '.join(provenance['settings']['presets'])} had other numbers"
+            return f"its {name} is {was[group].get(name)!r}, and not {value!r}"
     if was["model_sha256"] != provenance["model_sha256"]:
         return f"the sha256 of its model is {was['model_sha256'][:12]}, and not {provenance['model_sha256'][:12]}"
     if metadata["env_spec"] != specification:
@@ -105,7 +108,7 @@ def _difference(metadata: dict, provenance: dict, specification: str) -> str | N
 
 
 def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, threads, progress: Callable) -> None:
-    """Plays the missing episodes into the storage."""
+    """Play the missing episodes into the storage."""
     rows = math.ceil(len(missing) / math.ceil(len(missing) / rows))  # all rows busy to the end, or nearly
     environment = settings.environment(rows, threads)
     seeds = [settings.seed + index for index in missing]
@@ -146,7 +149,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
 
 
 def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str, threads) -> dict:
-    """Minari's metadata, but for the counts."""
+    """Return Minari's metadata, but for the counts."""
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     environment = settings.environment(evaluation.EPISODES, threads)
@@ -171,7 +174,7 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
 
 
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
-    """Over the seeds of the evaluation protocol, one in each row of the environment."""
+    """Return the mean return over the seeds of the evaluation protocol, one in each row of the environment."""
     count = environment.num_envs
     played = rollouts.play(environment, _policy(settings, count), range(count), settings.steps)
     totals = {episode.seed: episode.total for step in played for episode in step.finished}

@@ -1,4 +1,4 @@
-"""Datasets, opened to be read."""
+"""Opens datasets to be read."""
 
 import contextlib
 import json
@@ -13,14 +13,13 @@ from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import Settings
 from arc_suite.envs.dm import load
-from arc_suite.robots.spec import Body
 
 METADATA = "metadata.json"
 MAIN = "main_data.hdf5"
 
 
 def open(dataset_id: str) -> "Dataset":
-    """Opens a dataset that `tools/collect.py` has written.
+    """Open a dataset that `collect` has written.
 
     Args:
         dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari says where datasets lie.
@@ -38,49 +37,30 @@ class Dataset:
         id: Minari's.
         path: its folder.
         metadata: Minari's for the dataset; "arc_suite" holds `settings`, `versions` and `model_sha256`.
-        body: what moved.
-        task: name of the task.
-        task_kwargs: settings of the task.
-        steps: after which episodes were truncated.
+        settings: what the episodes depend on.
     """
 
     def __init__(self, dataset_id: str, path: Path):
-        """Reads the metadata; see `open`."""
+        """Read the metadata; see `open`."""
         self.id, self.path = dataset_id, path
         self.metadata = read_metadata(dataset_id, path)
         with damages(dataset_id, path / "data" / METADATA):
-            specification = json.loads(self.metadata["env_spec"])
-            domain = specification["kwargs"]["domain_name"]
-            self.task: str = specification["kwargs"]["task_name"]
-            self.task_kwargs: dict = specification["kwargs"].get("task_kwargs", {})
-            self.steps = operator.index(specification["max_episode_steps"])
+            known = self.metadata["arc_suite"]["settings"]
+            fields = {name: known[name] for name in Settings._fields} | {"presets": tuple(known["presets"])}
+            names = json.loads(self.metadata["env_spec"])["kwargs"]  # with the modules that register them
+            domain, task = names["domain_name"], names["task_name"]
             self._length = operator.index(self.metadata["total_episodes"])
-        self.body: Body = registry.body_of(domain)
-
-    @property
-    def settings(self) -> Settings:
-        """What the episodes depend on."""
-        known = self.metadata["arc_suite"]["settings"]
-        return Settings(
-            self.body,
-            known["policy"],
-            tuple(known["presets"]),
-            known["noise"],
-            known["seed"],
-            self.steps,
-            self.task,
-            self.task_kwargs,
-        )
+        self.settings = Settings(**fields | {"body": registry.body_of(domain), "task": task})
 
     def environment(self):
         """Return the dm_env in which the episodes play."""
-        return load(self.body, self.task, self.task_kwargs)
+        return load(self.settings.body, self.settings.task, self.settings.task_kwargs)
 
     def __len__(self) -> int:
         return self._length
 
     def __getitem__(self, index: int) -> Episode:
-        """Reads one episode.
+        """Read one episode.
 
         Raises:
             IndexError: there is none.
@@ -94,7 +74,7 @@ class Dataset:
         return (self[index] for index in range(len(self)))
 
     def summaries(self) -> list[dict]:
-        """The metadata of every episode: `seed`, `length`, `return`, `sha256`, and `preset` if there is one.
+        """Return the metadata of every episode: `seed`, `length`, `return`, `sha256`, and `preset` if there is one.
 
         Raises:
             ValueError: the file is damaged; one line.
@@ -104,7 +84,7 @@ class Dataset:
 
     @contextlib.contextmanager
     def reading(self):
-        """Yields the open HDF5 file; what goes wrong in reading it becomes a ValueError of one line."""
+        """Yield the open HDF5 file; what goes wrong in reading it becomes a ValueError of one line."""
         path = self.path / "data" / MAIN
         with damages(self.id, path), h5py.File(path, "r") as file:
             yield file
@@ -112,7 +92,7 @@ class Dataset:
 
 @contextlib.contextmanager
 def damages(dataset_id: str, file: Path):
-    """Turns what h5py raises at a damaged file into a ValueError of one line that names dataset and file."""
+    """Turn what h5py raises at a damaged file into a ValueError of one line that names dataset and file."""
     try:
         yield
     except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
@@ -120,7 +100,7 @@ def damages(dataset_id: str, file: Path):
 
 
 def read_metadata(dataset_id: str, path: Path) -> dict:
-    """The metadata of a dataset in a folder.
+    """Return the metadata of a dataset in a folder.
 
     Raises:
         ValueError: it is damaged, or the dataset is not of this suite; one line.

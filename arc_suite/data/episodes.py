@@ -38,17 +38,17 @@ class Episode(NamedTuple):
 
     @property
     def length(self) -> int:
-        """Control steps."""
+        """Number of control steps."""
         return len(self.rewards)
 
     @property
     def total(self) -> float:
-        """The return: the sum of the rewards, undiscounted."""
+        """Return of the episode: the sum of its rewards, undiscounted."""
         return float(self.rewards.sum())
 
     @property
     def nbytes(self) -> int:
-        """Size of the arrays."""
+        """Size of all arrays, bytes."""
         return sum(array.nbytes for array in self.arrays().values())
 
     def playback(self) -> Script:
@@ -60,7 +60,7 @@ class Episode(NamedTuple):
         return Script(lambda seed: self.actions, 1, self.actions.shape[1])
 
     def digest(self) -> str:
-        """The sha256 of everything in it: equal for episodes that are equal to the bit."""
+        """Return the sha256 of the whole episode: equal for episodes that are equal to the bit."""
         total = hashlib.sha256(f"{self.seed} {self.preset}".encode())
         for name, array in sorted(self.arrays().items()):
             total.update(f"{name} {array.dtype.str} {array.shape}".encode())
@@ -68,13 +68,13 @@ class Episode(NamedTuple):
         return total.hexdigest()
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """All arrays by their paths in the file."""
+        """Return all arrays by their paths in the file."""
         terms = {f"{TERMS}/{name}": term for name, term in self.terms.items()}
         return {name: getattr(self, name) for name in ARRAYS} | terms
 
 
 def write(file, index: int, episode: Episode) -> None:
-    """Writes an episode into an open HDF5 file, as `episode_<index>`.
+    """Write an episode into an open HDF5 file, as `episode_<index>`.
 
     Attributes of the group, which Minari shows as the episode's metadata: `id`, `seed`,
     `total_steps`, `length`, `return`, `preset` if there is one, and `sha256`, the digest.
@@ -90,7 +90,7 @@ def write(file, index: int, episode: Episode) -> None:
 
 
 def read(file, index: int) -> Episode:
-    """Reads an episode from an open HDF5 file.
+    """Read an episode from an open HDF5 file.
 
     Raises:
         ValueError: its attributes, the digest among them, are not those of what is in it.

@@ -12,7 +12,7 @@ _VERSIONED = re.compile(r"-v\d+$")
 
 
 def check(dataset_id: str) -> str:
-    """Returns the id if Minari admits it, and it does not lie within another dataset.
+    """Return the id if Minari admits it, and it does not lie within another dataset.
 
     Raises:
         ValueError: it is no such id, or the version is missing; one line with an example.
@@ -36,19 +36,19 @@ def _valid(dataset_id: str) -> bool:
 
 
 def folder(dataset_id: str) -> Path:
-    """Where a dataset of this id lies, or would lie."""
+    """Return the folder in which a dataset of this id lies, or would lie."""
     return get_dataset_path(check(dataset_id))
 
 
 def existing() -> list[str]:
-    """Ids of all datasets on this machine, hidden folders left out."""
+    """Return the ids of all datasets on this machine, hidden folders left out."""
     root = get_dataset_path()
     found = sorted(path.parent.parent.relative_to(root) for path in root.rglob("data/metadata.json"))
     return [path.as_posix() for path in found if not any(part.startswith(".") for part in path.parts)]
 
 
 def find(dataset_id: str) -> Path:
-    """Where a dataset lies.
+    """Return the folder in which a dataset lies.
 
     Raises:
         ValueError: a malformed id, or no such dataset; one line that names the nearest there is.

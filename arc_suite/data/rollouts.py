@@ -1,4 +1,4 @@
-"""Seeded episodes, played in the rows of a vector environment."""
+"""Plays seeded episodes in the rows of a vector environment."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Step(NamedTuple):
 
 
 def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: int) -> Iterator[Step]:
-    """Plays one episode for each seed; a row whose episode ends starts the next one at once.
+    """Play one episode for each seed; a row whose episode ends starts the next one at once.
 
     An episode depends on its seed and the policy alone, not on rows, threads or its neighbours.
     Actions are rounded to float32 before they are applied, so that what is recorded is what was done.
@@ -84,12 +84,12 @@ class _Recording:
         self._terms = None
 
     def begin(self, row: int, observations) -> None:
-        """Starts an episode in a row."""
+        """Start an episode in a row."""
         self._clock[row] = 0
         self._observations[row, 0] = observations[row]
 
     def add(self, actions, observations, rewards, terms) -> None:
-        """Takes a step of all rows down; rows that are done write over their last one."""
+        """Take down a step of all rows; rows that are done write over their last one."""
         names = [name for name in terms if not name.startswith("_")]
         if self._terms is None:
             self._terms = {name: np.empty_like(self._rewards) for name in names}
@@ -102,7 +102,7 @@ class _Recording:
         self._observations[self._rows, np.minimum(self._clock, self._last + 1)] = observations
 
     def episode(self, row: int, seed: int, terminated: bool, truncated: bool) -> Episode:
-        """A copy of the episode that has just ended in a row."""
+        """Return a copy of the episode that has just ended in a row."""
         length = self._clock[row]
         ends = np.arange(1, length + 1) == length
         return Episode(

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from arc_suite import registry, versions
+from arc_suite import checks, registry, versions
 from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.envs.scene import prepared
 from arc_suite.envs.vector import VectorEnv
@@ -33,7 +33,7 @@ class Settings(NamedTuple):
             for other policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
         seed: of the first episode.
-        steps: after which an episode is truncated, 1000 at most.
+        steps: after which an episode is truncated, if its task has not ended it before.
         task: name of the task.
         task_kwargs: its settings, as in `arc_suite.load`; plain values, which JSON can hold.
     """
@@ -112,10 +112,7 @@ class Settings(NamedTuple):
         }
 
     def _settings_text(self) -> str:
-        try:
-            return json.dumps(self.task_kwargs, sort_keys=True)
-        except TypeError as error:
-            raise ValueError(f"task_kwargs: expected values that JSON can hold: {error}") from None
+        return checks.json_text("task_kwargs", self.task_kwargs)
 
 
 def model_sha256(body: Body, task: str, task_kwargs: Mapping[str, Any]) -> str:

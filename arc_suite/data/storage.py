@@ -43,7 +43,7 @@ class Storage:
     """
 
     def __init__(self, dataset_id: str, folder: Path, place: Path, early: bool):
-        """Finds out what is in the folder, which moves to its place with the first episodes (early), or at the end."""
+        """Find out what is in the folder, which moves to its place with the first episodes (early), or at the end."""
         self.id, self.metadata = dataset_id, None
         self._folder, self._place = folder, place
         self._early = early
@@ -59,7 +59,7 @@ class Storage:
     @classmethod
     @contextlib.contextmanager
     def opened(cls, dataset_id: str, overwrite: bool) -> Iterator[Self]:
-        """Opens a dataset to collect into; no other process can meanwhile.
+        """Open a dataset to collect into; no other process can meanwhile.
 
         Args:
             dataset_id: of a dataset that is there or of a new one.
@@ -93,11 +93,11 @@ class Storage:
 
     @property
     def kept(self) -> frozenset[int]:
-        """Indices of the episodes that are on disk."""
+        """Return the indices of the episodes that are on disk."""
         return frozenset(self._where)
 
     def clear(self) -> None:
-        """Forgets what an overwriting collection that was given up has left."""
+        """Forget what an overwriting collection that was given up has left."""
         data = self._folder / "data"
         (data / MAIN).unlink(missing_ok=True)
         if (data / PARTS).exists():
@@ -106,7 +106,7 @@ class Storage:
         self._where, self.metadata, self.merged = {}, None, False
 
     def add(self, finished: Mapping[int, Episode]) -> None:
-        """Puts finished episodes on disk, by index, and lets Minari see them up to the first that is missing.
+        """Put finished episodes on disk, by index, and let Minari see them up to the first that is missing.
 
         Raises:
             OSError: a file cannot be written; one line that names it. What was there before is still.
@@ -129,7 +129,7 @@ class Storage:
         self._publish()
 
     def finish(self, progress: Callable) -> None:
-        """Merges the parts into one file, and puts a dataset that replaces another in its place.
+        """Merge the parts into one file, and put a dataset that replaces another in its place.
 
         Args:
             progress: wraps an iterable of the episodes' indices, such as `tqdm`.
@@ -166,11 +166,11 @@ class Storage:
                     self._where[int(name.removeprefix("episode_"))] = part, int(group.attrs["total_steps"])
 
     def _count(self) -> int:
-        """Episodes before the first that is missing."""
+        """Return the number of episodes before the first that is missing."""
         return next(index for index in itertools.count() if index not in self._where)
 
     def _size(self) -> int:
-        """Bytes of the files that hold episodes."""
+        """Return the size of the files that hold episodes, bytes."""
         return sum((self._folder / "data" / part).stat().st_size for part in {part for part, _ in self._where.values()})
 
     def _publish(self) -> None:
@@ -197,7 +197,7 @@ class Storage:
         _synchronise(path.parent)
 
     def _write(self, name: str, file: h5py.File) -> None:
-        """Writes a file that was put together in memory, so that a full disk is Python's error and not HDF5's."""
+        """Write a file that was put together in memory, so that a full disk is Python's error and not HDF5's."""
         file.flush()
         path = self._folder / "data" / name
         with files.writing(path) as temporary, _one_line(path):
@@ -206,7 +206,7 @@ class Storage:
         _synchronise(path.parent)
 
     def _move(self) -> None:
-        """Puts the folder in its place."""
+        """Put the folder in its place."""
         if self._folder == self._place:
             return
         old = self._place.with_name(f".{self._place.name}.old")
@@ -236,7 +236,7 @@ def _locked(folder: Path, dataset_id: str):
 
 
 def _image():
-    """An HDF5 file in memory."""
+    """Return an HDF5 file in memory."""
     return h5py.File("image", "w", driver="core", backing_store=False)
 
 
@@ -250,7 +250,7 @@ def _one_line(path: Path):
 
 
 def _synchronise(path: Path) -> None:
-    """Waits until a file or folder is on the disk."""
+    """Wait until a file or folder is on the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

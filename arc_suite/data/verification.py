@@ -1,11 +1,11 @@
-"""Replaying a dataset."""
+"""Verifies datasets: replays them and compares to the bit."""
 
 import contextlib
 from collections.abc import Callable
 
 from tqdm import tqdm
 
-from arc_suite import versions
+from arc_suite import registry, versions
 from arc_suite.data import rollouts
 from arc_suite.data.collection import ROWS
 from arc_suite.data.dataset import open
@@ -22,33 +22,37 @@ def verify(
     threads: int | None = None,
     progress: Callable = tqdm,
 ) -> int:
-    """Replays every episode of a dataset from its seed and compares everything to the bit.
+    """Replay every episode of a dataset from its seed and compare everything to the bit.
 
     Args:
         dataset_id: Minari's.
-        body: what should have walked; None for any.
+        body: what should have moved; None for any.
         rows: how many are replayed at a time.
         threads: on which to simulate; None for all cores.
         progress: makes a progress bar as `tqdm` does.
 
     Returns:
-        How many episodes there are.
+        The number of episodes.
 
     Raises:
         ValueError: the dataset is missing, damaged, of another body, model or version, or its replay
             differs; one line.
     """
     dataset = open(dataset_id)
-    if body not in (None, dataset.body):
-        raise ValueError(f"dataset {dataset_id!r} holds episodes of {dataset.body.name}, and not of {body.name}")
-    was = dataset.metadata["arc_suite"]
+    settings, was = dataset.settings, dataset.metadata["arc_suite"]
+    if body not in (None, settings.body):
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of {settings.body.name}, and not of {body.name}")
     for package, version in versions.recorded().items():
         if was["versions"].get(package) != version:
             there = f"{package} {was['versions'].get(package)}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
-    if was["model_sha256"] != model_sha256(dataset.body, dataset.task, dataset.task_kwargs):
-        raise ValueError(f"dataset {dataset_id!r} was collected with another model of {dataset.body.name}")
-    count, first = len(dataset), was["settings"]["seed"]
+    version, task = was["settings"].get("task_version"), registry.task_of(settings.task)
+    if version != task.version:
+        there = f"version {version} of {task.name}"
+        raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {task.version} is installed")
+    if was["model_sha256"] != model_sha256(settings.body, settings.task, settings.task_kwargs):
+        raise ValueError(f"dataset {dataset_id!r} was collected with another model of {settings.body.name}")
+    count, first = len(dataset), settings.seed
     if not count:
         return 0
     rows = min(rows, count)
@@ -61,11 +65,11 @@ def verify(
         recorded[seed] = episode
         return episode.actions
 
-    environment = dataset.settings.environment(rows, threads)
+    environment = settings.environment(rows, threads)
     replayer = Script(script, *environment.action_space.shape)
     bar = progress(desc="replaying", leave=False, total=dataset.metadata["total_steps"], unit="step", unit_scale=True)
     with contextlib.closing(environment), bar:
-        for step in rollouts.play(environment, replayer, range(first, first + count), dataset.steps):
+        for step in rollouts.play(environment, replayer, range(first, first + count), settings.steps):
             bar.update(step.playing)
             for episode in step.finished:
                 there = recorded.pop(episode.seed)
@@ -76,7 +80,7 @@ def verify(
 
 
 def _difference(recorded: Episode, replayed: Episode) -> str:
-    """The array and the row in which episodes differ first."""
+    """Return in words where episodes differ first: the array and the row."""
     if recorded.length != replayed.length:
         return f"{recorded.length} steps were recorded, {replayed.length} replayed"
     for (name, there), here in zip(recorded.arrays().items(), replayed.arrays().values(), strict=True):

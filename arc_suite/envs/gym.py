@@ -52,7 +52,7 @@ class Env(DmControlCompatibilityV0):
         height: int = 480,
         camera_id: int | str = "tracking",
     ):
-        """Loads the task.
+        """Load the task.
 
         Args:
             domain_name: a robot; see `arc_suite.load`.
@@ -102,7 +102,7 @@ class Env(DmControlCompatibilityV0):
         self._np_random_seed = -1
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
-        """Starts an episode.
+        """Start an episode.
 
         Args:
             seed: None to continue the stream of random numbers, or an integer to start a new one.
@@ -125,7 +125,7 @@ class Env(DmControlCompatibilityV0):
         return _flat(observation), {}
 
     def step(self, action):
-        """Advances by one control step.
+        """Advance by one control step.
 
         Args:
             action: (motors,), clipped to [-1, 1].
@@ -160,7 +160,7 @@ class Env(DmControlCompatibilityV0):
         self._env.command(name, value)
 
     def render(self):
-        """A picture of the present state in the mode and size chosen at the start.
+        """Return a picture of the present state in the mode and size chosen at the start.
 
         Returns:
             rgb_array: (height, width, 3) uint8. depth_array: (height, width) float32, m. Else None.
@@ -173,7 +173,7 @@ class Env(DmControlCompatibilityV0):
         return super().render()
 
     def close(self):
-        """Frees the simulation and what it was rendered with; once more does nothing."""
+        """Free the simulation and what it was rendered with; once more does nothing."""
         if self._window is not None:
             self._window.close()
             self._window = None

@@ -1,11 +1,10 @@
 """tools/build_model.py and the bodies it makes to order."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import mujoco
 import numpy as np
+import programs
 import pytest
 from dm_control import mjcf
 
@@ -20,7 +19,7 @@ SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
 
 
 def build_model(*arguments):
-    return subprocess.run([sys.executable, TOOL, *map(str, arguments)], capture_output=True, text=True)
+    return programs.run(TOOL, *arguments)
 
 
 def saved(model):

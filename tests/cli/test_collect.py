@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import sys
 
+import programs
 import pytest
 
 from arc_suite import data
@@ -78,7 +79,7 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
-    done = run("--episodes=2", *arguments)
+    done = programs.run(TOOL, "--episodes=2", *arguments)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"collect.py: {message}\n")
     assert not root.exists()
 

@@ -4,16 +4,15 @@ import importlib.metadata
 import json
 import pathlib
 import re
-import subprocess
-import sys
 
+import programs
 import pytest
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "evaluate.py"
 
 
 def evaluate(*arguments):
-    return subprocess.run([sys.executable, TOOL, *arguments], capture_output=True, text=True)
+    return programs.run(TOOL, *arguments)
 
 
 def test_table_of_all_robots():
@@ -36,7 +35,7 @@ def test_figures_of_a_demonstrator():
     assert low <= iqm <= high
     assert iqm == pytest.approx(2049, rel=0.015)
     assert fields[8] == "1000.0"
-    assert result.stdout.splitlines()[0].split()[-2:] == ["speed", "compliance"]
+    assert result.stdout.splitlines()[0].split()[-2:] == ["speed", "gait_compliance"]
     assert float(fields[9]) == pytest.approx(0.5, abs=0.05)
     assert 0 < float(fields[10]) < 1
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import imageio.v2 as imageio
 import numpy as np
+import programs
 import pytest
 from PIL import Image
 
@@ -179,7 +180,7 @@ def test_a_take_stays_at_its_end():
     ],
 )
 def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):
-    done = render(tmp_path, *arguments)
+    done = programs.run(TOOL, *arguments, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"render.py: {message}\n")
     assert os.listdir(tmp_path) == []
 

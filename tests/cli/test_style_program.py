@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import sys
 
+import programs
 import pytest
 
 from arc_suite import data, style
@@ -154,7 +155,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
-    done = run(*arguments, path=tmp_path)
+    done = programs.run(TOOL, *arguments, path=tmp_path)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == f"style.py: {message}"  # on a line that a progress bar has left
     assert "Traceback" not in done.stderr

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import imageio.v3 as imageio
+import programs
 import pytest
 
 TOOL = Path(__file__).parents[2] / "tools" / "tune_cpg.py"
@@ -71,7 +72,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(arguments, message):
-    done = tune(*arguments)
+    done = programs.run(TOOL, *QUICK, *arguments)
     assert done.returncode == 1
     assert done.stderr.startswith(f"tune_cpg.py: {message}")
     assert done.stderr.count("\n") == 1

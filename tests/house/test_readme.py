@@ -3,10 +3,9 @@
 import pathlib
 import re
 import shlex
-import subprocess
-import sys
 
 import gymnasium
+import programs
 import pytest
 import test_layers
 
@@ -46,7 +45,7 @@ def test_a_command_is_understood(command):
     program, *arguments = shlex.split(command)
     if program == "arc-suite":  # not on the path of every environment; the test of the wheel runs it
         arguments = ["-m", "arc_suite", *arguments]
-    done = subprocess.run([sys.executable, *arguments, "--version"], cwd=ROOT, capture_output=True, text=True)
+    done = programs.run(*arguments, "--version", cwd=ROOT)
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -1,20 +1,20 @@
 """Datasets: Minari opens them, they replay to the bit, and they depend on nothing but seeds and settings."""
 
-import pathlib
 import subprocess
 import sys
 
+import gaitless
 import h5py
 import minari
 import numpy as np
 import pytest
-from datasets import ID, QUEEN, SHORT, TICK, collect, digests, quiet, verify
+from datasets import ID, QUEEN, SHORT, SPIDER, TICK, collect, digests, quiet, verify
 
-from arc_suite import data, evaluation, policies, registry, style, versions
-from arc_suite.robots.spec_files import load_body
+import arc_suite
+from arc_suite import data, evaluation, policies
+from arc_suite.arenas import FLAT
+from arc_suite.cpg.presets import TUNINGS
 
-ROOT = pathlib.Path(__file__).parents[2]
-SPIDER = load_body(ROOT / "examples" / "spider.json")
 OWN = """
 import numpy as np
 def make(robot):
@@ -29,13 +29,17 @@ def make(robot):
 
 
 @pytest.fixture(autouse=True)
-def root(tmp_path, monkeypatch):
-    """Where Minari keeps datasets, and policies are found."""
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+def own(tmp_path, monkeypatch):
+    """Let policies of the module `own` be found."""
     monkeypatch.syspath_prepend(tmp_path)
     (tmp_path / "own.py").write_text(OWN)
     monkeypatch.delitem(sys.modules, "own", raising=False)
-    return tmp_path / "datasets"
+
+
+@pytest.fixture
+def stay():
+    with gaitless.registered():
+        yield
 
 
 def replay(environment, seed, actions):
@@ -51,9 +55,23 @@ def replay(environment, seed, actions):
     return np.array(observations), np.array(rewards), terms, np.array(terminations), np.array(truncations)
 
 
-@pytest.mark.parametrize(("body", "steps"), [(QUEEN, 30), (SPIDER, 20), (TICK, 200)])
-def test_minari_opens_a_dataset_whose_environment_replays_it_to_the_bit(body, steps):
-    settings = data.Settings(body, "random", (), seed=3, steps=steps)
+RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        RANDOM,
+        RANDOM._replace(body=SPIDER, steps=20),
+        RANDOM._replace(body=TICK, steps=200),
+        RANDOM._replace(task="steer", task_kwargs={"gait": "ripple", "weights": {"tracking": 2.0}}),
+        RANDOM._replace(task_kwargs={"arena": "bumps"}),
+        RANDOM._replace(body=SPIDER, task="steer", task_kwargs={"arena": "bumps"}),
+        RANDOM._replace(task="stay"),
+    ],
+    ids=["queen", "spider", "tick", "steer", "bumps", "spider steers on bumps", "no gait"],
+)
+def test_minari_opens_a_dataset_whose_environment_replays_it_to_the_bit(settings, stay):
     assert collect(ID, settings, 4) == 4
     dataset = minari.load_dataset(ID)
     assert len(dataset) == 4
@@ -71,9 +89,10 @@ def test_minari_opens_a_dataset_whose_environment_replays_it_to_the_bit(body, st
         assert episode.infos["reward_terms"].keys() == terms.keys()
         for name, term in terms.items():
             np.testing.assert_array_equal(episode.infos["reward_terms"][name], term)
-    if body == TICK:
+    if settings.body == TICK:
         assert any(episode.terminations[-1] for episode in dataset)
     assert verify(ID) == 4
+    assert data.open(ID).settings == settings
 
 
 def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
@@ -84,31 +103,6 @@ def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
     assert float(done.stdout) == data.open(ID)[0].observations[0].sum()
 
 
-def test_metadata():
-    collect(ID, data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20), 3)
-    dataset = data.open(ID)
-    assert (dataset.body, dataset.steps, len(dataset)) == (QUEEN, 20, 3)
-    about = dataset.metadata["arc_suite"]
-    assert about["versions"] == versions.recorded()
-    assert len(about["model_sha256"]) == 64
-    assert about["settings"] == {
-        "body": "queen",
-        "policy": "cpg",
-        "presets": ["slow", "fast"],
-        "noise": 0.1,
-        "seed": 7,
-        "steps": 20,
-    }
-    summaries = dataset.summaries()
-    assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 7, 8, 9
-    for summary, episode in zip(summaries, dataset, strict=True):
-        assert (summary["seed"], summary["preset"]) == (episode.seed, episode.preset)
-        assert summary["length"] == summary["total_steps"] == episode.length == 20
-        assert summary["return"] == episode.total == episode.rewards.sum()
-        assert summary["sha256"] == episode.digest()
-    assert list(minari.list_local_datasets()) == [ID]
-
-
 def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
     collect(ID, data.Settings(QUEEN, "zero", (), steps=30), 10)
     dataset = minari.load_dataset(ID)
@@ -117,29 +111,23 @@ def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
     assert minari.get_normalized_score(dataset, 4.0 * 30) == 1.0
 
 
-def rounded(policy):
-    return lambda timestep: policy(timestep).astype(np.float32)
+class Rounded:
+    """A policy whose actions are rounded as those of datasets."""
+
+    def __init__(self, policy):
+        self.policy = policy
+        self.begin = policy.begin
+
+    def act(self, observation, rewards):
+        return self.policy.act(observation, rewards).astype(np.float32)
 
 
 def test_an_episode_is_what_the_single_environment_plays():
     collect(ID, data.Settings(TICK, "random", (), **SHORT), 2)
     for episode in data.open(ID):
-        random = policies.policy("random", "tick", seed=episode.seed)
-        steps = evaluation.rollout(registry.load(TICK, "walk"), rounded(random), episode.seed, max_steps=20)
+        random = Rounded(policies.policy("random", "tick"))
+        steps = evaluation.rollout(arc_suite.load(TICK, "walk"), random, episode.seed, max_steps=20)
         np.testing.assert_array_equal(episode.rewards, [timestep.reward for timestep in steps][1:])
-
-
-def test_style_records_a_dataset():
-    collect(ID, data.Settings(QUEEN, **SHORT), 2)
-    dataset = data.open(ID)
-    environment = dataset.environment()
-    for episode in dataset:
-        playback = episode.playback()
-        for _ in range(2):  # the reset rewinds it
-            track = style.record(environment, playback, episode.seed, max_steps=episode.length)
-            np.testing.assert_array_equal(track.rewards, episode.rewards)
-    after = style.record(environment, playback, episode.seed, max_steps=22)
-    assert not after.actions[20:].any()
 
 
 @pytest.mark.parametrize(
@@ -184,20 +172,6 @@ def test_noise_is_normal_and_differs_from_episode_to_episode():
     assert abs(np.corrcoef(first.ravel(), second.ravel())[0, 1]) < 0.15
 
 
-def test_ids_by_default_are_minaris():
-    named = {
-        "arc_suite/queen/cpg-medium-v0": data.Settings(QUEEN),
-        "arc_suite/tick/random-v0": data.Settings(TICK, "random", ()),
-        "arc_suite/queen/cpg-medium-fast-noise0_1-v0": data.Settings(QUEEN, presets=("medium", "fast"), noise=0.1),
-        "arc_suite/spider/my_package_policies_make-50steps-v0": data.Settings(
-            SPIDER, "my_package.policies:make", (), steps=50
-        ),
-    }
-    for dataset_id, settings in named.items():
-        assert settings.dataset_id() == dataset_id
-        minari.dataset.minari_dataset.parse_dataset_id(dataset_id)
-
-
 def test_more_episodes_continue_and_a_finished_dataset_stays_as_it_is(root):
     settings = data.Settings(QUEEN, **SHORT)
     collect(ID, settings, 3)
@@ -222,6 +196,8 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
         (settings._replace(seed=1), "its seed is 5, and not 1"),
         (settings._replace(presets=("fast", "medium")), "its presets is ['medium'], and not ['fast', 'medium']"),
         (settings._replace(body=TICK), "its body is 'queen', and not 'tick'"),
+        (settings._replace(task="steer"), "its task is 'walk', and not 'steer'"),
+        (settings._replace(task_kwargs={"gait": "wave"}), "its task_kwargs is {}, and not {'gait': 'wave'}"),
     ):
         with pytest.raises(ValueError) as error:
             collect(ID, changed, 2)
@@ -236,3 +212,42 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
     assert digests()[0] == before[1]
     assert len(data.open(ID)) == 3
     assert [path.name for path in (root / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
+
+
+def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch):
+    settings = data.Settings(QUEEN, presets=("slow", "medium"), **SHORT)
+    collect(ID, settings, 2)
+    before, medium = digests(), TUNINGS["queen"]["medium"]
+    for changed in (medium._replace(stiffness=0.81), medium._replace(centre=medium.centre | {"ankle": (15, 30, -14)})):
+        monkeypatch.setitem(TUNINGS["queen"], "medium", changed)
+        with pytest.raises(ValueError) as error:
+            collect(ID, settings, 3)
+        message = f"dataset {ID!r} is another: its presets slow and medium had other numbers; --overwrite replaces it"
+        assert str(error.value) == message
+        assert digests() == before
+        assert verify(ID) == 2  # what was done can still be done
+    monkeypatch.setitem(TUNINGS["queen"], "medium", medium)
+    monkeypatch.setitem(TUNINGS["queen"], "fast", changed)  # which is none of the dataset's
+    assert collect(ID, settings, 3) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"presets": ("fats",)}, "unknown preset 'fats'; did you mean 'fast'?"),
+        ({"presets": ()}, "preset: expected one or more of slow, medium, fast"),
+        ({"policy": "cgp", "presets": ()}, "unknown policy 'cgp'; did you mean 'cpg'?"),
+        ({"policy": "nowhere:make", "presets": ()}, "policy 'nowhere:make': No module named 'nowhere'"),
+        ({"noise": float("nan")}, "noise: expected a finite number from 0 to inf, got nan"),
+        ({"steps": 0}, "steps: expected an integer from 1, got 0"),
+        ({"task": "wolk"}, "unknown task 'wolk'; did you mean 'walk'?"),
+        ({"task_kwargs": {"gaits": "wave"}}, "unknown setting of walk 'gaits'; did you mean 'gait'?"),
+        ({"task_kwargs": {"arena": FLAT}}, "task_kwargs: expected values that JSON can hold: Object of type Flat is"),
+        ({"seed": 2**32 - 1}, "seed: expected an integer from 0 to 4294967295, got 4294967296"),
+    ],
+)
+def test_wrong_settings_leave_nothing_behind(root, changes, message):
+    with pytest.raises(ValueError) as error:
+        collect(ID, data.Settings(QUEEN)._replace(**changes), 2)
+    assert str(error.value).startswith(message)
+    assert not root.exists()

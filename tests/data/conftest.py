@@ -1,0 +1,10 @@
+"""Where Minari keeps the datasets of a test."""
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def root(tmp_path, monkeypatch):
+    """Return the folder in which Minari keeps datasets."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    return tmp_path / "datasets"

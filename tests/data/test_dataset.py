@@ -1,0 +1,108 @@
+"""Datasets, opened to be read; those that are damaged are one line, and nothing is lost."""
+
+import hashlib
+import os
+
+import minari
+import numpy as np
+import pytest
+from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
+
+from arc_suite import data, style, versions
+from arc_suite.cpg.presets import TUNINGS
+
+
+def test_metadata():
+    collect(ID, data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20), 3)
+    dataset = data.open(ID)
+    assert dataset.settings == data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
+    assert len(dataset) == 3
+    about = dataset.metadata["arc_suite"]
+    assert about["versions"] == versions.recorded()
+    assert len(about["model_sha256"]) == 64
+    assert about["settings"] == {
+        "body": "queen",
+        "policy": "cpg",
+        "presets": ["slow", "fast"],
+        "noise": 0.1,
+        "seed": 7,
+        "steps": 20,
+        "task": "walk",
+        "task_kwargs": {},
+        "task_version": 0,
+        "presets_sha256": [
+            hashlib.sha256(repr(TUNINGS["queen"][name]).encode()).hexdigest() for name in ("slow", "fast")
+        ],
+    }
+    summaries = dataset.summaries()
+    assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 7, 8, 9
+    for summary, episode in zip(summaries, dataset, strict=True):
+        assert (summary["seed"], summary["preset"]) == (episode.seed, episode.preset)
+        assert summary["length"] == summary["total_steps"] == episode.length == 20
+        assert summary["return"] == episode.total == episode.rewards.sum()
+        assert summary["sha256"] == episode.digest()
+    assert list(minari.list_local_datasets()) == [ID]
+
+
+def test_style_records_a_dataset():
+    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    dataset = data.open(ID)
+    environment = dataset.environment()
+    for episode in dataset:
+        playback = episode.playback()
+        for _ in range(2):  # the reset rewinds it
+            track = style.record(environment, playback, episode.seed, max_steps=episode.length)
+            np.testing.assert_array_equal(track.rewards, episode.rewards)
+    after = style.record(environment, playback, episode.seed, max_steps=22)
+    assert not after.actions[20:].any()
+
+
+@pytest.mark.parametrize("name", ["settings", "versions", "model_sha256"])
+def test_metadata_that_do_not_tell_all_are_damage(root, name):
+    settings = data.Settings(QUEEN, **SHORT)
+    collect(ID, settings, 1)
+    for change in (lambda about: about.update({name: 1}), lambda about: about.pop(name)):
+        edited(root, lambda metadata, change=change: change(metadata["arc_suite"]))
+        for use in (verify, data.open, lambda dataset_id: collect(dataset_id, settings, 2)):
+            with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: .*{name}"):
+                use(ID)
+
+
+def test_a_dataset_of_the_earlier_form_is_refused_and_overwrite_replaces_it(root):
+    settings = data.Settings(QUEEN, **SHORT)
+    collect(ID, settings, 2)
+    before = digests()
+    edited(root, lambda metadata: metadata["arc_suite"]["settings"].pop("task"))
+    message = (
+        f"dataset {ID!r} is of an earlier form, which does not tell its task: collect it anew, "
+        "with --overwrite under the same id"
+    )
+    for use in (verify, data.open, style.source, lambda dataset_id: collect(dataset_id, settings, 3)):
+        with pytest.raises(ValueError) as error:
+            use(ID)
+        assert str(error.value) == message
+    collect(ID, settings, 2, overwrite=True)
+    assert digests() == before
+
+
+def test_episodes_without_metadata_are_not_continued_as_others(root):
+    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    (root / ID / "data" / "metadata.json").unlink()
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: "):
+        collect(ID, data.Settings(TICK, **SHORT), 3)
+
+
+@pytest.mark.parametrize("name", ["main_data.hdf5", "metadata.json"])
+@pytest.mark.parametrize("length", [0, 100])
+def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length):
+    settings = data.Settings(QUEEN, **SHORT)
+    collect(ID, settings, 2)
+    before, path = digests(), root / ID / "data" / name
+    os.truncate(path, length)
+    for use in (verify, lambda dataset_id: collect(dataset_id, settings, 3)):
+        with pytest.raises(ValueError) as error:
+            use(ID)
+        assert str(error.value).startswith(f"dataset {ID!r} is damaged: {path}: ")
+        assert "\n" not in str(error.value)
+    collect(ID, settings, 2, overwrite=True)
+    assert digests() == before

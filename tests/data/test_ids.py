@@ -1,0 +1,23 @@
+"""Ids of datasets."""
+
+import pytest
+from datasets import ID, QUEEN, SHORT, collect
+
+from arc_suite import data
+
+
+def test_unknown_ids():
+    with pytest.raises(ValueError, match=f"^unknown dataset '{ID}': there are none in "):
+        data.open(ID)
+    collect(ID, data.Settings(QUEEN, **SHORT), 1)
+    with pytest.raises(ValueError) as error:
+        data.open("arc_suite/test/same-v0")
+    assert str(error.value) == f"unknown dataset 'arc_suite/test/same-v0'; did you mean {ID!r}? (there are: {ID})"
+    other = "arc_suite/queen/walk/cpg-medium-v0"
+    for wrong, example in ((ID[:-3], ID), (f"{ID}/inner-v0", other), ("../some-v0", other), ("", other)):
+        with pytest.raises(ValueError) as error:
+            data.open(wrong)
+        assert str(error.value) == (
+            f"dataset id {wrong!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
+            f"at the end alone, such as {example!r}"
+        )

@@ -1,0 +1,87 @@
+"""Datasets that are altered or of other versions: one line each."""
+
+import h5py
+import minari
+import pytest
+from datasets import ID, QUEEN, SHORT, TICK, collect, edited, verify
+
+from arc_suite import data
+from arc_suite.data import episodes
+
+
+@pytest.mark.parametrize("key", ["observations", "actions", "rewards", "terminations", "truncations", "contact"])
+def test_a_bit_that_changed_is_found(root, key):
+    collect(ID, data.Settings(QUEEN, "zero", (), **SHORT), 2)
+    file = root / ID / "data" / "main_data.hdf5"
+    with h5py.File(file) as opened:
+        group = opened["episode_1"]
+        dataset = group[key] if key in group else group[episodes.TERMS][key]
+        place = dataset.id.get_offset() + dataset.dtype.itemsize - 1  # for an action of 0 the sign: physics is the same
+        size = dataset.dtype.itemsize
+    content = bytearray(file.read_bytes())
+    content[place] ^= 1 if size == 1 else 128
+    file.write_bytes(content)
+    for read in (verify, lambda dataset_id: list(data.open(dataset_id))):
+        with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*: episode_1: expected (sha256|return) "):
+            read(ID)
+
+
+@pytest.mark.parametrize("key", ["seed", "preset", "return", "length", "id"])
+def test_episode_metadata_that_changed_is_found(root, key):
+    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
+        attributes = file["episode_0"].attrs
+        attributes[key] = attributes[key] + ("x" if key == "preset" else 1)
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*: episode_0: expected "):
+        verify(ID)
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("rewards", "episode 1 differs from its replay: rewards[3]"),
+        ("actions", "episode 1 differs from its replay: observations[4]"),
+        ("seed", "episode 1 has seed 5, and not 6"),
+    ],
+)
+def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key, message):
+    collect(ID, data.Settings(QUEEN, "zero", (), **SHORT), 2)
+    with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
+        episode = episodes.read(file, 1)
+        if key == "seed":
+            episode = episode._replace(seed=5)
+        else:
+            getattr(episode, key)[3] += 0.25
+        del file["episode_1"]
+        episodes.write(file, 1, episode)
+    with pytest.raises(ValueError) as error:
+        verify(ID)
+    assert str(error.value) == f"dataset {ID!r}: {message}"
+
+
+def test_another_version_or_model_is_refused(root):
+    settings = data.Settings(QUEEN, **SHORT)
+    collect(ID, settings, 2)
+    edited(root, lambda metadata: metadata["arc_suite"].update(model_sha256="0" * 64))
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with another model of queen$"):
+        verify(ID)
+    with pytest.raises(ValueError, match="is another: the sha256 of its model is 000000000000, and not [0-9a-f]{12}; "):
+        collect(ID, settings, 3)
+    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update(task_version=1))
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with version 1 of walk; 0 is installed$"):
+        verify(ID)
+    with pytest.raises(ValueError, match="is another: its task_version is 1, and not 0; "):
+        collect(ID, settings, 3)
+    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update(task_version=0))
+    edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(mujoco="3.16.0"))
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with mujoco 3.16.0; 3.17.* is installed$"):
+        verify(ID)
+    with pytest.raises(ValueError, match="is another: its mujoco is '3.16.0', and not '3.17"):
+        collect(ID, settings, 3)
+    with pytest.raises(ValueError, match=f"^dataset '{ID}' holds episodes of queen, and not of tick$"):
+        verify(ID, TICK)
+    edited(root, lambda metadata: metadata.pop("arc_suite"))
+    for use in (verify, data.open, lambda dataset_id: collect(dataset_id, settings, 3)):
+        with pytest.raises(ValueError, match=f"^dataset '{ID}' was not collected by arc_suite$"):
+            use(ID)
+    assert len(minari.load_dataset(ID)) == 2
