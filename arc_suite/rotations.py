@@ -1,4 +1,11 @@
-"""Quaternions (..., 4), w first, as functions of arrays of NumPy or JAX with any leading axes."""
+"""Angles, and quaternions (..., 4), w first: functions of arrays of NumPy or JAX with any leading axes."""
+
+import math
+
+
+def wrapped(angle):
+    """Return angles (...) between -pi and pi, rad."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def upright(quaternion):

@@ -1,30 +1,58 @@
-"""The same bits everywhere: `python tests/determinism.py` prints a digest of 500 steps of each robot.
+"""The same bits everywhere: `python tests/determinism.py` prints digests of 500 steps of every robot and task.
 
-Once as a single environment and once as a row among others, for each number of threads given.
+One of the observations and one of the rewards, of a single environment and of a row among others,
+on each number of threads given (1, 2 and 8 by default).
 """
 
 import hashlib
 import sys
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import gymnasium
 import numpy as np
 
 import arc_suite
+from arc_suite import registry
 
 STEPS = 500
 ROW, SEED = 1, 40  # the row that is looked at, and its seed
 
+Step = tuple[np.ndarray, float | None]  # observation and reward; a reset of the environment has none
+
+
+class Digests(NamedTuple):
+    """The beginnings of two sha256."""
+
+    observations: str
+    rewards: str
+
 
 def actions(robot: str) -> np.ndarray:
-    """Strong enough to fall now and then: (steps, motors) float32."""
-    size = arc_suite.load(robot, "walk").action_spec().shape
-    return np.random.RandomState(1).uniform(-1.0, 1.0, (STEPS, *size)).astype(np.float32)
+    """Return actions (steps, motors) float32, strong enough to fall now and then."""
+    motors = len(registry.body_of(robot).joint_names)
+    return np.random.RandomState(1).uniform(-1.0, 1.0, (STEPS, motors)).astype(np.float32)
 
 
-def single(robot: str) -> str:
-    """The sha256 of observations and rewards of a single environment that is reset when an episode ends."""
-    env = gymnasium.make(f"arc_suite/{robot}-walk-v0")
-    digest = hashlib.sha256(env.reset(seed=SEED)[0].tobytes())
+def digests(steps: Iterable[Step]) -> Digests:
+    """Digest the steps of an environment."""
+    observations, rewards = hashlib.sha256(), hashlib.sha256()
+    for observation, reward in steps:
+        observations.update(observation.tobytes())
+        if reward is not None:
+            rewards.update(np.float64(reward).tobytes())
+    return Digests(observations.hexdigest()[:16], rewards.hexdigest()[:16])
+
+
+def env_id(robot: str, task: str) -> str:
+    """Return Gymnasium's id."""
+    return registry.env_id(robot, registry.task_of(task))
+
+
+def single(robot: str, task: str) -> Iterator[Step]:
+    """Step a single environment that is reset when an episode ends."""
+    env = gymnasium.make(env_id(robot, task))
+    yield env.reset(seed=SEED)[0], None
     ended = False
     for action in actions(robot):
         if ended:  # as rows of a vector environment do
@@ -32,28 +60,30 @@ def single(robot: str) -> str:
         else:
             observation, reward, terminated, truncated, _ = env.step(action)
             ended = terminated or truncated
-        digest.update(observation.tobytes() + np.float64(reward).tobytes())
-    return digest.hexdigest()
+        yield observation, reward
+    env.close()
 
 
-def row(robot: str, threads: int) -> str:
-    """The same of one of three rows."""
-    envs = gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs=3, num_threads=threads)
-    digest = hashlib.sha256(envs.reset(seed=SEED - ROW)[0][ROW].tobytes())
+def row(robot: str, task: str, threads: int) -> Iterator[Step]:
+    """Step three rows, and show one of them."""
+    envs = gymnasium.make_vec(env_id(robot, task), num_envs=3, num_threads=threads)
+    yield envs.reset(seed=SEED - ROW)[0][ROW], None
     for action in actions(robot):
         observations, rewards, *_ = envs.step(np.stack([action] * 3))
-        digest.update(observations[ROW].tobytes() + np.float64(rewards[ROW]).tobytes())
+        yield observations[ROW], rewards[ROW]
     envs.close()
-    return digest.hexdigest()
 
 
 def main() -> None:
-    """Prints a line for each robot and way."""
+    """Prints a line for each robot, task and way."""
     threads = [int(argument) for argument in sys.argv[1:]] or [1, 2, 8]
-    for robot in arc_suite.TASKS_BY_DOMAIN:
-        print(robot, "single", single(robot))
-        for count in threads:
-            print(robot, f"row on {count} threads", row(robot, count))
+    print(f"{'robot':<10}{'task':<10}{'way':<16}{'observations':<18}rewards")
+    for robot, task in arc_suite.ALL_TASKS:
+        ways = {"single": single(robot, task)}
+        ways |= {f"row, threads={count}": row(robot, task, count) for count in threads}
+        for way, steps in ways.items():
+            found = digests(steps)
+            print(f"{robot:<10}{task:<10}{way:<16}{found.observations:<18}{found.rewards}", flush=True)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ _WIDTHS = (16, 26, 12, 9)  # of the columns that every task has
 
 def line(first: str, *cells: str) -> str:
     """Return a line of the table: the columns that every task has, then the task's own figures."""
-    widths = (*_WIDTHS, *(12 for _ in cells[len(_WIDTHS) :]))
+    widths = (*_WIDTHS, *(16 for _ in cells[len(_WIDTHS) :]))
     return f"{first:<12}" + "".join(f" {cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
 
 

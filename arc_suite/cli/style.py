@@ -97,8 +97,8 @@ def print_report(robot: str, reports: dict) -> None:
     """Print the tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
     first = next(iter(reports.values()))
     rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
-    own = [name for name in first["progress"] if name not in first["metrics"]]  # the task's own figures
-    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in own]
+    asked = [name for name in first["progress"] if name not in first["metrics"]]
+    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in asked]
     rows += [
         (name, metric, [spread(r["metrics"][name]["robot"]) for r in reports.values()])
         for name, metric in first["metrics"].items()

@@ -56,6 +56,7 @@ class Demonstrator:
             raise ValueError(f"froude: {body.name} has presets alone: {', '.join(presets_of(body))}")
         else:
             self._control = Prescribed.fit(body, preset, gait)
+        self._joints = len(body.joint_names)
         self._clock = np.array(0)
 
     def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
@@ -76,9 +77,12 @@ class Demonstrator:
             (..., joints) in [-1, 1].
 
         Raises:
-            ValueError: not named blocks; one line.
+            ValueError: not named blocks, or those of another body; one line.
         """
         quaternion, angles, velocities = felt(observation)
+        if (angles.shape[-1], velocities.shape[-1]) != (self._joints, self._joints):
+            felt_joints = f"{angles.shape[-1]} angles and {velocities.shape[-1]} velocities"
+            raise ValueError(f"observation: expected those of {self._joints} joints, got {felt_joints}")
         if self._clock.shape != angles.shape[:-1]:
             self._clock = np.broadcast_to(self._clock, angles.shape[:-1]).copy()
         action = self._control(self._clock, quaternion, angles, velocities)

@@ -13,6 +13,7 @@ from shimmy.utils.dm_env import dm_env_step2gym_step
 from arc_suite import checks
 from arc_suite.envs.dm import load
 from arc_suite.simulation import opengl, pictures
+from arc_suite.tasks import Task
 
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
@@ -51,7 +52,7 @@ class Env(DmControlCompatibilityV0):
         height: int = 480,
         camera_id: int | str = "tracking",
     ):
-        """Loads the task.
+        """Load the task.
 
         Args:
             domain_name: a robot; see `arc_suite.load`.
@@ -86,6 +87,11 @@ class Env(DmControlCompatibilityV0):
         self._closed = False
 
     @property
+    def task(self) -> Task:
+        """What is asked, a value of `arc_suite.tasks`; its `split` gives an observation's blocks by name."""
+        return self._env.task.definition
+
+    @property
     def np_random(self) -> np.random.Generator:
         """Draws from the stream that resets draw from."""
         return np.random.Generator(self._env.task.random._bit_generator)
@@ -96,7 +102,7 @@ class Env(DmControlCompatibilityV0):
         self._np_random_seed = -1
 
     def reset(self, *, seed: int | None = None, options: dict | None = None):
-        """Starts an episode.
+        """Start an episode.
 
         Args:
             seed: None to continue the stream of random numbers, or an integer to start a new one.
@@ -119,7 +125,7 @@ class Env(DmControlCompatibilityV0):
         return _flat(observation), {}
 
     def step(self, action):
-        """Advances by one control step.
+        """Advance by one control step.
 
         Args:
             action: (motors,), clipped to [-1, 1].
@@ -154,7 +160,7 @@ class Env(DmControlCompatibilityV0):
         self._env.command(name, value)
 
     def render(self):
-        """A picture of the present state in the mode and size chosen at the start.
+        """Return a picture of the present state in the mode and size chosen at the start.
 
         Returns:
             rgb_array: (height, width, 3) uint8. depth_array: (height, width) float32, m. Else None.
@@ -167,7 +173,7 @@ class Env(DmControlCompatibilityV0):
         return super().render()
 
     def close(self):
-        """Frees the simulation and what it was rendered with; once more does nothing."""
+        """Free the simulation and what it was rendered with; once more does nothing."""
         if self._window is not None:
             self._window.close()
             self._window = None

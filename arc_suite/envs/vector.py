@@ -24,7 +24,7 @@ _RENDER_MODES = ("rgb_array", "depth_array")
 
 
 def _one_at_a_time(method):
-    """Refuses a call once the environment is closed, and while another thread's call is at work."""
+    """Refuse a call once the environment is closed, and while another thread's call is at work."""
 
     @functools.wraps(method)
     def guarded(self, *args, **kwargs):
@@ -73,7 +73,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         height: int = 480,
         camera_id: int | str = "tracking",
     ):
-        """Loads the task and allocates the rows.
+        """Load the task and allocates the rows.
 
         Args:
             domain_name: a robot; see `arc_suite.load`.
@@ -142,7 +142,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     @_one_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
-        """Starts an episode in every row, or in some.
+        """Start an episode in every row, or in some.
 
         Args:
             seed: s to seed row i with s + i, one seed for each row, or None to continue the rows'
@@ -167,7 +167,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     @_one_at_a_time
     def step(self, actions):
-        """Advances every row by one control step, but for rows that start an episode instead.
+        """Advance every row by one control step, but for rows that start an episode instead.
 
         Args:
             actions: (num_envs, motors), clipped to [-1, 1]; ignored for a row that starts an episode.
@@ -241,7 +241,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     @_one_at_a_time
     def rest(self, mask) -> None:
-        """Lets rows, and no others, stand still until they are reset; meanwhile they cost next to nothing.
+        """Let rows, and no others, stand still until they are reset; meanwhile they cost next to nothing.
 
         Args:
             mask: (num_envs,) booleans, at least one of them true.
@@ -254,7 +254,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     @_one_at_a_time
     def render(self, rows: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
-        """Pictures of the rows' present states, in the mode and size chosen at the start.
+        """Return pictures of the rows' present states, in the mode and size chosen at the start.
 
         Args:
             rows: which rows; None for all.
@@ -321,7 +321,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         return info
 
     def _seeds(self, seed) -> list[int | None]:
-        """A seed for each row."""
+        """Return a seed for each row."""
         if np.ndim(seed) == 1:
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: expected one for each of {self.num_envs} rows, got {len(seed)}")
@@ -330,7 +330,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         return [checks.seed(first + row) for row in range(self.num_envs)]
 
     def _seed(self, seeds: Sequence[int | None], rows: np.ndarray) -> None:
-        """Starts new streams of random numbers in some rows, but for rows whose seed is None."""
+        """Start new streams of random numbers in some rows, but for rows whose seed is None."""
         for row in np.flatnonzero(rows):
             if seeds[row] is not None:
                 self._randoms[row], self._carries[row] = np.random.RandomState(seeds[row]), self.task.first()
@@ -347,7 +347,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
 
 def usable_cores() -> int:
-    """How many cores this process may use, where the system tells; else how many there are."""
+    """Return how many cores this process may use, where the system tells; else how many there are."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 

@@ -22,7 +22,7 @@ class Window:
     """Stays closed once a person has closed it, by its button or the escape key."""
 
     def __init__(self, physics, camera_id: int | str, width: int, height: int):
-        """Opens the window.
+        """Open the window.
 
         Args:
             physics: the dm_control simulation to show; updated by its owner.
@@ -43,7 +43,7 @@ class Window:
         self._due = time.monotonic()
 
     def show(self, duration: float) -> None:
-        """Draws the present state, and returns `duration` seconds after the last picture was due."""
+        """Draw the present state, and returns `duration` seconds after the last picture was due."""
         if self._viewer is None:
             return
         if glfw.window_should_close(self._viewer.window):
@@ -55,7 +55,7 @@ class Window:
         self._due = time.monotonic() + duration
 
     def close(self) -> None:
-        """Closes the window; once more does nothing."""
+        """Close the window; once more does nothing."""
         if self._viewer is not None:
             with _current(self._viewer):
                 self._viewer.con.free()

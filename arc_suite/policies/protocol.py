@@ -6,6 +6,7 @@ from typing import Protocol
 import dm_env
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.envs.scene import checked_action
 
 
@@ -141,7 +142,11 @@ def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarr
     Args:
         policy: made for one row.
         seed: of its episodes.
+
+    Raises:
+        ValueError: not a seed.
     """
+    seed = checks.seed(seed)
 
     def act(timestep: dm_env.TimeStep) -> np.ndarray:
         if timestep.first():

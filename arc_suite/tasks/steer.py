@@ -15,10 +15,10 @@ from arc_suite.tasks.readings import Readings
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
 COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
-_FIELDS = ("place", "motion", "ends", "schedule", "command", "tracking")
+_OWN = [(field, np.ndarray) for field in ("place", "motion", "ends", "schedule", "command", "tracking")]
 
 
-class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *((name, np.ndarray) for name in _FIELDS)])):
+class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *_OWN])):
     """What is remembered beside the walk's; velocities are (forward, left, turning) in units of `Steer.units`.
 
     Attributes:
@@ -43,9 +43,8 @@ def draw_command(random: np.random.RandomState) -> np.ndarray:
 class Steer(walk.Walk):
     """Following a velocity command."""
 
-    name = "steer"
+    name, target_velocity = "steer", None
     commands = {"command": 3}
-    target_velocity = None
     bonuses = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
 
     @functools.cached_property
@@ -60,12 +59,12 @@ class Steer(walk.Walk):
         return np.array((speed, speed, speed / np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean()))
 
     def start(self, random: np.random.RandomState, carry: Any) -> Start:
-        """Draw walk's start, then the yaw, then for each command how long it is held and what it is."""
+        """Draw walk's start, then the yaw, then how long each command is held, then what they are."""
         start = super().start(random, carry)
         start.qpos[3:7] = rotations.turned(start.qpos[3:7], random.uniform(-math.pi, math.pi))
-        drawn = [(random.randint(SHORTEST, LONGEST), draw_command(random)) for _ in range(COMMANDS)]
-        held, schedule = (np.array(values) for values in zip(*drawn, strict=True))
-        own = (np.zeros(3), np.zeros(3), held.cumsum(), schedule, np.full(3, np.nan), np.float64(0.0))
+        ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
+        schedule = np.array([draw_command(random) for _ in range(COMMANDS)])
+        own = (np.zeros(3), np.zeros(3), ends, schedule, np.full(3, np.nan), np.float64(0.0))
         return start._replace(memory=Memory(*start.memory, *own))
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
@@ -78,10 +77,9 @@ class Steer(walk.Walk):
         numpy = place.__array_namespace__()
         sine, cosine = numpy.sin(heading), numpy.cos(heading)
         x, y, turn = ((place - memory.place)[..., i] for i in range(3))
-        turn = (turn + math.pi) % (2.0 * math.pi) - math.pi
-        way = numpy.stack([cosine * x + sine * y, cosine * y - sine * x, turn], axis=-1)
+        way = numpy.stack([cosine * x + sine * y, cosine * y - sine * x, rotations.wrapped(turn)], axis=-1)
         leak = min(self.parameters.gait_frequency * step, 1.0)
-        motion = memory.motion + leak * (way / (step * self.units) - memory.motion)
+        motion = (1.0 - leak) * memory.motion + leak * way / (step * self.units)
         memory = super().after(memory, readings)._replace(place=place, motion=motion)
         return memory._replace(tracking=memory.tracking + self.tracked(memory))
 
@@ -109,7 +107,7 @@ class Steer(walk.Walk):
     def observe(self, memory: Memory, readings: Readings) -> dict:
         """Return walk's blocks, and the command and the motion side by side."""
         command = memory.motion.__array_namespace__().concatenate([self.wanted(memory), memory.motion], axis=-1)
-        return {**super().observe(memory, readings), "command": command}
+        return super().observe(memory, readings) | {"command": command}
 
     def progress(self, memory: Memory) -> dict:
         """Return the mean `tracking`, and `gait_compliance`."""

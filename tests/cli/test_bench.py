@@ -22,6 +22,7 @@ def bench(*arguments, folder):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True)
 
 
+@pytest.mark.slow
 def test_small_run_prints_tables_and_writes_results_plot_and_document(tmp_path):
     document = tmp_path / "performance.md"
     document.write_text("Before.\n<!-- benchmark -->\nold\n<!-- end of benchmark -->\nAfter.\n")

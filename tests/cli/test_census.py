@@ -1,9 +1,8 @@
 """tools/walk_census.py lets random bodies walk and tells those that do from those that do not."""
 
-import subprocess
-import sys
 from pathlib import Path
 
+import programs
 import pytest
 
 TOOL = Path(__file__).parents[2] / "tools" / "walk_census.py"
@@ -11,13 +10,12 @@ BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
 
 
 def census(*arguments):
-    command = [sys.executable, TOOL, "--processes=1", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
+    return programs.run(TOOL, "--processes=1", *arguments)
 
 
 def test_bodies_walk():
     done = census(*BODIES, "--count=3")
-    assert done.returncode == 0, done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert lines[0].split() == ["legs", "3", "links", "all"]
     assert lines[1].split()[:2] == ["6", "3/3"]

@@ -5,12 +5,13 @@ import pathlib
 import subprocess
 import sys
 
+import programs
 import pytest
 
 from arc_suite import data
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
-ID = "arc_suite/queen/cpg-medium-20steps-v0"
+ID = "arc_suite/queen/walk/cpg-medium-20steps-v0"
 
 
 @pytest.fixture(autouse=True)
@@ -48,11 +49,11 @@ def test_collect_continue_verify_and_minaris_own_command(root):
 def test_a_mixture_with_noise_on_a_body_made_to_order():
     done = run("--legs=4", "--links=2", "--preset=slow,fast", "--noise=0.1", "--steps=10", "--episodes=2")
     assert done.returncode == 0, done.stderr
-    dataset_id = "arc_suite/walker_4x2/cpg-slow-fast-noise0_1-10steps-v0"
+    dataset_id = "arc_suite/walker_4x2/walk/cpg-slow-fast-noise0_1-10steps-v0"
     assert done.stdout.startswith(f"{dataset_id}: 2 episodes")
     assert len(data.open(dataset_id).body.legs) == 4
     done = run(f"--verify={dataset_id}", "--robot=queen")
-    assert done.stderr == f"collect.py: dataset {dataset_id!r} holds walks of walker_4x2, and not of queen\n"
+    assert done.stderr == f"collect.py: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
 
 
 @pytest.mark.parametrize(
@@ -78,7 +79,7 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
-    done = run("--episodes=2", *arguments)
+    done = programs.run(TOOL, "--episodes=2", *arguments)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"collect.py: {message}\n")
     assert not root.exists()
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import gymnasium
 import numpy as np
+import programs
 import pytest
 
 import arc_suite
@@ -18,8 +19,7 @@ SPIDER = ROOT / "examples" / "spider.json"
 
 
 def run(tool, *arguments, cwd=None):
-    command = [sys.executable, ROOT / "tools" / tool, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd)
+    return programs.run(ROOT / "tools" / tool, *arguments, cwd=cwd)
 
 
 def test_evaluate_takes_a_spec_and_a_body_made_to_order():

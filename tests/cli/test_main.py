@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import programs
 import pytest
 
 import arc_suite
@@ -19,7 +20,7 @@ TOOLS |= {"census": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_sui
 
 
 def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "arc_suite", *arguments], capture_output=True, text=True)
+    return programs.run("-m", "arc_suite", *arguments)
 
 
 @pytest.mark.parametrize("arguments", [(), ("--help",), ("-h",)])
@@ -92,6 +93,6 @@ def test_errors_of_a_program_name_it(program):
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_a_tool_is_the_program(program):
     tool = TOOLS[program]
-    done = subprocess.run([sys.executable, tool, "--help"], capture_output=True, text=True)
+    done = programs.run(tool, "--help")
     expected = help_of(program).replace(f"arc-suite {program}", f"python {tool}")
     assert (done.returncode, done.stdout, done.stderr) == (0, expected, "")

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import imageio.v2 as imageio
 import numpy as np
+import programs
 import pytest
 from PIL import Image
 
 import arc_suite
 from arc_suite.cli import films
 from arc_suite.models.sizing import control_timestep
-from arc_suite.policies import policy
+from arc_suite.policies import alone, policy
 from arc_suite.robots import generator
 from arc_suite.robots.spec_files import body_to_json
 
@@ -127,9 +128,7 @@ def test_a_film_of_frames_between_hundredths_keeps_their_sum(tmp_path):
 
 def test_settings_of_the_task_are_seen(tmp_path):
     plain = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png")
-    other = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png", "--set=weights={}")
     quick = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png", "--set=velocity_band=9")
-    assert plain.stdout == other.stdout
     assert quick.stdout.splitlines()[1:] == plain.stdout.splitlines()[1:]
     assert quick.stdout != plain.stdout
 
@@ -144,7 +143,7 @@ def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
 
 def test_a_take_stays_at_its_end():
     environment = arc_suite.load("leaper", "walk", {"random": 0})
-    take = films.Take("leaper", environment, policy("random", "leaper", seed=0), "profile", (64, 48))
+    take = films.Take("leaper", environment, alone(policy("random", "leaper"), 0), "profile", (64, 48))
     for _ in range(200):
         if take.ended:
             break
@@ -181,7 +180,7 @@ def test_a_take_stays_at_its_end():
     ],
 )
 def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):
-    done = render(tmp_path, *arguments)
+    done = programs.run(TOOL, *arguments, cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"render.py: {message}\n")
     assert os.listdir(tmp_path) == []
 

@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import sys
 
+import programs
 import pytest
 
 from arc_suite import data, style
@@ -108,6 +109,7 @@ def test_datasets_without_minari_say_what_to_install(tmp_path):
     assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
 
 
+@pytest.mark.slow
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr
@@ -142,7 +144,8 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
         (
             ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],
-            "policy 'own_walkers:broken': episode of seed 0: action[0]: expected a number from -1 to 1, got nan",
+            "policy 'own_walkers:broken': episode of seed 0, step 0: "
+            "action[0]: expected a number from -1 to 1, got nan",
         ),
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
@@ -152,7 +155,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
-    done = run(*arguments, path=tmp_path)
+    done = programs.run(TOOL, *arguments, path=tmp_path)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == f"style.py: {message}"  # on a line that a progress bar has left
     assert "Traceback" not in done.stderr

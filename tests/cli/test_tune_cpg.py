@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import imageio.v3 as imageio
+import programs
 import pytest
 
 TOOL = Path(__file__).parents[2] / "tools" / "tune_cpg.py"
@@ -22,6 +23,7 @@ def tune(*arguments):
     return subprocess.run(command(*arguments), capture_output=True, text=True)
 
 
+@pytest.mark.slow
 def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     straight, broken = tmp_path / "straight", tmp_path / "broken"
     done = tune("--generations=4", f"--output={straight}")
@@ -70,13 +72,14 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(arguments, message):
-    done = tune(*arguments)
+    done = programs.run(TOOL, *QUICK, *arguments)
     assert done.returncode == 1
     assert done.stderr.startswith(f"tune_cpg.py: {message}")
     assert done.stderr.count("\n") == 1
     assert done.stdout == ""
 
 
+@pytest.mark.slow
 def test_another_search_in_the_folder_is_refused(tmp_path):
     tune("--generations=1", f"--output={tmp_path}")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

@@ -17,21 +17,24 @@ FOLDER = pathlib.Path(__file__).parents[1]
 ENVIRON = os.environ | {"PYTHONPATH": str(FOLDER.parent)}
 
 
+@pytest.mark.slow
 def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_row():
-    digests = {}
+    found = {}
     for threads in (["1", "8"], ["2"]):
         command = [sys.executable, FOLDER / "determinism.py", *threads]
         done = subprocess.run(command, env=ENVIRON, capture_output=True, text=True, check=True)
-        for line in done.stdout.splitlines():
-            robot, _, way = line.partition(" ")
-            digests.setdefault(robot, []).append(way.split()[-1])
-    for robot in digests:
-        digests[robot] += [determinism.single(robot), determinism.single(robot)]
-    assert list(digests) == list(arc_suite.TASKS_BY_DOMAIN)
-    assert all(len(found) == 7 and len(set(found)) == 1 for found in digests.values())
-    assert len({found[0] for found in digests.values()}) == 4
+        for line in done.stdout.splitlines()[1:]:
+            robot, task, *_, observations, rewards = line.split()
+            found.setdefault((robot, task), []).append((observations, rewards))
+    for robot, task in found:
+        found[robot, task].append(determinism.digests(determinism.single(robot, task)))
+    assert tuple(found) == arc_suite.ALL_TASKS
+    assert all(len(digests) == 6 and len(set(digests)) == 1 for digests in found.values())
+    for kind in range(2):  # observations, rewards
+        assert len({digests[0][kind] for digests in found.values()}) == len(found)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="reads Linux's /proc")
 def test_soak_in_short():
     command = [sys.executable, FOLDER / "soak.py", "--steps=8000", "--block=2000", "--lives=4", "--slope=1000"]

@@ -4,6 +4,7 @@ import os
 import pathlib
 import pickle
 
+import dm_env
 import gymnasium
 import numpy as np
 import pytest
@@ -19,9 +20,11 @@ ID = "arc_suite/bastion-walk-v0"
 ZEROS = np.zeros(12)
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
+TASK_NAMES = "(there are: walk, steer)"
 DOMAINS = "(there are: queen, bastion, tick, leaper)"
 PRESETS = ", ".join(TUNINGS["bastion"])
 CAMERAS = "['tracking', 'portrait', 'profile']"
+BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
 FINITE = "expected a finite number from"
@@ -37,14 +40,17 @@ class World:
         self.dm.reset(), self.env.reset(seed=0), self.rows.reset(seed=0)
         for _ in range(3):
             self.dm.step(ZEROS), self.env.step(ZEROS), self.rows.step(np.zeros((3, 12)))
+        self.steer = arc_suite.load("bastion", "steer", {"random": 0})
+        self.steer.reset(), self.steer.step(ZEROS)
         self.walker = Demonstrator("bastion")
 
     def state(self):
         """Everything that a call could have changed."""
         rows = self.rows
         streams = [stream.get_state() for stream in rows._randoms]
+        episodes = rows._memory, rows._carries, rows._steps, rows._ended, rows._resting, rows._streams_begin
         return (
-            pickle.dumps((self.dm, self.env, rows._walker, rows._steps, rows._ended, streams, self.walker._clock)),
+            pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._clock)),
             rows.batch._simulations.state.tobytes(),
             pickle.dumps(np.random.get_state()),
             (dict(ROBOTS), dict(TASKS), set(gymnasium.registry), dict(os.environ), os.getcwd()),
@@ -91,6 +97,17 @@ CASES = [
     (lambda w: w.rows.step("walk"), "action: expected 3 x 12 numbers, got str"),
     (lambda w: w.rows.step(None), "action: expected shape (3, 12), got ()"),
     (lambda w: w.dm.physics.step(0), "nstep: expected an integer from 1, got 0"),
+    # Commands.
+    (lambda w: w.dm.command("command", [0.5, 0, 0]), "command 'command': task walk has no commands"),
+    (
+        lambda w: w.steer.command("comand", None),
+        "unknown command 'comand'; did you mean 'command'? (there are: command)",
+    ),
+    (lambda w: w.steer.command("command", [0.5]), "command 'command': expected 3 finite numbers, got [0.5]"),
+    (
+        lambda w: w.steer.command("command", [0, 0, np.inf]),
+        "command 'command': expected 3 finite numbers, got [0, 0, inf]",
+    ),
     # Seeds.
     (lambda w: w.env.reset(seed=[1]), f"{SEED} [1]"),
     (lambda w: w.env.reset(seed=np.array([1, 2])), f"{SEED} array([1, 2])"),
@@ -108,18 +125,18 @@ CASES = [
         "reset_mask: expected 3 booleans, at least one of them true, got array([1, 0, 1])",
     ),
     (rows(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 rows, got 3"),
-    (lambda w: policies.policy("random", "queen", seed=-1), f"{SEED} -1"),
+    (lambda w: policies.alone(policies.policy("random", "queen"), seed=-1), f"{SEED} -1"),
     # Ids.
     (lambda w: arc_suite.load("Queen", "walk"), f"unknown domain 'Queen'; did you mean 'queen'? {DOMAINS}"),
     (lambda w: arc_suite.load(7, "walk"), f"unknown domain 7; did you mean 'tick'? {DOMAINS}"),
     (lambda w: arc_suite.load(["queen"], "walk"), f"unknown domain ['queen']; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: arc_suite.load("queen", None), "unknown task None; did you mean 'walk'? (there are: walk)"),
+    (lambda w: arc_suite.load("queen", None), f"unknown task None; did you mean 'steer'? {TASK_NAMES}"),
     (
         lambda w: arc_suite.load("creature:hopper", "walk"),
         "domain 'hopper': cannot import creature: No module named 'creature'",
     ),
     (make(domain_name="bastoin"), f"unknown domain 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
-    (rows(task_name="wlak"), "unknown task 'wlak'; did you mean 'walk'? (there are: walk)"),
+    (rows(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
     # Cameras and sizes.
     (lambda w: w.dm.physics.render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),
     (lambda w: w.dm.physics.render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 2, or one of {CAMERAS}"),
@@ -141,8 +158,13 @@ CASES = [
     (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (lambda w: Demonstrator("bastion", froude=0.2), f"froude: bastion has presets alone: {PRESETS}"),
     (lambda w: Demonstrator("bastion", gait="trott"), f"unknown gait 'trott'; did you mean 'trot'? {GAITS}"),
-    (lambda w: w.walker(np.zeros(5)), "observation: expected 151 numbers, got shape (5,)"),
-    (lambda w: w.walker(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
+    (lambda w: w.walker(dm_env.restart(np.zeros(151))), f"{BLOCKS}, got ndarray"),
+    (lambda w: w.walker.act({"posture": np.zeros(17)}), f"{BLOCKS}, got dict"),
+    (
+        lambda w: w.walker.act({"posture": np.zeros((2, 17)), "velocities": np.zeros((2, 24))}),
+        "observation: expected those of 12 joints, got 12 angles and 18 velocities",
+    ),
+    (lambda w: w.rows.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
     (
         lambda w: policies.policy("cgp", "queen"),
         "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)",
@@ -184,6 +206,7 @@ CASES = [
         lambda w: arc_suite.load("queen", "walk", None, "flat"),
         "environment_kwargs: expected a mapping of names to values, got 'flat'",
     ),
+    (walk(arena="bumpy"), "unknown arena 'bumpy'; did you mean 'bumps'? (there are: flat, bumps)"),
     (rows(num_envs=2.5), "num_envs: expected an integer from 1, got 2.5"),
     (rows(num_threads="all"), "num_threads: expected an integer from 1, got 'all'"),
     (rows(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),

@@ -1,97 +1,171 @@
-"""The architecture: imports point downwards only."""
+"""The architecture: imports point downwards only, and go round nowhere."""
 
 import ast
+import functools
+import graphlib
 import pathlib
 import subprocess
 import sys
+
+import pytest
 
 import arc_suite
 
 PACKAGE = pathlib.Path(arc_suite.__file__).parent
 
-# From the bottom up; a module may import from its own layer's row only what stands before it.
-LAYERS = (
-    ("checks", "files", "versions"),
-    ("robots",),
-    ("arenas",),
-    ("models",),
-    ("simulation",),
-    ("tasks",),
-    ("registry",),
-    ("cpg",),
-    ("registration",),
-    ("envs",),
-    ("policies",),
+# From the ground up: a module imports its own room and those above it in this list. What stands in
+# one row leans on nothing in it.
+ROOMS = (
+    ("checks", "rotations", "files", "versions"),
+    ("robots",),  # what moves
+    ("arenas",),  # where
+    ("models",),  # spec -> MJCF
+    ("simulation",),  # MuJoCo runs
+    ("tasks",),  # what is asked
+    ("registry",),  # names of all three
+    ("envs",),  # the faces
+    ("cpg",),  # demonstrators
+    ("registration",),  # robots and tasks of other packages
+    ("policies",),  # who acts
     ("evaluation",),
     ("data",),
     ("style",),
     ("tuning",),
-    ("cli",),
-    ("doctor", "__main__"),
+    ("cli",),  # programs
+    ("doctor", "__main__"),  # that Python starts by name
 )
-ORDER = [name for layer in LAYERS for name in layer]
+HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 
-# Modules that may import nothing but these beside the standard library and arc_suite itself.
+# What the lower rooms may import beside the standard library and arc_suite; the longest name that fits counts.
 THIRD_PARTY = {
-    "checks": set(),
-    "robots.spec": set(),
-    "robots.queen": set(),
-    "robots.bastion": set(),
-    "robots.tick": set(),
-    "robots.leaper": set(),
-    "tasks.readings": {"numpy"},
-    "tasks.terms": {"numpy"},
-    "cpg.law": {"numpy"},
+    "checks": {"numpy"},
+    "rotations": set(),
+    "files": set(),
+    "versions": {"packaging"},
+    "robots": set(),
+    "robots.generator": {"numpy"},
+    "arenas": {"numpy", "dm_control"},
+    "arenas.arena": {"dm_control"},
+    "models": {"numpy", "mujoco", "dm_control"},
+    "simulation": {"numpy", "mujoco", "dm_control", "glfw", "OpenGL"},
+    "tasks": {"numpy"},
+    "registry": set(),
+    "envs": {"numpy", "mujoco", "dm_control", "dm_env", "gymnasium", "shimmy", "glfw"},
+    "cpg": {"numpy"},
     "cpg.presets": set(),
+    "registration": {"gymnasium"},
+    "policies": {"numpy", "dm_env"},
+    "evaluation.statistics": {"numpy"},
     "style.metrics": {"numpy"},
 }
 
+# Modules of the suite that these may import, and no others.
+INSIDE = {
+    "rotations": set(),
+    "robots.spec": set(),
+    "robots.queen": {"robots.spec"},
+    "robots.bastion": {"robots.spec"},
+    "robots.tick": {"robots.spec"},
+    "robots.leaper": {"robots.spec"},
+    "arenas.arena": set(),
+    "tasks.clock": set(),
+    "tasks.readings": {"arenas"},
+    "tasks.terms": {"tasks.readings"},
+    "tasks.contract": {"arenas", "robots.spec", "tasks.clock", "tasks.readings", "tasks.terms"},
+    "cpg.law": set(),
+    "cpg.presets": {"robots.gaits"},
+    "evaluation.statistics": set(),
+    "style.metrics": {"rotations", "style.tracks"},
+}
 
-def modules():
+
+@functools.cache
+def trees():
+    """The syntax of every module, by name without `arc_suite.`; "" is the package itself."""
+    found = {}
     for path in sorted(PACKAGE.rglob("*.py")):
-        name = ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix("__init__").rstrip(".")
-        if name:
-            yield name, ast.parse(path.read_text())
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        found[".".join(part for part in parts if part != "__init__")] = ast.parse(path.read_text())
+    return found
 
 
-def imports(tree):
+def imported(tree):
+    """Everything that a module imports, wherever in its text, by full name."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, "imports are absolute"
-            if node.module == "arc_suite":
-                yield from (f"arc_suite.{alias.name}" for alias in node.names)
-            else:
-                yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
-def test_imports_point_downwards():
-    for name, tree in modules():
-        for target in imports(tree):
-            parts = target.split(".")
-            if parts[0] == "arc_suite" and len(parts) > 1 and parts[1] != name.split(".")[0]:
-                importer, imported = ORDER.index(name.split(".")[0]), ORDER.index(parts[1])
-                assert imported < importer, f"{name} imports {target}"
+def inside(tree):
+    """The modules of the suite that a module imports."""
+    for target in imported(tree):
+        top, _, name = target.partition(".")
+        if top == "arc_suite":
+            yield name if name in trees() else name.rpartition(".")[0]
 
 
-def test_every_module_has_a_layer():
-    assert {name.split(".")[0] for name, _ in modules()} <= set(ORDER)
+def outside(tree):
+    """The packages that a module imports beside the standard library and the suite."""
+    tops = {target.partition(".")[0] for target in imported(tree)}
+    return tops - {"arc_suite"} - sys.stdlib_module_names
 
 
-def test_low_layers_import_little():
-    trees = dict(modules())
-    for name, allowed in THIRD_PARTY.items():
-        for target in imports(trees[name]):
-            top = target.split(".")[0]
-            assert top in allowed | {"arc_suite"} or top in sys.stdlib_module_names, f"{name} imports {target}"
+def room(name):
+    return name.partition(".")[0]
 
 
-def test_terms_and_readings_know_no_robots():
-    trees = dict(modules())
-    for name in ("tasks.readings", "tasks.terms"):
-        inside = {target for target in imports(trees[name]) if target.startswith("arc_suite")}
-        assert inside <= {"arc_suite.tasks.readings"}, f"{name} imports {inside}"
+def modules():
+    """Every module but the package itself, which hands on what its users need."""
+    return [name for name in trees() if name]
+
+
+def test_every_module_has_a_room():
+    assert {room(name) for name in modules()} == set(HEIGHTS)
+
+
+@pytest.mark.parametrize("name", modules())
+def test_imports_point_downwards(name):
+    for target in inside(trees()[name]):
+        if room(name) == "cli" and not target:
+            continue  # programs use the suite as its users do
+        assert target, f"{name} imports arc_suite itself"
+        lower = HEIGHTS[room(target)] < HEIGHTS[room(name)]
+        assert lower or room(target) == room(name), f"{name} imports {target}"
+
+
+def test_no_import_goes_round_inside_rooms_either():
+    graphlib.TopologicalSorter({name: set(inside(tree)) - {name} for name, tree in trees().items()}).prepare()
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in modules() if any(f"{name}.".startswith(f"{k}.") for k in THIRD_PARTY)]
+)
+def test_lower_rooms_need_little(name):
+    nearest = max((key for key in THIRD_PARTY if f"{name}.".startswith(f"{key}.")), key=len)
+    assert outside(trees()[name]) <= THIRD_PARTY[nearest]
+
+
+@pytest.mark.parametrize("name", INSIDE)
+def test_what_stands_alone(name):
+    assert set(inside(trees()[name])) <= INSIDE[name]
+
+
+def test_tables_name_what_is_there():
+    assert THIRD_PARTY.keys() | INSIDE.keys() <= trees().keys()
+
+
+def test_only_tasks_and_registration_know_one_task_from_another():
+    """Whoever drives tasks gets them from the registry; walk's row of numbers comes with a robot that is registered."""
+    texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
+    contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
+    particular = texts - contract
+    assert particular == {"tasks.walk", "tasks.steer"}
+    for name in modules():
+        if room(name) != "tasks" and name != "registration":
+            assert not particular & set(inside(trees()[name])), name
 
 
 def test_import_is_light():

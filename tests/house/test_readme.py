@@ -2,16 +2,27 @@
 
 import pathlib
 import re
+import shlex
 
+import gymnasium
+import programs
 import pytest
+import test_layers
 
 import arc_suite
 from arc_suite import data
+from arc_suite.cli import main
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import walk
 
-README = (pathlib.Path(__file__).parents[2] / "README.md").read_text()
+ROOT = pathlib.Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
 BLOCKS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "examples").glob("*.md"))]
+_COMMAND = re.compile(r"(?:^|`)((?:python (?:tools/|-m arc_suite)|arc-suite )[^`\n]*(?:\n[^`\n]+(?=`))?)", re.MULTILINE)
+SCHEMATIC = {"arc-suite PROGRAM --help", "arc-suite PROGRAM", "python -m arc_suite PROGRAM"}
+COMMANDS = sorted({" ".join(text.split()) for page in PAGES for text in _COMMAND.findall(page.read_text())} - SCHEMATIC)
 
 
 @pytest.fixture
@@ -28,8 +39,19 @@ def test_code(block, dataset):
     exec(compile(block, "README.md", "exec"), {})
 
 
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_is_understood(command):
+    """The program, its flags and their values are; what it does then, its own tests say."""
+    program, *arguments = shlex.split(command)
+    if program == "arc-suite":  # not on the path of every environment; the test of the wheel runs it
+        arguments = ["-m", "arc_suite", *arguments]
+    done = programs.run(*arguments, "--version", cwd=ROOT)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_there_is_code():
     assert len(BLOCKS) >= 2
+    assert len(COMMANDS) >= 20
 
 
 @pytest.mark.parametrize("robot", arc_suite.TASKS_BY_DOMAIN)
@@ -50,13 +72,31 @@ def test_table_of_robots(robot):
 
 
 def test_table_of_terms():
-    for name, weight in walk.WEIGHTS.items():
+    for name, weight in (walk.BONUSES | walk.COSTS).items():
         rows = re.findall(rf"^\| `{name}` \| (-?[\d.]+)[ ;]", README, re.MULTILINE)
         assert float(rows[-1]) == weight, name
 
 
 def test_ids_are_registered():
-    import gymnasium
-
     for name in re.findall(r"`(arc_suite/[a-z]+-walk-v0)`", README):
         assert name in gymnasium.registry
+
+
+def test_every_program_is_told_of():
+    for path in (ROOT / "tools").glob("*.py"):
+        assert f"tools/{path.name}" in README or f"make {path.stem.replace('_', '-')}" in README, path
+    for name in main.PROGRAMS:
+        assert re.search(rf"(tools/(walk_)?{name}\.py|arc_suite\.{name}|arc-suite {name})\b", README), name
+
+
+def test_the_map_names_every_room():
+    (text,) = re.findall(r"```\n(tools/.*?)```", README, re.DOTALL)
+    named = set(re.findall(r"\b(\w+)(?:/|\.py)", text)) - {"tools", "arc_suite"}
+    assert named == set(test_layers.HEIGHTS) - {"__main__"}
+
+
+def test_links_lead_somewhere():
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", README)
+    assert len(targets) > 10
+    for target in targets:
+        assert (ROOT / target).exists(), target

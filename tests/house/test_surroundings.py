@@ -19,22 +19,25 @@ socket.socket.connect = socket.create_connection = socket.getaddrinfo = refuse
 import gymnasium
 import numpy as np
 import arc_suite
-for robot in arc_suite.TASKS_BY_DOMAIN:
-    environment = arc_suite.load(robot, "walk", {"on_divergence": "terminate"})
+jobs = [(robot, "walk", {}) for robot in arc_suite.TASKS_BY_DOMAIN] + [("tick", "steer", {"arena": "bumps"})]
+for robot, task, settings in jobs:
+    environment = arc_suite.load(robot, task, settings | {"on_divergence": "terminate"})
     environment.reset()
     environment.physics.data.qvel[:] = np.nan
     assert environment.step(np.zeros(environment.action_spec().shape)).last()
     environment.physics.forward()
     environment.physics.render(32, 32)
-    env = gymnasium.make(f"arc_suite/{robot}-walk-v0", render_mode="rgb_array", width=32, height=32)
+    kwargs = {"task_kwargs": settings, "render_mode": "rgb_array", "width": 32, "height": 32}
+    env = gymnasium.make(f"arc_suite/{robot}-{task}-v0", **kwargs)
     env.reset(); env.step(env.action_space.sample()); env.render(); env.close()
-    envs = gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs=2, render_mode="rgb_array")
+    envs = gymnasium.make_vec(f"arc_suite/{robot}-{task}-v0", num_envs=2, **kwargs)
     envs.reset()
     envs.batch.data.qpos[0, 0] = np.inf
     envs.step(envs.action_space.sample()); envs.render(); envs.close()
 """
 
 
+@pytest.mark.slow
 def test_no_file_appears_and_nothing_is_downloaded(tmp_path):
     home, work = tmp_path / "home", tmp_path / "work"
     home.mkdir(), work.mkdir()
@@ -86,7 +89,7 @@ FORBIDDEN = {
     "shelve",
     "yaml",
 }
-FILES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").glob("*.py")])
+FILES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))

@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 import gymnasium
 import mujoco
 
-from arc_suite import registry
+import arc_suite
+from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import timers
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks.walk import SUBSTEPS
 from benchmark import ordinary
 
 FULL = "mj_step, full model"
@@ -102,7 +102,7 @@ def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant
     observation = {"posture": data.qpos[2:], "velocities": data.qvel}  # live
 
     def reset():
-        environment = registry.load(robot, "walk", {"random": 0})
+        environment = arc_suite.load(robot, "walk", {"random": 0})
         environment.reset()
         data.qpos[:], data.qvel[:] = environment.physics.position(), environment.physics.velocity()
         return observation
@@ -117,7 +117,7 @@ def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant
 
 
 def _dm_env(robot: str) -> Contestant:
-    environment = registry.load(robot, "walk", {"random": 0, **_TASK_KWARGS})
+    environment = arc_suite.load(robot, "walk", {"random": 0, **_TASK_KWARGS})
     return Contestant(DM_ENV, 1, 1, environment.reset, environment.step, environment.physics.free)
 
 

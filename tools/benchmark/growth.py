@@ -5,11 +5,11 @@ import time
 import mujoco
 import numpy as np
 
+from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots import queen
 from arc_suite.robots.spec import Body, Leg, Link
 from arc_suite.simulation import timers
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks.walk import SUBSTEPS
 
 LEGS = (2, 4, 6, 8, 10, 12)
 LINKS = (1, 2, 3, 4)

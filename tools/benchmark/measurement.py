@@ -7,13 +7,14 @@ import platform
 import resource
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 
 import gymnasium
 import numpy as np
 
 from arc_suite.cpg import Demonstrator
+from arc_suite.envs.scene import prepared
 from benchmark import contestants, growth, ordinary
 from benchmark.contestants import Contestant
 
@@ -90,6 +91,7 @@ class _Field:
                 stack.callback(contestant.close)
                 self._contestants.append(contestant)
         self._contestants.sort(key=lambda contestant: contestants.ORDER.index(contestant.name))
+        self._task, _ = prepared(robot, "walk")
         self._policies = [Demonstrator(robot) for _ in self._contestants]
         self._observations = [contestant.reset() for contestant in self._contestants]
         self._times = [[] for _ in self._contestants]
@@ -111,12 +113,17 @@ class _Field:
             for c, times in zip(self._contestants, self._times, strict=True)
         ]
 
+    def _blocks(self, observation) -> Mapping[str, np.ndarray]:
+        """The named blocks of whatever a contestant returns: a dm_env `TimeStep`, a vector or the blocks."""
+        observation = getattr(observation, "observation", observation)
+        return observation if isinstance(observation, Mapping) else self._task.split(observation)
+
     def _run(self, index: int, steps: int) -> float:
         """Seconds spent in steps; the policy acts while the clock stands still."""
         contestant, policy, observation = self._contestants[index], self._policies[index], self._observations[index]
         seconds = 0.0
         for _ in range(steps):
-            action = policy(observation)
+            action = policy.act(self._blocks(observation))
             started = time.perf_counter()
             observation = contestant.step(action)
             seconds += time.perf_counter() - started

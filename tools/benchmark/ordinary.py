@@ -5,8 +5,9 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.mujoco import MujocoEnv
 
-from arc_suite import models, registry
+from arc_suite import models
 from arc_suite.robots import ROBOTS
+from arc_suite.tasks import walk
 
 
 def full_model(robot: str):
@@ -51,7 +52,7 @@ class OrdinaryEnv(MujocoEnv):
             **kwargs: of `MujocoEnv`.
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
-        settings = registry.load(robot, "walk").task.settings
+        settings = walk.settings(ROBOTS[robot], {})
         self._weights, self._numbers = settings.weights, settings.parameters
         self._base_noise, self._joint_noise = settings.base_noise, settings.joint_noise
         self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
@@ -75,9 +76,9 @@ class OrdinaryEnv(MujocoEnv):
 
     def step(self, action):
         action = np.clip(action, -1.0, 1.0)
-        x_before = self.data.qpos[0]
+        x_before = self.data.body("torso").xpos[0]
         self.do_simulation(action, self.frame_skip)
-        x_velocity = (self.data.qpos[0] - x_before) / self.dt
+        x_velocity = (self.data.body("torso").xpos[0] - x_before) / self.dt
         self._phase = (self._phase + 2 * np.pi * self._numbers.gait_frequency * self.dt) % (2 * np.pi)
 
         observation = self._get_obs()

@@ -12,8 +12,11 @@ _HORIZON = tuple((top + bottom) / 2.0 for top, bottom in zip(_SKY["rgb1"], _SKY[
 _GROUND = {"rgb1": (0.33, 0.37, 0.42), "rgb2": (0.29, 0.33, 0.375), "markrgb": (0.50, 0.56, 0.62)}
 
 
+_EXTENT = 3.5  # of the scene, in heights of the creature, about what MuJoCo makes of one on a plane
+
+
 def add_scene(root: mjcf.RootElement, height: float) -> None:
-    """Adds sky and light, and a grid on the ground that makes motion over it visible.
+    """Add sky and light, and a grid on the ground that makes motion over it visible.
 
     Args:
         root: holds the body `torso` and the geoms of an arena.
@@ -43,6 +46,8 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
     )
     for geom in root.worldbody.geom:  # of the arena; the bodies have theirs
         geom.material = "ground"
+        if geom.type != "plane":  # ground of finite size would stretch the map of shadows over all of it
+            root.statistic.set_attributes(extent=_EXTENT * height, center=(0.0, 0.0, height))
 
     # Lights ride on the torso, so that shadows stay sharp however far the creature walks.
     torso = root.find("body", "torso")

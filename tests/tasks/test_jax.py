@@ -1,0 +1,76 @@
+"""The text of a task under `jax.jit` and `jax.vmap`: what it computes is what NumPy computes."""
+
+import numpy as np
+import pytest
+
+from arc_suite.arenas import ARENAS
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.tasks import TASKS
+
+jax = pytest.importorskip("jax", reason="of the extra `jax`: make check-jax")
+jax.config.update("jax_enable_x64", True)
+
+BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": generator.random_body(3)}
+ROWS, STEPS = 3, 60
+
+
+def assert_close(ours, theirs):
+    ours, theirs = jax.tree.leaves(ours), jax.tree.leaves(theirs)
+    assert len(ours) == len(theirs)
+    for mine, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(np.asarray(other), np.asarray(mine), rtol=1e-12, atol=1e-12)
+
+
+def recorded(body, task_name, arena):
+    """Yields memory, action and fields of the simulation, before and after steps of rows that walk about."""
+    rows = VectorEnv(body, task_name, ROWS, 1, task_kwargs={"arena": arena})
+    rows.reset(seed=0)
+    task, random = rows.task, np.random.RandomState(0)
+    for _ in range(STEPS):
+        memory = rows._memory
+        action = random.uniform(-0.4, 0.4, rows.action_space.shape)
+        rows.step(action)
+        yield task, memory, action, {name: getattr(rows.batch.data, name).copy() for name in task.reads}
+    rows.close()
+
+
+@pytest.mark.parametrize("task_name", TASKS)
+@pytest.mark.parametrize("arena", ARENAS)
+@pytest.mark.parametrize("body", BODIES)
+def test_jit_and_vmap_compute_what_numpy_computes(task_name, arena, body):
+    def step(task, memory, action, fields):
+        """A control step as a driver runs it, but for the simulation: everything that a task computes."""
+        readings = task.read(Fields(fields))
+        memory, inputs = task.before(memory, action)
+        memory = task.after(memory, readings)
+        ends = tuple(end | np.zeros((), bool) for end in task.ended(memory, readings))
+        return (
+            readings,
+            memory,
+            inputs.ctrl,
+            task.terms(memory, readings),
+            task.observe(memory, readings),
+            ends[0],
+            task.progress(memory),
+            task.begin(memory, readings),
+            task.lift(memory, readings),
+        )
+
+    compiled = None
+    for task, memory, action, fields in recorded(BODIES[body], task_name, arena):
+        if compiled is None:
+            compiled = {
+                "rows at once": jax.jit(lambda *values, task=task: step(task, *values)),
+                "one row, mapped": jax.jit(jax.vmap(lambda *values, task=task: step(task, *values))),
+            }
+        expected = step(task, memory, action, fields)
+        for function in compiled.values():
+            assert_close(expected, function(*jax.tree.map(jax.numpy.asarray, (memory, action, fields))))
+
+
+class Fields:
+    """Fields of a simulation by name."""
+
+    def __init__(self, fields):
+        self.__dict__.update(fields)

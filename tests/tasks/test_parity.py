@@ -1,0 +1,98 @@
+"""Walk beside a computation by hand, from nothing but plain MuJoCo and the paper's formulas."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import arc_suite
+from arc_suite import models
+from arc_suite.cpg import Demonstrator
+from arc_suite.robots import ROBOTS
+
+STEPS = 60  # of each episode
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+WEIGHTS = {
+    "forward": 1.5,
+    "healthy": 1.0,
+    "gait_bonus": 1.5,
+    "gait_cost": -0.1,
+    "control": -0.05,
+    "smoothness": -0.02,
+    "contact": -0.0005,
+    "angular_velocity": -0.05,
+    "vertical_velocity": -0.02,
+    "posture": -0.001,
+}
+CONTROL = {"bastion": -0.08, "leaper": -0.1}  # where the weight is another
+
+
+class Published:
+    """The published environment's step: 25 times mj_step of the model as a file holds it, with masks."""
+
+    def __init__(self, robot, environment):
+        """Starts where an environment that has just been reset stands."""
+        self.numbers = environment.task.settings.parameters
+        self.weights = WEIGHTS | {"control": CONTROL.get(robot, WEIGHTS["control"])}
+        self.model = mujoco.MjModel.from_xml_string(models.assemble(ROBOTS[robot]).to_xml_string())
+        assert self.model.npair == 0 and self.model.opt.integrator == mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        self.data = mujoco.MjData(self.model)
+        self.feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
+        physics = environment.physics
+        state = np.empty(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(physics.model.ptr, physics.data.ptr, state, STATE)
+        mujoco.mj_setState(self.model, self.data, state, STATE)
+        mujoco.mj_kinematics(self.model, self.data)
+        self.phase, self.last_action = 0.0, np.zeros(self.model.nu)
+
+    def step(self, action):
+        """Returns the observation and the reward."""
+        p, data = self.numbers, self.data
+        action = np.clip(action, -1.0, 1.0)
+        before = data.body("torso").xpos[0]
+        data.ctrl[:] = action
+        for _ in range(25):
+            mujoco.mj_step(self.model, data)
+        speed = (data.body("torso").xpos[0] - before) / (25 * self.model.opt.timestep)
+        self.phase = (self.phase + 2 * math.pi * p.gait_frequency * 0.05) % (2 * math.pi)
+        wanted = (self.phase + p.phase_offsets) % (2 * math.pi) < 2 * math.pi * p.duty_factor
+        wrong = int(((data.xpos[self.feet, 2] < p.stance_threshold) != wanted).sum())
+        forces = np.clip(data.cfrc_ext[1:], -1.0, 1.0).ravel()
+        terms = {
+            "forward": max(0.0, 1.0 - abs(speed - p.target_velocity) / p.velocity_band),
+            "healthy": float(p.healthy_range[0] <= data.qpos[2] <= p.healthy_range[1]),
+            "gait_bonus": 1.0 - wrong / len(self.feet),
+            "gait_cost": wrong,
+            "control": np.sum(action**2),
+            "smoothness": np.sum((action - self.last_action) ** 2),
+            "contact": np.sum(forces**2),
+            "angular_velocity": np.sum(data.qvel[3:5] ** 2),
+            "vertical_velocity": data.qvel[2] ** 2,
+            "posture": np.sum(data.qpos[7:] ** 2),
+        }
+        self.last_action = action
+        clock = (math.sin(self.phase), math.cos(self.phase))
+        observation = np.concatenate([data.qpos[2:], data.qvel, forces, clock])
+        return observation, sum(weight * terms[name] for name, weight in self.weights.items())
+
+
+@pytest.mark.parametrize("fallen", [False, True], ids=["walking", "falling"])
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_observation_and_reward_are_the_published_ones(robot, fallen):
+    environment = arc_suite.load(robot, "walk", {"random": 3, "healthy_range": (-9.0, 9.0)})
+    policy, random = Demonstrator(robot, "tuned"), np.random.RandomState(4)
+    for _ in range(2):  # episodes
+        timestep = environment.reset()
+        published = Published(robot, environment)
+        speeds = []
+        for _ in range(STEPS):
+            action = policy(timestep) + random.normal(0.0, 1.0 if fallen else 0.1, published.model.nu)
+            timestep = environment.step(action)
+            observation, reward = published.step(action)
+            assert_array_equal(environment.physics.state(), np.concatenate([published.data.qpos, published.data.qvel]))
+            assert_allclose(np.concatenate(list(timestep.observation.values())), observation, rtol=0.0, atol=1e-9)
+            assert_allclose(timestep.reward, reward, rtol=0.0, atol=1e-12)
+            speeds.append(environment.task.terms["forward"])
+        assert np.count_nonzero(speeds) > 0  # the term that looks at the frame's position has been looked at
