@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from returns import RETURNS
 
 import arc_suite
 from arc_suite import evaluation, versions
@@ -12,17 +13,48 @@ def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
     environment = arc_suite.load("leaper", "walk", {"time_limit": 2.0})
     first, second, third = evaluation.episodes(environment, Demonstrator("leaper"), range(4, 7))
     assert evaluation.run(environment, Demonstrator("leaper"), 5) == second != first
-    environment.task.random.seed(6)
-    timestep, total, compliance, policy = environment.reset(), 0.0, 0.0, Demonstrator("leaper")
-    start = environment.physics.data.qpos[0]
+    timestep, total, compliance, policy = environment.reset(6), 0.0, 0.0, Demonstrator("leaper")
+    start = environment.physics.data.xpos[1, 0]  # of the torso's frame, as in the reward
     while not timestep.last():
         timestep = environment.step(policy(timestep))
         total += timestep.reward
         compliance += environment.task.terms["gait_bonus"]
     assert third.length == 40
     assert third.total == pytest.approx(total)
-    assert third.compliance == pytest.approx(compliance / 40)
-    assert third.speed == pytest.approx((environment.physics.data.qpos[0] - start) / 2.0)
+    assert third.progress.keys() == {"speed", "gait_compliance"}
+    assert third.progress["gait_compliance"] == pytest.approx(compliance / 40)
+    assert third.progress["speed"] == pytest.approx((environment.physics.data.xpos[1, 0] - start) / 2.0)
+
+
+def test_policies_get_named_rows_and_the_reward_of_the_step_before():
+    class Watching:
+        def __init__(self):
+            self.begun, self.rewards = [], []
+
+        def begin(self, rows, seeds):
+            self.begun.append((list(rows), list(seeds)))
+
+        def act(self, observation, rewards):
+            assert {name: block.shape for name, block in observation.items()} == {
+                name: (1, size) for name, size in environment.task.definition.blocks.items()
+            }
+            self.rewards.append(rewards)
+            return np.full((1, 18), 0.1)
+
+    environment, policy = arc_suite.load("tick", "steer", {"time_limit": 0.5}), Watching()
+    steps = list(evaluation.rollout(environment, policy, seed=4))
+    assert policy.begun == [([0], [4])]
+    np.testing.assert_array_equal(policy.rewards, [[0.0], *([step.reward] for step in steps[1:-1])])
+    episode = evaluation.run(environment, policy, seed=4)
+    assert episode.progress.keys() == {"tracking", "gait_compliance"}
+    assert episode.total == sum(step.reward for step in steps[1:])
+
+
+def test_returns_of_the_papers_demonstrators():
+    for robot, returns in RETURNS.items():
+        assert evaluation.expert_return("walk", robot) == returns.paper
+        assert evaluation.expert_return("steer", robot) is None
+    assert evaluation.expert_return("walk", "spider") is None
 
 
 def test_the_protocol_is_ten_episodes():

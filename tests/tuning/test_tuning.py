@@ -89,7 +89,8 @@ def test_judge_plays_the_episodes_of_ordinary_environments():
             observation, _ = environment.reset(seed=5 + episode)
             total, smoothness, tilt, axis = 0.0, 0.0, 0.0, np.zeros(3)
             for _ in range(30):
-                observation, reward, _, _, info = environment.step(policy(observation))
+                action = policy.act(environment.unwrapped.task.split(observation))
+                observation, reward, _, _, info = environment.step(action)
                 total += reward
                 smoothness += info["reward_terms"]["smoothness"]
                 mujoco.mju_rotVecQuat(axis, (0.0, 0.0, 1.0), observation[1:5].astype(float))
@@ -113,7 +114,8 @@ def test_judge_counts_falls_and_pays_nothing_after_them():
     )
     observation, _ = environment.reset(seed=0)
     while not fallen:
-        observation, reward, fallen, _, _ = environment.step(policy(observation))
+        action = policy.act(environment.unwrapped.task.split(observation))
+        observation, reward, fallen, _, _ = environment.step(action)
         total += reward
     assert_allclose(score.rewards[0, 0], total / 60, rtol=1e-12)
     assert np.isfinite(score.style["posture"]).all()

@@ -5,12 +5,17 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from returns import RETURNS
 
 import arc_suite
 from arc_suite import evaluation
 from arc_suite.cpg import PRESETS, Demonstrator
-from arc_suite.cpg.presets import TUNINGS
-from arc_suite.robots import ROBOTS
+from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.presets import TUNINGS, Bend, Preset
+from arc_suite.models.sizing import control_timestep
+from arc_suite.policies import alone
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.style import record
 from arc_suite.tuning import Judge
 
 # preset medium: centre, stance and swing bends in degrees by rank from the front.
@@ -69,46 +74,39 @@ def expected_target(robot, joint, step):
 def test_action_is_the_published_law(robot):
     joints = ROBOTS[robot].joint_names
     n = len(joints)
-    size = sum(spec.shape[0] for spec in arc_suite.load(robot, "walk").observation_spec().values())
+    task = arc_suite.load(robot, "walk").task.definition
     demonstrator = Demonstrator(robot)
     rng = np.random.default_rng(1)
     ramp, start = (15, 0.2) if robot == "leaper" else (20, 0.3)
     for step in range(200):
-        observation = rng.normal(0, 0.2, size)
+        observation = rng.normal(0, 0.2, task.size)
         angles, velocities = observation[5 : 5 + n], observation[11 + n : 11 + 2 * n]
         targets = [expected_target(robot, joint, step) for joint in joints]
         kp = 0.8 * (start + (1 - start) * min(1.0, step / ramp))
         expected = np.clip(kp * (targets - angles) - MEDIUM[robot]["kd"] * velocities, -1, 1)
         cycle_edges = [(MEDIUM[robot]["frequency"] * 0.05 * step + OFFSETS[j.rsplit("_", 1)[0]]) % 1 for j in joints]
         sure = [min(abs(c - edge) for edge in (0.0, 0.6, 1.0)) > 1e-9 for c in cycle_edges]
-        action = demonstrator(observation)
+        action = demonstrator.act(task.split(observation))
         assert action.shape == (n,)
         assert_allclose(action[sure], expected[sure], atol=1e-12, err_msg=f"step {step}")
 
 
-# Mean return of 10 seeds; the published lines with the tolerance that the paper's figures carry.
-PUBLISHED = {"queen": (2049, 0.015), "tick": (1971, 0.015), "bastion": (2324, 0.015), "leaper": (2653, 0.05)}
-
-
-@pytest.mark.parametrize("robot", PUBLISHED)
+@pytest.mark.parametrize("robot", RETURNS)
 def test_medium_earns_the_published_return(robot):
     environment = arc_suite.load(robot, "walk")
     results = evaluation.episodes(environment, Demonstrator(robot))
-    published, tolerance = PUBLISHED[robot]
-    assert_allclose(np.mean([episode.total for episode in results]), published, rtol=tolerance)
+    returns = RETURNS[robot]
+    assert_allclose(np.mean([episode.total for episode in results]), returns.medium, rtol=returns.within)
     assert {episode.length for episode in results} == {1000}
 
 
-# Mean return of 10 seeds, with the tolerance that their scatter asks for.
-TUNED = {"queen": (3830, 0.005), "bastion": (3796, 0.005), "tick": (3814, 0.005), "leaper": (3567, 0.01)}
-
-
-@pytest.mark.parametrize("robot", TUNED)
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", RETURNS)
 def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
     presets = [TUNINGS[robot][name] for name in ("tuned", "medium")]
     score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets, range(10))
-    expected, tolerance = TUNED[robot]
-    assert_allclose(1000 * score.rewards[0].mean(), expected, rtol=tolerance)
+    returns = RETURNS[robot]
+    assert_allclose(1000 * score.rewards[0].mean(), returns.tuned, rtol=returns.tuned_within)
     assert not score.falls.any()
     for cost, (tuned, medium) in score.style.items():
         assert tuned.mean() <= medium.mean(), cost
@@ -119,42 +117,38 @@ def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
     environment = arc_suite.load(robot, "walk")
     episodes = {preset: evaluation.run(environment, Demonstrator(robot, preset), seed=1) for preset in PRESETS}
     assert {episode.length for episode in episodes.values()} == {1000}
-    assert 0.0 < episodes["slow"].speed < episodes["medium"].speed
+    speeds = {preset: episode.progress["speed"] for preset, episode in episodes.items()}
+    assert 0.0 < speeds["slow"] < speeds["medium"]
     target = environment.task.settings.parameters.target_velocity
-    assert_allclose(episodes["medium"].speed, target, rtol=0.02)
+    assert_allclose(speeds["medium"], target, rtol=0.02)
 
 
-def test_every_form_of_observation_gives_the_same_action():
+def test_time_steps_blocks_and_rows_give_the_same_action():
     environment = arc_suite.load("bastion", "walk", {"random": 0})
     timestep = environment.reset()
-    forms = [Demonstrator("bastion") for _ in range(4)]
+    single, act, rows = Demonstrator("bastion"), alone(Demonstrator("bastion")), Demonstrator("bastion")
     for _ in range(30):
         blocks = timestep.observation
-        flat = np.concatenate(list(blocks.values()))
-        actions = [
-            form(observation)
-            for form, observation in zip(forms, (timestep, blocks, flat, {"observations": flat}), strict=True)
-        ]
-        for action in actions[1:]:
-            assert_array_equal(actions[0], action)
-        timestep = environment.step(actions[0])
+        action = single(timestep)
+        assert_array_equal(action, act(timestep))
+        for row in rows.act({name: np.stack([block, block]) for name, block in blocks.items()}):
+            assert_array_equal(action, row)
+        timestep = environment.step(action)
 
 
 def test_batch_rows_are_single_demonstrators_and_restart_alone():
     rng = np.random.default_rng(0)
     batch, singles = Demonstrator("tick"), [Demonstrator("tick") for _ in range(3)]
+    split = arc_suite.load("tick", "walk").task.definition.split
     for step in range(60):
         observations = rng.normal(0, 0.3, (3, 199))
-        if step == 25:
-            batch.reset([1])
-            singles[1].reset()
-        if step == 40:
-            batch.reset(np.array([True, False, True]))
-            singles[0].reset()
-            singles[2].reset()
-        actions = batch(observations)
+        restarting = {25: [1], 40: [0, 2]}.get(step, [])
+        batch.begin(restarting)
+        for row in restarting:
+            singles[row].begin([0])
+        actions = batch.act(split(observations))
         for row, single in enumerate(singles):
-            assert_array_equal(actions[row], single(observations[row]))
+            assert_array_equal(actions[row], single.act(split(observations[row])))
 
 
 def test_first_timestep_restarts_the_clock():
@@ -168,8 +162,16 @@ def test_first_timestep_restarts_the_clock():
 
 
 def test_wrong_observation_and_names_are_one_line_errors():
-    with pytest.raises(ValueError, match=r"^observation: expected 199 numbers, got shape \(198,\)$"):
-        Demonstrator("queen")(np.zeros(198))
+    blocks = "observation: expected blocks posture and velocities by name, as `split` of a task gives them, got "
+    for wrong, kind in ((np.zeros(199), "ndarray"), ({"observations": np.zeros(199)}, "dict")):
+        with pytest.raises(ValueError) as error:
+            Demonstrator("queen").act(wrong)
+        assert str(error.value) == blocks + kind
+    others = arc_suite.load("bastion", "walk").reset()
+    with pytest.raises(ValueError, match=r"^observation: expected those of 18 joints, got 12 angles and 12 velocit"):
+        Demonstrator("queen")(others)
+    with pytest.raises(ValueError, match=r"^presets: expected a body named 'queen' to have the 18 joints of queen, g"):
+        Demonstrator(ROBOTS["bastion"].replace(name="queen"))
     with pytest.raises(ValueError, match=r"^unknown preset 'meduim'; did you mean 'medium'\?"):
         Demonstrator("queen", "meduim")
     with pytest.raises(ValueError, match=r"^preset: queen has 6 legs, and phase_offsets is for 4$"):
@@ -178,3 +180,47 @@ def test_wrong_observation_and_names_are_one_line_errors():
         Demonstrator("queen", TUNINGS["bastion"]["tuned"])
     with pytest.raises(ValueError, match=r"^unknown robot 'quene'; did you mean 'queen'\?"):
         Demonstrator("quene")
+
+
+# A robot of another package: its control step follows from its size, and its presets from nowhere.
+CREEPER = generator.generate(4, 2).replace(name="creeper")
+CREEPING = Preset(
+    stiffness=0.6,
+    damping=0.1,
+    settle=0,
+    ramp=1,
+    ramp_start=1.0,
+    frequency=1.2,
+    duty_factor=0.6,
+    phase_offsets=(0.0, 0.5, 0.5, 0.0),
+    sweep=20,
+    centre={"knee": 0},
+    bends={"knee": Bend(stance=0, swing=30)},
+)
+
+
+@pytest.mark.parametrize("height", [None, 0.05, 4.0])
+def test_a_registered_robot_moves_at_the_frequency_that_its_preset_asks_for(height, monkeypatch):
+    body = CREEPER if height is None else generator.scaled(CREEPER, height / 0.4).replace(name="creeper")
+    monkeypatch.setitem(ROBOTS, "creeper", body)
+    monkeypatch.setitem(TUNINGS, "creeper", {"medium": CREEPING, "fast": CREEPING._replace(frequency=1.8)})
+    environment = arc_suite.load("creeper", "walk", {"time_limit": 400 * control_timestep(body)})
+    step = environment.control_timestep()
+    assert step == pytest.approx(control_timestep(body)) and abs(step - 0.05) > 0.005
+    for preset, frequency in (("medium", 1.2), ("fast", 1.8)):
+        track = record(environment, Demonstrator("creeper", preset), seed=0)
+        actions = track.actions[:, 0] - track.actions[:, 0].mean()
+        spectrum = abs(np.fft.rfft(actions))
+        found = np.fft.rfftfreq(len(actions), track.time_step)[spectrum.argmax()]
+        assert found == pytest.approx(frequency, abs=1.0 / (len(actions) * step)), preset
+
+
+def test_a_robots_numbers_go_by_its_name():
+    queen = ROBOTS["queen"]
+    heavier = queen.replace(density=10.001)
+    assert presets_of(heavier) is TUNINGS["queen"]
+    blocks = arc_suite.load("queen", "walk").reset(0).observation
+    for preset in PRESETS:
+        ours, theirs = (Demonstrator(body, preset) for body in (queen, heavier))
+        for _ in range(20):
+            assert_array_equal(ours.act(blocks), theirs.act(blocks))
