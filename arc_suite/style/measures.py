@@ -22,7 +22,7 @@ def _stride_length(track: Track) -> float:
 
 
 class Metric(NamedTuple):
-    """What stands behind a metric's name.
+    """The entry of a metric in the table.
 
     Attributes:
         function: of a track.
@@ -38,7 +38,7 @@ class Metric(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """The robot's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
+    """The body's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
 
     value: float
     legs: Mapping[str, float]

@@ -32,7 +32,7 @@ def duty_factor(track: Track) -> np.ndarray:
 
 
 def phase_error(track: Track) -> np.ndarray:
-    """How late the middle of stance comes against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
+    """Lateness of the middle of stance against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
 
     The middle of stance is its circular mean over the clock (Fisher, "Statistical analysis of
     circular data", 1993), taken of the schedule on the same samples too. NaN for a leg that never
@@ -49,7 +49,7 @@ def phase_error(track: Track) -> np.ndarray:
 
 
 def phase_scatter(track: Track) -> float:
-    """How far the legs' phase errors differ from one another: their circular variance (Fisher, 1993), 0 to 1.
+    """Circular variance of the legs' phase errors (Fisher, 1993), by which they differ from one another; 0 to 1.
 
     0 if all legs are late by the same time, so that the gait is the prescribed one but for a lag;
     1 if half of the legs are half a cycle off the others, as in a hop. NaN for fewer than two legs

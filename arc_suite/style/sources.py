@@ -21,7 +21,7 @@ HELP = (
 
 
 class Stage(NamedTuple):
-    """Of what tracks are wanted.
+    """What is to be recorded: a body in a task.
 
     Attributes:
         body: that moves.
@@ -35,7 +35,7 @@ class Stage(NamedTuple):
 
 
 class Source(NamedTuple):
-    """Something that gives tracks.
+    """A source of tracks.
 
     Attributes:
         label: by which it is shown.

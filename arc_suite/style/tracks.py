@@ -14,7 +14,7 @@ from arc_suite.tasks.terms import Parameters, total
 
 
 class Track(NamedTuple):
-    """A rollout: one row for the end of every control step, SI units, angles in rad.
+    """A recorded rollout: one row for the end of every control step, SI units, angles in rad.
 
     Attributes:
         body: what moved.

@@ -1,22 +1,19 @@
-"""Demonstrators against the published figures."""
+"""Demonstrators: the published law, rows and single ones, any control step."""
 
 import math
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from returns import RETURNS
 
 import arc_suite
-from arc_suite import evaluation
 from arc_suite.cpg import PRESETS, Demonstrator
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of
 from arc_suite.cpg.presets import TUNINGS, Bend, Preset
 from arc_suite.models.sizing import control_timestep
 from arc_suite.policies import alone
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.style import record
-from arc_suite.tuning import Judge
 
 # preset medium: centre, stance and swing bends in degrees by rank from the front.
 MEDIUM = {
@@ -89,38 +86,6 @@ def test_action_is_the_published_law(robot):
         action = demonstrator.act(task.split(observation))
         assert action.shape == (n,)
         assert_allclose(action[sure], expected[sure], atol=1e-12, err_msg=f"step {step}")
-
-
-@pytest.mark.parametrize("robot", RETURNS)
-def test_medium_earns_the_published_return(robot):
-    environment = arc_suite.load(robot, "walk")
-    results = evaluation.episodes(environment, Demonstrator(robot))
-    returns = RETURNS[robot]
-    assert_allclose(np.mean([episode.total for episode in results]), returns.medium, rtol=returns.within)
-    assert {episode.length for episode in results} == {1000}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", RETURNS)
-def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
-    presets = [TUNINGS[robot][name] for name in ("tuned", "medium")]
-    score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets, range(10))
-    returns = RETURNS[robot]
-    assert_allclose(1000 * score.rewards[0].mean(), returns.tuned, rtol=returns.tuned_within)
-    assert not score.falls.any()
-    for cost, (tuned, medium) in score.style.items():
-        assert tuned.mean() <= medium.mean(), cost
-
-
-@pytest.mark.parametrize("robot", ROBOTS)
-def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
-    environment = arc_suite.load(robot, "walk")
-    episodes = {preset: evaluation.run(environment, Demonstrator(robot, preset), seed=1) for preset in PRESETS}
-    assert {episode.length for episode in episodes.values()} == {1000}
-    speeds = {preset: episode.progress["speed"] for preset, episode in episodes.items()}
-    assert 0.0 < speeds["slow"] < speeds["medium"]
-    target = environment.task.settings.parameters.target_velocity
-    assert_allclose(speeds["medium"], target, rtol=0.02)
 
 
 def test_time_steps_blocks_and_rows_give_the_same_action():
@@ -224,3 +189,38 @@ def test_a_robots_numbers_go_by_its_name():
         ours, theirs = (Demonstrator(body, preset) for body in (queen, heavier))
         for _ in range(20):
             assert_array_equal(ours.act(blocks), theirs.act(blocks))
+
+
+def test_ranks_and_sides_of_a_hip():
+    medium = TUNINGS["queen"]["medium"]
+    led = medium._replace(sweep=(1.0, 2.0, 3.0), centre=medium.centre | {"hip": (10.0, 20.0, 30.0)})
+    hips = [i for i, name in enumerate(ROBOTS["queen"].joint_names) if name.endswith("hip")]
+    laid = pattern(ROBOTS["queen"], led)
+    assert_allclose(np.degrees(laid.sweep[hips]), [-1, -2, -3, 1, 2, 3])
+    assert_allclose(np.degrees(laid.centre[hips]), [-10, -20, -30, 10, 20, 30])
+
+
+def test_settling_is_a_crouch_or_the_centre():
+    medium = TUNINGS["bastion"]["medium"]
+    crouching = medium._replace(settle=4, crouch={"hip": 10, "ankle": (60, 50, 40)})
+    still = np.zeros((2, 12))
+    targets = []
+    for preset in (medium, crouching):
+        control = Prescribed.fit(ROBOTS["bastion"], preset._replace(stiffness=0.1, ramp_start=1.0))
+        targets.append([np.degrees(control(np.array(clock), None, *still) / 0.1) for clock in (0, 3, 4)])
+    assert_allclose(targets[0], np.tile([0, 30], (3, 6)), atol=1e-9)
+    left = [-10, 60, -10, 50, -10, 40]
+    assert_allclose(targets[1][:2], [left + [abs(angle) for angle in left]] * 2, atol=1e-9)
+    assert abs(targets[1][2] - targets[1][1]).max() > 10
+
+
+def test_stacked_controls_are_single_ones():
+    body, presets = ROBOTS["queen"], TUNINGS["queen"]
+    controls = [Prescribed.fit(body, preset) for preset in presets.values()]
+    stacked = Prescribed.stacked(controls)
+    random = np.random.default_rng(0)
+    for clock in (0, 3, 14, 15, 40, 500):
+        angles, velocities = random.normal(0.0, 0.3, (2, len(presets), 18))
+        actions = stacked(np.full(len(presets), clock), None, angles, velocities)
+        for row, control in enumerate(controls):
+            assert_array_equal(actions[row], control(np.array(clock), None, angles[row], velocities[row]))
