@@ -10,12 +10,15 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from arc_suite import checks, rotations
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.models.sizing import GRAVITY, control_timestep, natural_frequency, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.gaits import Gait
 from arc_suite.robots.spec import Body, Leg
 from arc_suite.tasks.fitting import GAIT_FREQUENCY
+
+_LEAST_FROUDE = 1e-3
 
 LIFT = 0.2  # of the standing height: how far a foot is lifted in mid-swing
 
@@ -68,8 +71,8 @@ class Stride(NamedTuple):
         Raises:
             ValueError: such a speed cannot be.
         """
-        if not (isinstance(froude, (int, float)) and 1e-3 <= abs(froude) <= 1.0):
-            raise ValueError(f"froude: expected a number from 0.001 to 1, or negative, got {froude!r}")
+        if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
+            raise ValueError(f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {froude!r}")
         body = sized(body)
         pose = standing(body)
         cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / pose.height)
