@@ -28,8 +28,8 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
     """Write a file atomically: `with writing("a.png") as temporary: save(temporary)`.
 
     The temporary file lies beside the target and has its extension; it takes the target's place
-    when the block ends and is deleted if the block raises. Open the block before any long work:
-    what cannot be written is found out at once.
+    when the block ends, unless the block has deleted it, and is deleted if the block raises. Open
+    the block before any long work: what cannot be written is found out at once.
 
     Args:
         path: the target; a file that is there is replaced.
@@ -52,7 +52,8 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
     try:
         yield temporary
-        temporary.replace(target)
+        if temporary.exists():
+            temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
 

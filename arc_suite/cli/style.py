@@ -6,8 +6,8 @@
   arc-suite style --policy out/spider.npz --compare zero
   arc-suite style --policy arc_suite/queen/walk/cpg-medium-v0 --compare arc_suite/queen/walk/random-v0
 
-`--output` writes gait.png, reward.png, speed.png and path.png of the first episode. What every
-metric means is written in arc_suite/style/metrics.py.
+`--output` writes gait.png, reward.png, speed.png and path.png of the first episode; no gait.png where
+the task prescribes no gait. What every metric means is written in arc_suite/style/metrics.py.
 """
 
 import contextlib
@@ -120,7 +120,7 @@ def pictures(robots: list[str]):
         yield lambda robot, tracks: None
         return
     try:
-        from arc_suite.style.plots import PICTURES
+        from arc_suite.style.plots import OF_GAIT, PICTURES
     except ImportError as error:
         raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
     with contextlib.ExitStack() as stack:
@@ -130,8 +130,12 @@ def pictures(robots: list[str]):
             targets[robot] = {name: stack.enter_context(files.writing(folder / f"{name}.png")) for name in PICTURES}
 
         def draw(robot, tracks):
+            gaits = all(track.parameters is not None for track in tracks.values())
             for name, file in targets[robot].items():
-                PICTURES[name](tracks).savefig(file)
+                if name in OF_GAIT and not gaits:
+                    file.unlink()  # so that nothing is written
+                else:
+                    PICTURES[name](tracks).savefig(file)
 
         yield draw
 

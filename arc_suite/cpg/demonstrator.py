@@ -1,4 +1,4 @@
-"""Demonstrators: policies that walk by rote, from nothing but their clock and the joints they feel."""
+"""Demonstrators: policies that walk from nothing but their clock and the torso and joints they feel."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,16 +20,16 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
 
 class Demonstrator:
-    """Walks one body at one speed, in one environment or in a batch of them.
+    """A policy that walks one body at one speed, in one environment or in the rows of a batch.
 
-    The policy keeps its own clock, one for each environment, and asks the observation for joint
-    angles and velocities and the torso's orientation alone. It acts in the rows of a batch by
-    `begin` and `act`, as every policy does, and in one environment as a function of a `TimeStep`
-    with named blocks, whose first of an episode restarts the clock.
+    It keeps a clock of its own for each row, and takes joint angles and velocities and the torso's
+    orientation alone from the observation. It acts in the rows of a batch by `begin` and `act`, as
+    every policy does, and in one environment as a function of a `TimeStep` with named blocks, whose
+    first of an episode restarts the clock.
     """
 
     def __init__(self, robot: str | Body, preset: str | Preset = "medium", froude: float | None = None, gait=None):
-        """Prepares a demonstrator.
+        """Fit a demonstrator to a body.
 
         Args:
             robot: queen, bastion, tick or leaper, or any body.
@@ -141,7 +141,7 @@ class Prescribed(NamedTuple):
 
     @classmethod
     def fit(cls, body: Body, preset: Preset, gait: gaits.Gait | None = None) -> Self:
-        """A preset, laid out over a body's joints, in its own gait or another."""
+        """Return a preset, laid out over a body's joints, in its own gait or another."""
         if gait is not None:
             preset = preset._replace(phase_offsets=gait.offsets, duty_factor=gait.duty_factor)
         laid = pattern(body, preset)
@@ -150,7 +150,7 @@ class Prescribed(NamedTuple):
 
     @classmethod
     def stacked(cls, controls: Sequence[Self]) -> Self:
-        """Several controls of one body as one, of a batch that has a row for each."""
+        """Return several controls of one body as one, of a batch that has a row for each."""
 
         def stack(values):
             return np.stack([np.atleast_1d(value) for value in values])
@@ -159,7 +159,7 @@ class Prescribed(NamedTuple):
         return cls(Pattern(*map(stack, zip(*patterns, strict=True))), *map(stack, numbers))
 
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
-        """Actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
+        """Return the actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
         steps = clock[..., None]
         walking = joint_targets(self.pattern, (self.control_timestep * steps)[..., 0])
         targets = np.where(steps < self.settle, self.crouch, walking)
@@ -168,7 +168,7 @@ class Prescribed(NamedTuple):
 
 
 def pattern(body: Body, preset: Preset) -> Pattern:
-    """Lays a preset out over a body's joints.
+    """Return a preset, laid out over a body's joints.
 
     Raises:
         ValueError: it does not fit the body; one line.

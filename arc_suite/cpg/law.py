@@ -32,7 +32,7 @@ class Pattern(NamedTuple):
 
 
 def joint_targets(pattern: Pattern, time) -> np.ndarray:
-    """Joint angles (..., joints) wanted at a time (...) in s, in rad."""
+    """Return the joint angles (..., joints) wanted at a time (...) in s, in rad."""
     cycle = (pattern.frequency * time[..., None] + pattern.offset) % 1.0
     duty = pattern.duty_factor
     in_stance = cycle < duty
@@ -43,5 +43,5 @@ def joint_targets(pattern: Pattern, time) -> np.ndarray:
 
 
 def torques(targets, angles, velocities, stiffness, damping) -> np.ndarray:
-    """Actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s)."""
+    """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s)."""
     return (stiffness * (targets - angles) - damping * velocities).clip(-1.0, 1.0)

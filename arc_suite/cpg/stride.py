@@ -60,7 +60,7 @@ class Stride(NamedTuple):
 
     @classmethod
     def fit(cls, body: Body, froude: float, gait: Gait) -> Self:
-        """Fits the stride to a body.
+        """Return the stride that suits a body.
 
         Args:
             body: the spec.
@@ -111,8 +111,9 @@ class Stride(NamedTuple):
         )
 
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
-        """Actions (..., joints) after `clock` (...) control steps."""
-        yaw = rotations.yaw(np.asarray(quaternion))[..., None]
+        """Return the actions (..., joints) after `clock` (...) control steps."""
+        w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))[..., None]
         # Turned to the left, legs on the left take longer strides.
         pattern = self.pattern._replace(
             sweep=self.pattern.sweep * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))
@@ -126,14 +127,14 @@ class Stride(NamedTuple):
 
 
 def _sweep(leg: Leg, jacobian, reach: float) -> np.ndarray:
-    """The joint angles (joints of the leg,) that bring a leg's foot forward by `reach`, and back if negated."""
+    """Return the joint angles (joints of the leg,) that bring a leg's foot forward by `reach`, and back if negated."""
     low, high = _ranges(leg)
     room = np.minimum(np.minimum(-low, high), LARGEST_SWEEP)
     return _towards(jacobian, (reach, 0.0, 0.0), _SWEEP_WEIGHTS, room, room)
 
 
 def _lift(leg: Leg, jacobian, height: float) -> np.ndarray:
-    """The joint angles (joints of the leg,) that lift a leg's foot by a height."""
+    """Return the joint angles (joints of the leg,) that lift a leg's foot by a height."""
     low, high = _ranges(leg)
     return _towards(
         jacobian, (0.0, 0.0, height), _LIFT_WEIGHTS, np.minimum(-low, LARGEST_LIFT), np.minimum(high, LARGEST_LIFT)
@@ -141,12 +142,12 @@ def _lift(leg: Leg, jacobian, height: float) -> np.ndarray:
 
 
 def _ranges(leg: Leg) -> np.ndarray:
-    """Lower and upper bounds (2, joints of the leg) of targets, rad."""
+    """Return the lower and upper bounds (2, joints of the leg) of targets, rad."""
     return _USED * np.radians([joint.range_deg for joint in leg.joints]).T
 
 
 def _towards(jacobian, displacement, weights, below, above) -> np.ndarray:
-    """Joint angles (joints,) that move a foot by a displacement, to first order and within bounds.
+    """Return the joint angles (joints,) that move a foot by a displacement, to first order and within bounds.
 
     Damped least squares give the direction; along it, plain least squares give the length, which
     the room `below` and `above` zero bounds.

@@ -79,7 +79,6 @@ def collect(
 
 
 def _check(settings: Settings, episodes: int) -> None:
-    checks.number("noise", settings.noise, 0.0)
     checks.integer("steps", settings.steps, 1)
     checks.seed(settings.seed)
     checks.seed(settings.seed + episodes - 1)

@@ -31,7 +31,7 @@ def open(dataset_id: str) -> "Dataset":
 
 
 class Dataset:
-    """The recorded episodes of one body: a sequence of `Episode`s, each read when it is asked for.
+    """A dataset of recorded episodes: a sequence of `Episode`s, each read when it is asked for.
 
     Attributes:
         id: Minari's.

@@ -14,7 +14,7 @@ TERMS = "infos/reward_terms"  # as in the info of a step
 
 
 class Episode(NamedTuple):
-    """One recorded episode.
+    """A recorded episode.
 
     Attributes:
         seed: of its reset.

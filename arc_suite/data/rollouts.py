@@ -11,7 +11,7 @@ from arc_suite.policies import Policy
 
 
 class Step(NamedTuple):
-    """What one control step of all rows brought.
+    """The outcome of one control step of all rows.
 
     Attributes:
         playing: number of rows that played.
@@ -71,7 +71,7 @@ def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: in
 
 
 class _Recording:
-    """What happens in the rows: allocated once, filled from step to step."""
+    """Arrays of what happens in the rows: allocated once, filled from step to step."""
 
     def __init__(self, environment: VectorEnv, steps: int):
         rows = environment.num_envs

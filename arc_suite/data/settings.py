@@ -1,4 +1,4 @@
-"""What a dataset is collected with: all that its episodes depend on."""
+"""Settings of datasets: all that their episodes depend on."""
 
 import copy
 import hashlib
@@ -24,7 +24,7 @@ from arc_suite.tasks.contract import STEPS
 
 
 class Settings(NamedTuple):
-    """What the episodes of a dataset depend on; episode k has the seed `seed + k` and nothing else of its own.
+    """All that the episodes of a dataset depend on; episode k has the seed `seed + k` and nothing else of its own.
 
     Attributes:
         body: what moves.

@@ -1,4 +1,4 @@
-"""A dataset while it is collected: whenever a kill or a full disk comes, what is there opens.
+"""Storage of a dataset while it is collected: whenever a kill or a full disk comes, what is there opens.
 
 No file is written where it is read. Finished episodes go to part files, `data/parts/<n>.hdf5`, each
 written beside its place and moved there. `main_data.hdf5`, which Minari opens, is a small file of

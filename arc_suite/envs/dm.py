@@ -2,6 +2,8 @@
 
 import collections
 import math
+from collections.abc import Mapping
+from typing import Any
 
 import dm_env
 import numpy as np
@@ -48,14 +50,19 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
         checks.name(name, ["flat_observation"], "environment setting")
     run = TaskRun(task, random, on_divergence, options.get("flat_observation", False))
     run.visualize_reward = visualize_reward
-    return Environment(Physics.from_body(task.scene.body, task.scene.arena), run)
+    return Environment(Physics.from_body(task.scene.body, task.scene.arena), run, settings)
 
 
 class Environment(control.Environment):
-    """A task in a simulation; steps, resets and specs are those of dm_control."""
+    """A task in a simulation; steps, resets and specs are those of dm_control.
 
-    def __init__(self, physics: Physics, run: "TaskRun"):
+    Attributes:
+        task_kwargs: the settings with which `load` opened the task.
+    """
+
+    def __init__(self, physics: Physics, run: "TaskRun", task_kwargs: Mapping[str, Any]):
         """Put a task's run and its simulation together; `load` makes both."""
+        self.task_kwargs = task_kwargs
         limit = run.definition.step_limit
         step = SUBSTEPS * physics.timestep()
         super().__init__(

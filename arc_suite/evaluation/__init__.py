@@ -1,4 +1,4 @@
-"""How policies are judged: the protocol, and figures over episodes."""
+"""Evaluation of policies: the protocol, and figures over episodes."""
 
 from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, expert_return, rollout, run
 from arc_suite.evaluation.statistics import Summary, interquartile_mean, iqm_and_interval, summary

@@ -1,4 +1,4 @@
-"""Do random bodies walk? Runs their demonstrators over a range of seeds and judges each walk."""
+"""A census of random bodies: their demonstrators walk, and each walk is judged."""
 
 import collections
 import functools
@@ -25,7 +25,7 @@ MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body ha
 
 
 class Trial(NamedTuple):
-    """What to try.
+    """What one walk of a census is to be.
 
     Attributes:
         seed: of the random body and of its initial pose.
@@ -53,7 +53,7 @@ class Trial(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """How a walk went.
+    """What became of a walk.
 
     Attributes:
         trial: what was tried.
@@ -76,7 +76,7 @@ class Outcome(NamedTuple):
 
 
 class Course(NamedTuple):
-    """A walk as the torso went it; leading axis: control steps, the start included.
+    """The course of the torso in a walk; leading axis: control steps, the start included.
 
     Attributes:
         positions: (n, 2) m, x and y.
@@ -90,7 +90,7 @@ class Course(NamedTuple):
 
 
 def follow(trial: Trial) -> tuple[control.Environment, Course]:
-    """Walks one body.
+    """Play the walk of one body.
 
     Returns:
         The environment as the walk left it, and the walk.
@@ -117,7 +117,7 @@ def follow(trial: Trial) -> tuple[control.Environment, Course]:
 
 
 def judge(trial: Trial, course: Course) -> Outcome:
-    """Tells whether a course is a walk, and if not, why: a fall, dragging, slowness or drift."""
+    """Return whether a course is a walk, and if not, why: a fall, dragging, slowness or drift."""
     body = trial.body
     forward, sideways = course.positions[-1] - course.positions[0]
     length = 2.0 * body.torso.solids[0].size[0]
@@ -142,14 +142,14 @@ def judge(trial: Trial, course: Course) -> Outcome:
 
 
 def attempt(trial: Trial) -> Outcome:
-    """Walks one body and judges the walk."""
+    """Play the walk of one body and judge it."""
     environment, course = follow(trial)
     environment.close()
     return judge(trial, course)
 
 
 def census(trials: Sequence[Trial], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
-    """Walk many bodies.
+    """Play and judge the walks of many bodies.
 
     Args:
         trials: to run.
@@ -169,7 +169,7 @@ def census(trials: Sequence[Trial], processes: int | None = None, progress: Call
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """How many walked and their median speed, by legs and links, as text."""
+    """Return as text how many bodies walked, and their median speed, by legs and links."""
     links = sorted({outcome.links for outcome in outcomes})
     lines = ["legs " + "".join(f"{f'{k} link' + 's' * (k > 1):>18}" for k in links) + f"{'all':>18}"]
     for legs in sorted({outcome.legs for outcome in outcomes}):
@@ -189,7 +189,7 @@ def _cell(outcomes: Sequence[Outcome]) -> str:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """The whole of a census in a few lines."""
+    """Return a census in a few lines of text."""
     walked = sum(not outcome.failures for outcome in outcomes)
     reasons = collections.Counter(reason for outcome in outcomes for reason in outcome.failures)
     speed, drift = (np.median([getattr(outcome, name) for outcome in outcomes]) for name in ("froude", "drift"))

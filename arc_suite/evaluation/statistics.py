@@ -10,7 +10,7 @@ CONFIDENCE = 0.95
 
 
 class Summary(NamedTuple):
-    """A figure over episodes; episodes in which it is NaN are left out, NaN if that is all of them.
+    """The summary of a figure over episodes; those in which it is NaN are left out, NaN if that is all of them.
 
     Attributes:
         mean: of the values.
@@ -28,7 +28,7 @@ class Summary(NamedTuple):
 
 
 def summary(values: Sequence[float]) -> Summary:
-    """Sums a figure up over episodes.
+    """Return the summary of a figure over episodes.
 
     Args:
         values: one for each episode; NaN where it is undefined; may be infinite.
@@ -43,7 +43,7 @@ def summary(values: Sequence[float]) -> Summary:
 
 
 def interquartile_mean(values) -> np.ndarray:
-    """Mean of the middle half, over the last axis: (..., n) to (...).
+    """Return the mean of the middle half, over the last axis: (..., n) to (...).
 
     A quarter of the values, rounded down, is cut off at either end, as in rliable and in SciPy's
     `trim_mean` (Agarwal et al., "Deep reinforcement learning at the edge of the statistical
@@ -55,7 +55,7 @@ def interquartile_mean(values) -> np.ndarray:
 
 
 def iqm_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[float, tuple[float, float]]:
-    """Interquartile mean of all values, with its stratified bootstrap interval (Agarwal et al., 2021).
+    """Return the interquartile mean of all values, with its stratified bootstrap interval (Agarwal et al., 2021).
 
     Every resample draws as many values from each stratum as it has; the interval lies between the
     2.5th and the 97.5th percentile of the resamples' interquartile means.

@@ -1,4 +1,4 @@
-"""Who acts: one protocol, and policies by name."""
+"""Policies: one protocol of acting, and policies by name."""
 
 from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, policy
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone

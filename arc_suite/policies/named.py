@@ -61,11 +61,13 @@ def policy(
         noise: standard deviation of normal noise on the actions, by the episode's seed.
 
     Raises:
-        ValueError: an unknown name; one line that names it and the nearest valid one.
+        ValueError: an unknown name, or a value out of range; one line that names it and the nearest
+            valid one.
     """
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
         checks.name(preset, PRESETS, "preset")
+    checks.number("noise", noise, 0.0)
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, str) and ":" in name:
         made = _from_path(name, body, rows)

@@ -1,4 +1,4 @@
-"""The protocol of acting, made for rows: who acts in the rows of a batch, or in one environment as a batch of one."""
+"""The protocol of acting, made for the rows of a batch; one environment is a batch of one."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
@@ -11,7 +11,7 @@ from arc_suite.envs.scene import checked_action
 
 
 class Policy(Protocol):
-    """Who acts in the rows of a batch, each row an episode of its own.
+    """A policy for the rows of a batch, each row an episode of its own.
 
     What it does in an episode depends on nothing but the episode's seed, observations and rewards.
     """
@@ -32,7 +32,7 @@ class Policy(Protocol):
 
 
 class Script:
-    """Actions that do not depend on what happens."""
+    """A policy whose actions do not depend on what happens."""
 
     def __init__(self, script: Callable[[int], Iterable[np.ndarray]], rows: int, joints: int):
         """Take a function of a seed that gives the actions (joints,) of its episode; past their end, 0."""
@@ -51,7 +51,7 @@ class Script:
 
 
 class Sum:
-    """The sum of what two policies do."""
+    """A policy whose actions are the sums of those of two."""
 
     def __init__(self, first: Policy, second: Policy):
         """Take the policies."""
@@ -68,7 +68,7 @@ class Sum:
 
 
 class Mixture:
-    """Policies that take turns from seed to seed."""
+    """A policy that is one of several, which take turns from seed to seed."""
 
     def __init__(self, policies: Sequence[Policy], rows: int):
         """Take the policies; the episode of seed s is that of the one at s modulo their number."""
@@ -88,7 +88,7 @@ class Mixture:
 
 
 class Individuals:
-    """Plain functions of a dm_env `TimeStep`, one made anew for every episode.
+    """A policy of plain functions of a dm_env `TimeStep`, one made anew for every episode.
 
     A function gets what it would get in the environment of `arc_suite.load`: named blocks, in the
     precision in which they come.

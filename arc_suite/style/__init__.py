@@ -1,4 +1,4 @@
-"""How well a body moves, beside what it earns: recorded rollouts, metrics of style, and pictures of both."""
+"""Style of movement, beside what it earns: recorded rollouts, metrics of style, and pictures of both."""
 
 from arc_suite.style.files import load, save
 from arc_suite.style.measures import METRICS, measure, report

@@ -1,4 +1,4 @@
-"""Tracks on disk: one .npz file of plain arrays, with the body and the versions that made them, and no pickles.
+"""Saves and loads tracks: one .npz file of plain arrays, with the body and the versions that made them, and no pickles.
 
 Track i's field positions is the array `i/positions`; what is a mapping or a tuple of names, such as
 the reward's terms, has an array for each, `i/terms/forward`. Numbers are arrays without axes.
@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from arc_suite import versions
+from arc_suite import checks, versions
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.style.tracks import Track
 from arc_suite.tasks import terms
@@ -19,10 +19,11 @@ FORMAT = "arc_suite tracks 2"  # another number for every change of what a file 
 
 
 def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
-    """Writes tracks of one body.
+    """Write tracks of one body.
 
     Raises:
-        ValueError: no tracks, or tracks of several bodies; one line.
+        ValueError: no tracks, tracks of several bodies, or settings of a task that JSON cannot hold;
+            one line.
         OSError: the file cannot be written.
     """
     bodies = {track.body for track in tracks}
@@ -30,7 +31,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
         raise ValueError(f"tracks: expected those of one body, got {sorted(body.name for body in bodies)}")
     arrays = {"format": FORMAT, "body": body_to_json(*bodies), "versions": json.dumps(versions.recorded())}
     for index, track in enumerate(tracks):
-        fields = track._asdict()
+        fields = track._asdict() | {"task_kwargs": checks.json_text("task_kwargs", track.task_kwargs)}
         del fields["body"]
         arrays |= _flat({name: value for name, value in fields.items() if value is not None}, str(index))
     with open(path, "wb") as file:
@@ -38,7 +39,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
 
 
 def _flat(fields: Mapping, path: str) -> dict:
-    """The values of a mapping and of the mappings and named tuples in it, by path."""
+    """Return the values of a mapping and of the mappings and named tuples in it, by path."""
     values = {}
     for name, value in fields.items():
         value = value._asdict() if hasattr(value, "_asdict") else value
@@ -48,7 +49,7 @@ def _flat(fields: Mapping, path: str) -> dict:
 
 
 def load(path: str | os.PathLike) -> list[Track]:
-    """Reads tracks, equal to the bit to those that were saved.
+    """Read tracks, equal to the bit to those that were saved.
 
     Raises:
         ValueError: the file holds no tracks, or those of another format, or is damaged; one line.
@@ -72,7 +73,7 @@ def load(path: str | os.PathLike) -> list[Track]:
 
 
 def _track(body, arrays, index) -> Track:
-    """The track of an index; arrays without axes become numbers, and those of `Track`'s tuples tuples."""
+    """Return the track of an index; arrays without axes become numbers, and those of `Track`'s tuples tuples."""
     fields = {}
     for name, array in arrays.items():
         top, *path = name.split("/")
@@ -85,4 +86,5 @@ def _track(body, arrays, index) -> Track:
         low, high = fields["parameters"]["healthy_range"].tolist()
         fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
     absent = {"phases": None, "parameters": None, "progress": {}}
-    return Track(body=body, **absent | fields | {"legs": tuple(fields["legs"].tolist())})
+    values = {"legs": tuple(fields["legs"].tolist()), "task_kwargs": json.loads(fields["task_kwargs"])}
+    return Track(body=body, **absent | fields | values)

@@ -1,4 +1,4 @@
-"""The report of style: all metrics of a track by name, and their figures over episodes."""
+"""Reports of style: all metrics of a track by name, and their figures over episodes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -11,24 +11,24 @@ from arc_suite.style.tracks import Track
 
 
 def _stride_frequency(track: Track) -> float:
-    """One stride a cycle of the clock, Hz; NaN where legs shall always stand or never."""
+    """Return one stride a cycle of the clock, Hz; NaN where legs shall always stand or never."""
     parameters = track.parameters
     return parameters.gait_frequency if 0.0 < parameters.duty_factor < 1.0 else np.nan
 
 
 def _stride_length(track: Track) -> float:
-    """The way in a stride at the target speed, m; NaN where no stride or no speed is prescribed."""
+    """Return the way in a stride at the target speed, m; NaN where no stride or no speed is prescribed."""
     return track.target_velocity / (_stride_frequency(track) or np.nan)
 
 
 class Metric(NamedTuple):
-    """What stands behind a metric's name.
+    """The entry of a metric in the table.
 
     Attributes:
         function: of a track.
         unit: shares and indices have none.
         prescribed: the value that the task asks for, of a track; None where it leaves that open.
-        of_gait: whether it compares with the prescribed gait, and is left out in a task without one.
+        of_gait: whether it needs the prescribed gait or pose; left out in a task without one.
     """
 
     function: Callable[[Track], np.ndarray | float]
@@ -38,7 +38,7 @@ class Metric(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """The robot's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
+    """The body's value of a metric, and each leg's by name; no legs where it is not a metric of legs."""
 
     value: float
     legs: Mapping[str, float]
@@ -71,7 +71,7 @@ METRICS = {
 
 
 def measure(track: Track) -> dict[str, Measurement]:
-    """All metrics of a track, by name.
+    """Return the metrics of a track by name; those of the gait if its task prescribes one.
 
     A robot's phase error is the mean size of its legs' errors, so that early and late do not
     cancel. Legs whose value is NaN do not count; NaN if that is all of them.
@@ -93,7 +93,7 @@ def _measurement(track, name, values) -> Measurement:
 
 
 def report(tracks: Sequence[Track]) -> dict:
-    """The figures of a policy, over tracks of one body and task.
+    """Return the figures of a policy, over tracks of one body and task.
 
     Returns:
         `return` and `length` as summaries of the evaluation protocol, `progress` likewise by name, and
@@ -124,6 +124,6 @@ def report(tracks: Sequence[Track]) -> dict:
 
 
 def _prescribed(metric: Metric, track: Track) -> float | None:
-    """The value that the task asks for; None where it asks for none."""
+    """Return the value that the task asks for; None where it asks for none."""
     value = metric.prescribed and metric.prescribed(track)
     return None if value is None or np.isnan(value) else value

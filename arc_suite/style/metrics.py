@@ -32,7 +32,7 @@ def duty_factor(track: Track) -> np.ndarray:
 
 
 def phase_error(track: Track) -> np.ndarray:
-    """How late the middle of stance comes against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
+    """Lateness of the middle of stance against the schedule, in cycles of the clock; (feet,) in -0.5 to 0.5.
 
     The middle of stance is its circular mean over the clock (Fisher, "Statistical analysis of
     circular data", 1993), taken of the schedule on the same samples too. NaN for a leg that never
@@ -49,7 +49,7 @@ def phase_error(track: Track) -> np.ndarray:
 
 
 def phase_scatter(track: Track) -> float:
-    """How far the legs' phase errors differ from one another: their circular variance (Fisher, 1993), 0 to 1.
+    """Circular variance of the legs' phase errors (Fisher, 1993), by which they differ from one another; 0 to 1.
 
     0 if all legs are late by the same time, so that the gait is the prescribed one but for a lag;
     1 if half of the legs are half a cycle off the others, as in a hop. NaN for fewer than two legs
@@ -78,7 +78,7 @@ def stride_frequency(track: Track) -> np.ndarray:
 
 
 def _between_touchdowns(track, difference) -> np.ndarray:
-    """A difference between the first and the last touchdown of each leg, by number of strides; (feet,)."""
+    """Return a difference between the first and the last touchdown of each leg, by number of strides; (feet,)."""
     touchdown = track.stance[1:] & ~track.stance[:-1]
     lifts = (~track.stance & (_heights(track) > 0.5 * foot_clearance(track))).cumsum(axis=0)
     means = np.full(len(track.legs), np.nan)
@@ -114,7 +114,7 @@ def foot_clearance(track: Track) -> np.ndarray:
 
 
 def _heights(track) -> np.ndarray:
-    """(steps, feet) of the feet's lowest points over the ground, m."""
+    """Return the heights of the feet's lowest points over the ground, (steps, feet) m."""
     return track.foot_heights - track.foot_radii
 
 
@@ -207,7 +207,7 @@ def cost_of_transport(track: Track) -> float:
 
 
 def forward_axes(track: Track) -> np.ndarray:
-    """Where the torso faces: its x axis in the world, (steps, 3)."""
+    """Return where the torso faces: its x axis in the world, (steps, 3)."""
     return rotations.matrix(track.quaternions)[:, :, 0]
 
 
@@ -216,7 +216,7 @@ def _seconds(track) -> float:
 
 
 def _travelled(track) -> float:
-    """Length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
+    """Return the length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
     way = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
     asked = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
     return way if way > _NOWHERE * asked else 0.0
@@ -232,14 +232,14 @@ def _rms(values) -> float:
 
 
 def _rms_by_leg(track, values) -> np.ndarray:
-    """Root mean square over time and over the joints of each leg: (steps, joints) to (feet,)."""
+    """Return the root mean square over time and over the joints of each leg: (steps, joints) to (feet,)."""
     squares = (values**2).mean(axis=0)
     counts = np.bincount(track.joint_legs, minlength=len(track.legs))
     return np.sqrt(np.bincount(track.joint_legs, squares, len(track.legs)) / counts)
 
 
 def _mean_where(values, mask) -> np.ndarray:
-    """Mean over the last axis where the mask is true, NaN where it is nowhere."""
+    """Return the mean over the last axis where the mask is true, NaN where it is nowhere."""
     counts = mask.sum(axis=-1)
     sums = np.where(mask, values, 0.0).sum(axis=-1)
     return np.where(counts > 0, sums / counts.clip(1), np.nan)

@@ -68,7 +68,7 @@ def _drawn(draw):
 
 @_drawn
 def gait(tracks: Mapping[str, Track]) -> Figure:
-    """Gait diagram: bars of stance over time, by leg, on the prescribed schedule; four seconds amid the track."""
+    """Draw the gait: bars of stance over time, by leg, on the prescribed schedule; four seconds amid the track."""
     legs = max(len(track.legs) for track in tracks.values())
     figure, axes = _rows(tracks, 0.36 * legs + 0.75)
     for (label, track), axis in zip(tracks.items(), axes, strict=True):
@@ -117,7 +117,7 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
 
 @_drawn
 def reward(tracks: Mapping[str, Track]) -> Figure:
-    """Weighted terms of the reward over time, gains stacked upwards and costs downwards; means over a gait cycle."""
+    """Draw the reward's weighted terms over time, gains stacked upwards and costs downwards, as means over a cycle."""
     figure, axes = _rows(tracks, 2.75, sharey=True)
     for (label, track), axis in zip(tracks.items(), axes, strict=True):
         weighted = {name: weight * track.terms[name] for name, weight in track.weights.items()}
@@ -164,13 +164,14 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
 
 @_drawn
 def speed(tracks: Mapping[str, Track]) -> Figure:
-    """Forward speed over time against the target: its mean over a gait cycle, and within it the range of the steps."""
+    """Draw forward speed over time against the target: its mean over a gait cycle, and the range of the steps in it."""
     figure = Figure(figsize=(_WIDTH, 3.5), layout="constrained")
     axis = figure.subplots()
     first = next(iter(tracks.values()))
     if not np.isnan(target := first.target_velocity):
-        band = first.parameters.velocity_band
-        axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0, label="where speed is rewarded")
+        if first.parameters is not None:
+            band = first.parameters.velocity_band
+            axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0, label="where speed is rewarded")
         axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)), label=f"target: {target:.2f} m/s")
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x = track.positions[:, 0]
@@ -190,14 +191,16 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
 
 @_drawn
 def path(tracks: Mapping[str, Track]) -> Figure:
-    """Path of the torso from above, in equal scales; arrows show where the robot faces."""
+    """Draw the path of the torso from above, in equal scales; arrows show where the robot faces."""
     points = np.concatenate([track.positions[:, :2] for track in tracks.values()])
     (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
     width = 1.1 * max(right - left, 1.5 * (high - low), 1.0)
     height = max(1.3 * (high - low), 0.16 * width)
     figure = Figure(figsize=(_WIDTH, 0.92 * _WIDTH * height / width + 1.5), layout="constrained")
     axis = figure.subplots()
-    axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
+    straight = not np.isnan(next(iter(tracks.values())).target_velocity)  # whether x is the way to go
+    if straight:
+        axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x, y = track.positions[:, 0], track.positions[:, 1]
         axis.plot(x, y, color=colour, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
@@ -222,14 +225,14 @@ def path(tracks: Mapping[str, Track]) -> Figure:
     axis.set_aspect("equal")
     axis.locator_params(axis="y", nbins=4)
     axis.set_title("Path of the torso from above")
-    axis.set_xlabel("x (m), the way to go")
+    axis.set_xlabel("x (m), the way to go" if straight else "x (m)")
     axis.set_ylabel("y (m)")
     figure.legend(ncols=2, **_BELOW)
     return figure
 
 
 PICTURES = {function.__name__: function for function in (gait, reward, speed, path)}
-OF_GAIT = ("gait",)  # pictures that a task without a gait has not
+OF_GAIT = ("gait",)  # those that only tracks of a task with a gait have
 
 
 def _rows(tracks, height, **shared):
@@ -238,18 +241,18 @@ def _rows(tracks, height, **shared):
 
 
 def _runs(mask):
-    """First and one past the last index of every run of true values."""
+    """Return the first and one past the last index of every run of true values."""
     return np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int))).reshape(-1, 2)
 
 
 def _steps_in_a_cycle(track) -> float:
-    """Control steps in a cycle of the gait clock; in the whole track, if there is none or it stands."""
+    """Return the control steps in a cycle of the gait clock; in the whole track, if there is none or it stands."""
     frequency = 0.0 if track.parameters is None else track.parameters.gait_frequency
     return 1.0 / (max(frequency, 1.0 / track.times[-1]) * track.time_step)
 
 
 def _over_a_cycle(track, values):
-    """Moving average over a cycle, which need not be whole steps; at the ends over what there is of it."""
+    """Return the moving average over a cycle, which need not be whole steps; at the ends over what there is of it."""
     width = _steps_in_a_cycle(track)
     reach = int(np.ceil(width / 2))
     window = (0.5 * width + 0.5 - abs(np.arange(-reach, reach + 1))).clip(0.0, 1.0)
@@ -258,7 +261,7 @@ def _over_a_cycle(track, values):
 
 
 def _range_over_a_cycle(track, values):
-    """Least and greatest of the values in the cycle about each."""
+    """Return the least and the greatest of the values in the cycle about each."""
     reach = round(_steps_in_a_cycle(track) / 2)
     padded = np.pad(values, reach, mode="reflect" if len(values) > reach else "edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)

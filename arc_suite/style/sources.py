@@ -1,4 +1,4 @@
-"""Where tracks come from: a policy that is recorded, a file in which they were saved, or a dataset that is replayed."""
+"""Sources of tracks: a policy that is recorded, a file in which they were saved, or a dataset that is replayed."""
 
 import functools
 import re
@@ -21,7 +21,7 @@ HELP = (
 
 
 class Stage(NamedTuple):
-    """Of what tracks are wanted.
+    """What is to be recorded: a body in a task.
 
     Attributes:
         body: that moves.
@@ -35,7 +35,7 @@ class Stage(NamedTuple):
 
 
 class Source(NamedTuple):
-    """Something that gives tracks.
+    """A source of tracks.
 
     Attributes:
         label: by which it is shown.
@@ -60,7 +60,7 @@ def source(name: str, preset: str = "medium") -> Source:
     Raises:
         ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened;
             one line. `takes` raises it too, of a policy that does not go with the body, a seed that
-            is none, and tracks of another body or task; so do a policy whose action is none, and a
+            is none, and tracks of another body, task or settings; so do a policy whose action is none, and a
             replay whose rewards are not those recorded.
         OSError: a file cannot be read; one line.
     """
@@ -85,7 +85,7 @@ def _played(name: str, preset: str) -> Source:
 
 def _saved(path: str) -> Source:
     tracks = load(path)
-    stage = Stage(tracks[0].body, tracks[0].task)
+    stage = Stage(tracks[0].body, tracks[0].task, tracks[0].task_kwargs)
 
     def takes(wanted, seeds):
         _check_stage(path, stage, wanted)
@@ -100,7 +100,7 @@ def _replayed(dataset_id: str) -> Source:
     except ImportError as error:
         raise ValueError(str(error)) from None
     dataset = data.open(dataset_id)
-    stage = Stage(dataset.body, dataset.task, dataset.task_kwargs)
+    stage = Stage(dataset.settings.body, dataset.settings.task, dataset.settings.task_kwargs)
 
     def replay(environment, index):
         episode = dataset[index]
@@ -123,9 +123,13 @@ def _replayed(dataset_id: str) -> Source:
 
 
 def _check_stage(name: str, stage: Stage, wanted: Stage) -> None:
-    """Raise a ValueError of one line, unless tracks are of the body and the task that are wanted."""
+    """Raise a ValueError of one line, unless tracks are of the body, the task and the settings that are wanted."""
     if stage.body != wanted.body:
         other = "another body of that name" if stage.body.name == wanted.body.name else stage.body.name
         raise ValueError(f"{name}: expected tracks of {wanted.body.name}, got those of {other}")
-    if stage.task != wanted.task:
+    # The name alone tells tasks apart: what stands before it is the module that registers it.
+    if stage.task.rpartition(":")[2] != wanted.task.rpartition(":")[2]:
         raise ValueError(f"{name}: expected tracks of the task {wanted.task}, got those of {stage.task}")
+    there, asked = (checks.json_text("task_kwargs", each.task_kwargs) for each in (stage, wanted))
+    if there != asked:
+        raise ValueError(f"{name}: expected tracks with the settings {asked}, got those with {there}")

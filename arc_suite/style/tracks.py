@@ -1,7 +1,7 @@
-"""Recorded rollouts as plain arrays: all that a report of style needs."""
+"""Records rollouts as plain arrays: all that a report of style needs."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,11 +14,12 @@ from arc_suite.tasks.terms import Parameters, total
 
 
 class Track(NamedTuple):
-    """A rollout: one row for the end of every control step, SI units, angles in rad.
+    """A recorded rollout: one row for the end of every control step, SI units, angles in rad.
 
     Attributes:
         body: what moved.
         task: name of the task.
+        task_kwargs: its settings, as in `arc_suite.load`.
         seed: of the episode, with which the actions repeat it.
         time_step: s between rows.
         positions: (steps, 3) of the torso.
@@ -50,6 +51,7 @@ class Track(NamedTuple):
 
     body: Body
     task: str
+    task_kwargs: Mapping[str, Any]
     seed: int
     time_step: float
     positions: np.ndarray
@@ -80,22 +82,22 @@ class Track(NamedTuple):
 
     @property
     def times(self) -> np.ndarray:
-        """(steps,) s since the start of the episode."""
+        """Times since the start of the episode, (steps,) s."""
         return self.time_step * np.arange(1, len(self.positions) + 1)
 
     @property
     def stance(self) -> np.ndarray:
-        """(steps, feet) which feet are in stance: below the threshold of the paper's Section 4."""
+        """Feet in stance, (steps, feet) booleans: those below the threshold of the paper's Section 4."""
         return self.foot_heights < self.parameters.stance_threshold
 
     @property
     def schedule(self) -> np.ndarray:
-        """(steps, feet) which feet the gait wants in stance (the paper's Section 4)."""
+        """Feet that the gait wants in stance (the paper's Section 4), (steps, feet) booleans."""
         return wanted_stance(self.phases, self.parameters.duty_factor, self.parameters.phase_offsets)
 
     @property
     def rewards(self) -> np.ndarray:
-        """(steps,)"""
+        """Rewards of the steps, (steps,)."""
         return total(self.terms, self.weights)
 
 
@@ -111,7 +113,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
         max_steps: to stop early.
 
     Returns:
-        The track.
+        The track; without phases and parameters if the task prescribes no gait.
     """
     run, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
     task = run.definition
@@ -146,6 +148,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
     return Track(
         body=body,
         task=task.name,
+        task_kwargs=environment.task_kwargs,
         seed=int(seed),
         time_step=environment.control_timestep(),
         **{"phases": None} | recorded,
@@ -164,7 +167,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
 
 
 def mirrors(body: Body) -> np.ndarray:
-    """For each leg the index of the leg that stands across the x-z plane, -1 if there is none."""
+    """Return for each leg the index of the leg that stands across the x-z plane, -1 if there is none."""
     stands = np.array([leg.foot_position for leg in body.legs])
     distances = np.linalg.norm(stands[:, None] - stands * (1, -1, 1), axis=-1)
     nearest = distances.argmin(axis=1)
@@ -173,7 +176,7 @@ def mirrors(body: Body) -> np.ndarray:
 
 
 def lowest_point_velocities(model, data, feet, radii) -> np.ndarray:
-    """Velocities of the feet where they would touch the floor: (feet, 3) m/s in the world frame.
+    """Return the velocities of the feet where they would touch a level floor: (feet, 3) m/s in the world frame.
 
     Args:
         model: `mujoco.MjModel`

@@ -1,4 +1,4 @@
-"""What a search has found so far, in a file of JSON lines that survives being broken off."""
+"""Journals: what a search has found so far, in a file of JSON lines that survives being broken off."""
 
 import fcntl
 import json
@@ -18,7 +18,7 @@ class Journal:
     """
 
     def __init__(self, path: str | os.PathLike, settings: Mapping[str, Any]):
-        """Opens the file, or starts one.
+        """Open the file, or starts one.
 
         Args:
             path: of the file, in a folder that is there.
@@ -49,12 +49,12 @@ class Journal:
             self._write(header)
 
     def append(self, generation: Generation) -> None:
-        """Adds a generation, which is in the file from then on."""
+        """Add a generation, which is in the file from then on."""
         self._write(_line(generation._asdict()))
         self.generations.append(generation)
 
     def close(self) -> None:
-        """Closes the file."""
+        """Close the file."""
         self._file.close()
 
     def _write(self, line: bytes) -> None:
@@ -67,7 +67,7 @@ def _line(value: Mapping[str, Any]) -> bytes:
 
 
 def _generations(path: Path, text: bytes, header: bytes) -> list[Generation]:
-    """The generations of a journal's text, if its header is that one."""
+    """Return the generations of a journal's text, if its header is that one."""
     advice = "delete it or write to another folder"
     try:
         found, *lines = map(json.loads, text.splitlines())

@@ -33,7 +33,7 @@ class Score(NamedTuple):
 
 
 class Judge:
-    """Plays seeded episodes of presets, each in a row of one vector environment."""
+    """A judge that plays seeded episodes of presets, each in a row of one vector environment."""
 
     def __init__(
         self,
@@ -51,11 +51,18 @@ class Judge:
             presets: how many are judged at once.
             episodes: of each.
             steps: control steps of an episode.
-            task: name of the task; its terms must have those of `TERMS`.
+            task: name of the task, whose reward has the terms of `TERMS`.
             task_kwargs: its settings, as in `arc_suite.load`.
+
+        Raises:
+            ValueError: a task whose reward has other terms; one line.
         """
         self._body, self._shape, self._steps = body, (presets, episodes), steps
         self._environment = VectorEnv(body, task, presets * episodes, task_kwargs=task_kwargs)
+        there = self._environment.task.settings.weights
+        if not set(TERMS) <= there.keys():
+            self.close()
+            raise ValueError(f"task {task}: expected a reward with terms {' and '.join(TERMS)}, got {', '.join(there)}")
 
     def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> Score:
         """Play the episodes of these seeds, which are the same for all presets."""

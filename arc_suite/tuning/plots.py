@@ -15,7 +15,7 @@ _STYLE_COLOURS = ("#D55E00", "#CC79A7", "#E69F00")
 
 
 def course(robot: str, reward: float, generations: Sequence[Generation], length: int) -> Figure:
-    """Returns and style over generations, beside those of the preset `medium`.
+    """Draw returns and style over generations, beside those of the preset `medium`.
 
     Args:
         robot: whose search it was.

@@ -1,4 +1,4 @@
-"""CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the numbers of a demonstrator.
+"""Searches by CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the numbers of a demonstrator.
 
 A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
 generation and the same for all of its candidates, less two penalties: for a style that is worse
@@ -65,7 +65,7 @@ class Search:
         task: str = "walk",
         task_kwargs: Mapping[str, Any] | None = None,
     ):
-        """Judges `medium`, with leads over its clock too; the best one is where the search sets out.
+        """Judge `medium`, with leads over its clock too; the best one is where the search sets out.
 
         Args:
             robot: one that has presets.
@@ -78,6 +78,7 @@ class Search:
 
         Raises:
             ImportError: no package `cma`.
+            ValueError: a task without the terms of style; one line.
         """
         import cma  # of the extra "tune"
 
@@ -102,7 +103,7 @@ class Search:
         self._generations = 0
 
     def step(self, fitness: list[float] | None = None) -> Generation | None:
-        """Goes on by a generation.
+        """Go on by a generation.
 
         Args:
             fitness: of its candidates, if they have been judged before.
@@ -120,7 +121,7 @@ class Search:
         return generation
 
     def result(self) -> Preset:
-        """What the search believes to be best: the mean of its distribution, rounded."""
+        """Return what the search believes to be best: the mean of its distribution, rounded."""
         return self._space.preset(self._space.rounded(self._vector(self._strategy.mean)))
 
     def _vector(self, solution) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What is searched: the numbers in which presets of a robot may differ, as vectors."""
+"""Spaces of a search: the numbers in which presets of a robot may differ, as vectors."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from arc_suite.robots.spec import Body
 
 
 class Range(NamedTuple):
-    """Of a number, in degrees or cycles.
+    """The range of a number, in degrees or cycles.
 
     Attributes:
         scale: how far it is moved at first.
@@ -46,7 +46,7 @@ _DECIMALS = 4  # of all numbers of a preset
 
 
 class Space(NamedTuple):
-    """Vectors of numbers about a preset.
+    """A space of vectors of numbers about a preset.
 
     A vector holds the stiffness, the damping, how it settles and ramps up, and the duty factor; for
     each rank of legs its lead over the preset's clock (cycles), the sweep and the centre of the hip
@@ -63,20 +63,20 @@ class Space(NamedTuple):
 
     @property
     def ranks(self) -> int:
-        """How many ranks of legs there are."""
+        """Number of ranks of legs."""
         return max(self.body.ranks) + 1
 
     def ranges(self) -> list[Range]:
-        """Of every number of a vector, in order."""
+        """Return the range of every number of a vector, in order."""
         by_rank = [*_BY_RANK.values(), *len(self.origin.bends) * list(_BY_JOINT_AND_RANK.values())]
         return [*_SHARED.values(), *(number for number in by_rank for _ in range(self.ranks))]
 
     def rounded(self, vector: np.ndarray) -> np.ndarray:
-        """The vector (size,) to the decimals that matter."""
+        """Return a vector (size,) to the decimals that matter."""
         return np.array([round(value, number.decimals) for value, number in zip(vector, self.ranges(), strict=True)])
 
     def vector(self, lead: float = 0.0) -> np.ndarray:
-        """The vector (size,) of the preset itself, but for a lead of all legs in cycles."""
+        """Return the vector (size,) of the preset itself, but for a lead of all legs in cycles."""
         preset = self.origin
         angles = [lead, preset.sweep, preset.centre.get("hip", 0.0)]
         for name, bend in preset.bends.items():
@@ -85,7 +85,7 @@ class Space(NamedTuple):
         return np.array([*(getattr(preset, name) for name in _SHARED), *by_rank])
 
     def preset(self, vector: np.ndarray) -> Preset:
-        """The preset of a vector (size,), within its ranges."""
+        """Return the preset of a vector (size,), within its ranges."""
         _, low, high, _ = np.transpose(self.ranges())
         numbers = iter((vector.clip(low, high).round(_DECIMALS) + 0.0).tolist())
         shared = {name: next(numbers) for name in _SHARED}

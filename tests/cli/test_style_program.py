@@ -110,6 +110,52 @@ def test_datasets_without_minari_say_what_to_install(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("task", ["steer", "staying:stay"])
+def test_other_tasks(tmp_path, task):
+    fixtures = (ROOT / "tests" / "fixtures" / "gaitless.py").read_text()
+    registering = "import arc_suite\narc_suite.register(module=__name__, tasks=(Stay,))\n"
+    (tmp_path / "staying.py").write_text(fixtures + registering)
+    saved, figures, folder = tmp_path / "tick.npz", tmp_path / "style.json", tmp_path / "pictures"
+    asked = (f"--task={task}", "--set=time_limit=2", "--set=arena=bumps", "--episodes=1")
+    done = programs.run(
+        TOOL, "--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", path=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    report = json.loads(figures.read_text(), parse_constant=pytest.fail)
+    assert (report["task"], report["task_kwargs"]) == (task, {"time_limit": 2, "arena": "bumps"})
+    recorded = report["robots"]["tick"]["cpg medium"]
+    measured = recorded["metrics"].keys()
+    assert recorded["length"]["mean"] == 40
+    names, rows = ["path.png", "reward.png", "speed.png"], {line[:18].strip() for line in done.stdout.splitlines()}
+    if task == "steer":
+        assert measured == METRICS.keys() and "tracking" in rows
+        names = ["gait.png", *names]
+    else:
+        assert measured == {name for name, metric in METRICS.items() if not metric.of_gait}
+        assert "gait compliance" not in rows
+    assert sorted(path.name for path in folder.iterdir()) == names
+
+    # What was saved tells its task and settings; the same episode again gives the same figures.
+    again = programs.run(TOOL, f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", path=tmp_path)
+    if task == "steer":
+        assert again.returncode == 0, again.stderr
+        report = json.loads(figures.read_text())
+        assert (report["task"], report["task_kwargs"]) == ("steer", {"time_limit": 2, "arena": "bumps"})
+        assert list(report["robots"]["tick"].values()) == [recorded, recorded]
+    else:  # nothing says which module registers the task
+        assert (again.returncode, again.stdout) == (1, "")
+        assert again.stderr.startswith("style.py: unknown task 'stay'; did you mean 'steer'?")
+        again = programs.run(TOOL, f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path)
+        assert again.returncode == 0, again.stderr
+        assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]
+    other = programs.run(TOOL, f"--policy={saved}", "--set=arena=flat", f"--task={task}", path=tmp_path)
+    assert (other.returncode, other.stdout) == (1, "")
+    assert other.stderr == (
+        f'style.py: {saved}: expected tracks with the settings {{"arena": "flat"}}, '
+        'got those with {"arena": "bumps", "time_limit": 2}\n'
+    )
+
+
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr

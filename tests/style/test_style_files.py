@@ -3,21 +3,23 @@
 import io
 import zipfile
 
+import gaitless
 import numpy as np
 import pytest
 from synthetic import assert_same
 
 import arc_suite
 from arc_suite import style
-from arc_suite.policies import policy
+from arc_suite.arenas import FLAT
+from arc_suite.policies import Script, policy
 from arc_suite.robots import generator
 from arc_suite.style import load, record, save
 
 BODY = generator.generate(5, 2)
 
 
-def recorded(body, seeds=(3,), steps=12, **settings):
-    environment = arc_suite.load(body, "walk", settings)
+def recorded(body, seeds=(3,), steps=12, task="walk", **settings):
+    environment = arc_suite.load(body, task, settings)
     return [record(environment, policy("cpg", body), seed, steps) for seed in seeds]
 
 
@@ -33,9 +35,12 @@ def saved(leaper, tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("body", ["queen", BODY], ids=str)
-def test_tracks_survive_the_way_there_and_back(body, tmp_path):
-    tracks = recorded(body, seeds=(0, 2**32 - 1), gait="ripple", weights={"posture": -1e-9})
+@pytest.mark.parametrize("task", ["walk", "steer"])
+@pytest.mark.parametrize("body", ["queen", BODY], ids=["queen", "made"])
+def test_tracks_survive_the_way_there_and_back(body, task, tmp_path):
+    settings = {"arena": "bumps", "gait": "ripple", "weights": {"posture": -1e-9}}
+    tracks = recorded(body, (0, 2**32 - 1), task=task, **settings)
+    assert (tracks[0].task, tracks[0].task_kwargs) == (task, settings)
     save(tmp_path / "tracks.npz", tracks)
     loaded = load(str(tmp_path / "tracks.npz"))
     assert len(loaded) == 2
@@ -45,15 +50,25 @@ def test_tracks_survive_the_way_there_and_back(body, tmp_path):
     assert style.measure(loaded[0]).keys() == style.METRICS.keys()
 
 
+def test_tracks_of_a_task_without_a_gait_survive_too(tmp_path):
+    with gaitless.registered():
+        tracks = recorded("leaper", task="stay", weights={"control": -0.1})
+    assert tracks[0].phases is tracks[0].parameters is None
+    save(tmp_path / "tracks.npz", tracks)
+    (track,) = load(tmp_path / "tracks.npz")
+    assert_same(track, tracks[0])
+    assert style.report([track])["metrics"].keys() == style.report(tracks)["metrics"].keys()
+
+
 def test_a_file_says_what_made_it(saved):
     with np.load(saved, allow_pickle=False) as arrays:
-        assert arrays["format"] == "arc_suite tracks 1"
+        assert arrays["format"] == "arc_suite tracks 2"
         assert '"mujoco": "3.17' in str(arrays["versions"])
 
 
 def test_seed_and_actions_repeat_a_track(leaper):
-    actions = iter(leaper[1].actions)
-    again = record(arc_suite.load("leaper", "walk"), lambda time_step: next(actions), leaper[1].seed, 12)
+    script = Script(lambda seed: leaper[1].actions, 1, 12)
+    again = record(arc_suite.load("leaper", "walk"), script, leaper[1].seed, 12)
     assert_same(again, leaper[1])
 
 
@@ -61,6 +76,8 @@ def test_what_cannot_be_saved_is_refused(leaper, tmp_path):
     for tracks, found in (([], r"\[\]"), (leaper + recorded("tick", steps=2), r"\['leaper', 'tick'\]")):
         with pytest.raises(ValueError, match=f"^tracks: expected those of one body, got {found}$"):
             save(tmp_path / "a.npz", tracks)
+    with pytest.raises(ValueError, match="^task_kwargs: expected values that JSON can hold: Object of type Flat is"):
+        save(tmp_path / "a.npz", recorded("tick", steps=2, arena=FLAT))
     assert not list(tmp_path.iterdir())
 
 
@@ -104,10 +121,10 @@ def one_array():
         (b"", "not a file of tracks, or a damaged one: No data left in file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
         (one_array(), "not a file of tracks, or a damaged one: "),
-        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 1', got 'no tracks'"),
-        (archive(format="arc_suite tracks 2"), "expected 'arc_suite tracks 1', got 'arc_suite tracks 2'"),
-        (archive(format="arc_suite tracks 1"), "not a file of tracks, or a damaged one: 'body'"),
-        (archive(format="arc_suite tracks 1", body="{}"), "not a file of tracks, or a damaged one: name: missing"),
+        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 2', got 'no tracks'; record them anew"),
+        (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 2', got 'arc_suite tracks 1'"),
+        (archive(format="arc_suite tracks 2"), "not a file of tracks, or a damaged one: 'body'"),
+        (archive(format="arc_suite tracks 2", body="{}"), "not a file of tracks, or a damaged one: name: missing"),
         (archive(format=np.array([print], dtype=object)), "not a file of tracks, or a damaged one: Object arrays"),
     ],
 )

@@ -1,5 +1,6 @@
 """Recorded tracks agree with the reward and the physics."""
 
+import gaitless
 import mujoco
 import numpy as np
 import pytest
@@ -37,6 +38,34 @@ def test_tracks_agree_with_the_reward(robot):
     )
     assert 0.05 < track.contacts.mean() < 0.95
     assert (track.foot_positions[track.contacts][:, 2] < track.foot_radii[0] + 0.011).all()  # within the contact margin
+
+
+@pytest.mark.parametrize("task", ["steer", "stay"])
+@pytest.mark.parametrize("arena", ["flat", "bumps"])
+def test_tracks_of_any_task_and_ground(task, arena):
+    settings = {"time_limit": 2.0, "arena": arena}
+    with gaitless.registered():
+        environment = arc_suite.load("queen", task, settings)
+    definition = environment.task.definition
+    track = record(environment, Demonstrator("queen"), seed=3)
+    episode = evaluation.run(environment, Demonstrator("queen"), seed=3)
+    assert (track.task, track.task_kwargs, track.weights) == (task, settings, definition.settings.weights)
+    assert len(track.times) == episode.length == 40
+    assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
+    assert track.progress == episode.progress
+    assert track.progress.keys() == ({"tracking", "gait_compliance"} if task == "steer" else set())
+    assert np.isnan(track.target_velocity)
+    ground = definition.scene.arena
+    assert (abs(ground.height(track.foot_positions[..., 0], track.foot_positions[..., 1])) > 0).any() == (
+        arena == "bumps"
+    )
+    assert_array_equal(track.foot_heights, ground.clearance(track.foot_positions))
+    assert_array_equal(track.torso_heights, ground.clearance(track.positions))
+    if task == "steer":
+        assert measure(track)["gait_compliance"].value == pytest.approx(track.progress["gait_compliance"], rel=1e-12)
+        assert_array_equal(track.phases, definition.clock.phases[1:41])
+    else:
+        assert track.phases is track.parameters is None
 
 
 def test_recording_is_seeded():

@@ -41,7 +41,7 @@ def test_every_metric_states_its_definition_and_measures_robot_or_legs():
 
 def test_what_the_task_prescribes_is_what_a_perfect_walk_does():
     track = synthetic()
-    prescribed = {name: metric.prescribed(track.parameters) for name, metric in METRICS.items() if metric.prescribed}
+    prescribed = {name: metric.prescribed(track) for name, metric in METRICS.items() if metric.prescribed}
     assert list(prescribed) == [
         "gait_compliance",
         "duty_factor",
@@ -53,7 +53,11 @@ def test_what_the_task_prescribes_is_what_a_perfect_walk_does():
     ]
     assert prescribed == pytest.approx({name: value(name, track) for name in prescribed}, abs=1e-9)
     for change in ({"duty_factor": 1.0}, {"gait_frequency": 0.0}):
-        assert math.isnan(METRICS["stride_length"].prescribed(track.parameters._replace(**change)))
+        changed = track._replace(parameters=track.parameters._replace(**change))
+        assert math.isnan(METRICS["stride_length"].prescribed(changed))
+    steering = track._replace(target_velocity=math.nan)  # no velocity is asked for all the time
+    asked = {name for name, metric in style.report([steering])["metrics"].items() if metric["prescribed"] is not None}
+    assert asked == set(prescribed) - {"speed", "stride_length"}
 
 
 def test_a_report_sums_tracks_up():
@@ -67,6 +71,46 @@ def test_a_report_sums_tracks_up():
     assert duty["prescribed"] == 0.5
     assert {leg: summary.mean for leg, summary in duty["legs"].items()} == dict.fromkeys(LEGS, 0.5) | {"fr": 0.75}
     assert figures["metrics"]["foot_slip"]["prescribed"] is None
+    assert figures["progress"].keys() == {"speed"}
+    assert figures["progress"]["speed"].mean == pytest.approx(0.375)
+
+
+def test_heights_are_over_the_ground():
+    level, track = measure(synthetic(slip=0.1)), synthetic(slip=0.1)
+    hill = 0.3 * track.positions[:, 0]
+    raised = track._replace(
+        positions=track.positions + hill[:, None] * (0, 0, 1),
+        foot_positions=track.foot_positions + hill[:, None, None] * (0, 0, 1),
+    )
+    for name, measurement in measure(raised).items():
+        if name != "asymmetry":  # which is of paths in the torso's frame
+            assert measurement.value == pytest.approx(level[name].value, rel=0.05), name
+
+
+def without_gait(track):
+    return track._replace(phases=None, parameters=None, target_velocity=math.nan)
+
+
+def test_a_task_without_a_gait_has_the_other_metrics():
+    track = synthetic(slip=0.1)
+    of_gait = {name for name, metric in METRICS.items() if metric.of_gait}
+    measured, bare = measure(track), measure(without_gait(track))
+    assert bare == {name: measurement for name, measurement in measured.items() if name not in of_gait}
+    assert list(bare) == [
+        "foot_slip",
+        "speed",
+        "heading_error",
+        "lateral_drift",
+        "torso_pitch",
+        "torso_roll",
+        "height_variation",
+        "action_change",
+        "torque",
+        "cost_of_transport",
+    ]
+    figures = style.report([without_gait(track)])
+    assert figures["metrics"].keys() == bare.keys()
+    assert {metric["prescribed"] for metric in figures["metrics"].values()} == {None}
 
 
 def test_gait_compliance_counts_steps():
@@ -244,6 +288,7 @@ def test_package_exports():
     assert style.__all__ == [
         "METRICS",
         "Source",
+        "Stage",
         "Track",
         "load",
         "measure",

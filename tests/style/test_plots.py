@@ -25,6 +25,23 @@ def test_pictures(tmp_path, count):
         assert (tmp_path / f"{name}.png").stat().st_size > 5000
 
 
+def test_pictures_of_a_task_without_a_gait_or_a_way_to_go():
+    from arc_suite.style.plots import OF_GAIT, PICTURES
+
+    walk = synthetic()
+    steer, stay = (
+        walk._replace(target_velocity=math.nan, **changes) for changes in ({}, {"phases": None, "parameters": None})
+    )
+    for track, names in ((walk, set(PICTURES)), (steer, set(PICTURES)), (stay, set(PICTURES) - set(OF_GAIT))):
+        figures = {name: PICTURES[name]({"a": track}) for name in names}
+        legend = {text.get_text() for text in figures["speed"].legends[0].get_texts()}
+        told = {"where speed is rewarded", "target: 0.50 m/s"} if track is walk else set()
+        assert legend == {"a: 0.50 m/s"} | told
+        assert figures["path"].axes[0].get_xlabel() == ("x (m), the way to go" if track is walk else "x (m)")
+    stands = stay._replace(target_velocity=0.0)  # a target without a gait has no band of velocities
+    assert len(PICTURES["speed"]({"a": stands}).legends[0].get_texts()) == 2
+
+
 def test_gait_diagram_shows_stance_and_schedule():
     from matplotlib.colors import to_hex
 

@@ -9,7 +9,7 @@ from synthetic import DT, synthetic
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.demonstrator import pattern
+from arc_suite.cpg.demonstrator import felt, pattern
 from arc_suite.cpg.law import joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
@@ -26,15 +26,18 @@ class Scripted:
         self.pattern = honest._replace(**changes.get(cheat, {}))
         self.limp = len(body.legs[0].joints)
 
-    def __call__(self, timestep):
-        self.clock = 0 if timestep.first() else self.clock + 1
-        angles, velocities = timestep.observation["posture"][5:], timestep.observation["velocities"][6:]
-        targets = joint_targets(self.pattern, np.float64(DT * self.clock))
+    def begin(self, rows, seeds):
+        self.clock = 0
+
+    def act(self, observation, rewards):
+        _, angles, velocities = felt(observation)
+        targets = joint_targets(self.pattern, np.full(1, DT * self.clock))
+        self.clock += 1
         if self.cheat == "stand":
             targets = 0.0 * targets
         action = torques(targets, angles, velocities, self.preset.stiffness, self.preset.damping)
         if self.cheat == "drag":
-            action[: self.limp] = 0.0
+            action[:, : self.limp] = 0.0
         return action
 
 

@@ -1,10 +1,12 @@
 """Untrained policies by name."""
 
+import sys
+
 import numpy as np
 import pytest
 
 import arc_suite
-from arc_suite.policies import POLICIES, policy
+from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
@@ -13,14 +15,16 @@ from arc_suite.robots.generator import generate
 def test_policies_act_on_time_steps(name):
     environment = arc_suite.load("leaper", "walk", {"random": 0})
     time_step = environment.reset()
-    first, second = (policy(name, "leaper", seed=1)(time_step) for _ in range(2))
+    first, second = (alone(policy(name, "leaper"), seed=1)(time_step) for _ in range(2))
     environment.action_spec().validate(first)
     np.testing.assert_array_equal(first, second)
     assert (name == "zero") == (not first.any())
 
 
 def test_random_policies_differ_by_seed():
-    assert (policy("random", "tick", seed=1)(None) != policy("random", "tick", seed=2)(None)).all()
+    time_step = arc_suite.load("tick", "walk").reset(0)
+    first, second = (alone(policy("random", "tick"), seed)(time_step) for seed in (1, 2))
+    assert (first != second).all()
 
 
 @pytest.mark.parametrize(
@@ -35,6 +39,17 @@ def test_random_policies_differ_by_seed():
             ("cpg", "queen", "midium"),
             "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast, tuned)",
         ),
+        (
+            ("cpg", generate(4, 2), "tuned"),
+            "unknown preset 'tuned'; did you mean 'medium'? (there are: slow, medium, fast)",
+        ),
+        (("cpg", "queen", ()), "preset: expected one or more of slow, medium, fast, tuned, got none"),
+        (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number from 0 to inf, got -0.1"),
+        (
+            ("cpg", ROBOTS["bastion"].replace(name="queen")),
+            "presets: expected a body named 'queen' to have the 18 joints of queen, got 12 or others; "
+            "give it another name",
+        ),
     ],
 )
 def test_unknown_names_are_named(arguments, message):
@@ -44,11 +59,15 @@ def test_unknown_names_are_named(arguments, message):
 
 
 OWN = """
+import numpy as np
 import arc_suite.cpg
 number = 3
 def walk(robot): return arc_suite.cpg.Demonstrator(robot)
 def forgets(robot): return None
-def told(robot): return lambda time_step: robot
+robots = []
+def told(robot):
+    robots.append(robot)
+    return lambda time_step: np.zeros(18)
 """
 
 
@@ -56,19 +75,23 @@ def told(robot): return lambda time_step: robot
 def own(tmp_path, monkeypatch):
     (tmp_path / "own_policies.py").write_text(OWN)
     monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "own_policies", raising=False)
 
 
 def test_policies_from_pythons_path(own):
     time_step = arc_suite.load("tick", "walk", {"random": 0}).reset()
-    expected = policy("cpg", "tick")(time_step)
+    expected = alone(policy("cpg", "tick"))(time_step)
     for path in ("own_policies:walk", "arc_suite.cpg:Demonstrator"):
-        np.testing.assert_array_equal(policy(path, "tick")(time_step), expected)
+        np.testing.assert_array_equal(alone(policy(path, "tick"))(time_step), expected)
 
 
 def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_any_other(own):
-    body = generate(4, 2)
-    told = [policy("own_policies:told", robot)(None) for robot in ("tick", ROBOTS["tick"], body)]
-    assert told == ["tick", "tick", body]
+    body, denser = generate(4, 2), ROBOTS["tick"].replace(density=1000.0)
+    for robot, told in (("tick", "tick"), (ROBOTS["tick"], "tick"), (body, body), (denser, denser)):
+        made = policy("own_policies:told", robot)
+        made.begin([0], [0])
+        assert sys.modules["own_policies"].robots.count(told) >= 2
+        assert sys.modules["own_policies"].robots[-1] == told
 
 
 @pytest.mark.parametrize(

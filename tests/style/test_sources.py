@@ -7,7 +7,7 @@ import arc_suite
 from arc_suite import data, style
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.style import record, source
+from arc_suite.style import Stage, record, source
 from arc_suite.tasks import walk
 
 BODY = generator.generate(5, 2)
@@ -34,25 +34,29 @@ def dataset(tmp_path, monkeypatch):
     return data.open("arc_suite/leaper/noisy-v0")
 
 
-def take(opened, body, seeds):
-    return [made() for made in opened.takes(body, seeds)]
+LEAPER, TICK = Stage(ROBOTS["leaper"]), Stage(ROBOTS["tick"])
+
+
+def take(opened, stage, seeds):
+    return [made() for made in opened.takes(stage, seeds)]
 
 
 def test_policies_walk_any_body_once_for_each_seed():
     opened = source("zero")
-    assert (opened.label, opened.body) == ("zero", None)
-    for body in (ROBOTS["tick"], BODY):
-        tracks = take(opened, body, (5, 6))
-        assert [(track.body, track.seed) for track in tracks] == [(body, 5), (body, 6)]
+    assert (opened.label, opened.stage) == ("zero", None)
+    for stage in (TICK, Stage(BODY, "steer", {"time_limit": 1.0, "arena": "bumps"})):
+        tracks = take(opened, stage, (5, 6))
+        assert [(track.body, track.seed) for track in tracks] == [(stage.body, 5), (stage.body, 6)]
+        assert {(track.task, str(track.task_kwargs)) for track in tracks} == {(stage.task, str(stage.task_kwargs))}
         assert not tracks[0].actions.any()
     assert source("cpg", "fast").label == "cpg fast"
 
 
 def test_files_have_the_tracks_that_they_have(leaper, saved):
     opened = source(str(saved))
-    assert (opened.label, opened.body) == ("leaper.npz", ROBOTS["leaper"])
+    assert (opened.label, opened.stage) == ("leaper.npz", LEAPER)
     for count, expected in ((1, 1), (2, 2), (10, 2)):
-        tracks = take(opened, ROBOTS["leaper"], range(count))
+        tracks = take(opened, LEAPER, range(count))
         assert len(tracks) == expected
         assert_same(tracks[-1], leaper[expected - 1])
 
@@ -68,14 +72,33 @@ def test_what_is_no_source_is_refused_before_any_work(saved):
         assert str(error.value).startswith(message)
     for body, other in ((ROBOTS["tick"], "leaper"), (ROBOTS["leaper"].replace(density=7.0), "another body")):
         with pytest.raises(ValueError, match=f"^{saved}: expected tracks of {body.name}, got those of {other}"):
-            source(str(saved)).takes(body, (0,))
+            source(str(saved)).takes(Stage(body), (0,))
+    with pytest.raises(ValueError, match=f"^{saved}: expected tracks of the task steer, got those of walk$"):
+        source(str(saved)).takes(LEAPER._replace(task="steer"), (0,))
+    with pytest.raises(ValueError) as error:
+        source(str(saved)).takes(LEAPER._replace(task_kwargs={"arena": "bumps"}), (0,))
+    assert str(error.value) == f'{saved}: expected tracks with the settings {{"arena": "bumps"}}, got those with {{}}'
+
+
+def test_stored_tracks_tell_their_stage(tmp_path, monkeypatch):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    stage = Stage(ROBOTS["tick"], "steer", {"healthy_range": [0.05, 0.5], "arena": "bumps"})
+    environment = arc_suite.load(stage.body, stage.task, {"healthy_range": (0.05, 0.5), "arena": "bumps"})
+    style.save(tmp_path / "tick.npz", [record(environment, policy("cpg", stage.body), 0, 5)])
+    settings = data.Settings(stage.body, steps=5, task=stage.task, task_kwargs=environment.task_kwargs)
+    data.collect("arc_suite/tick/steers-v0", settings, episodes=1)
+    for name in (str(tmp_path / "tick.npz"), "arc_suite/tick/steers-v0"):
+        assert source(name).stage == stage
+        for same in (stage, stage._replace(task="arc_suite:steer", task_kwargs=environment.task_kwargs)):
+            (track,) = take(source(name), same, range(1))
+            assert (track.task, len(track.times)) == ("steer", 5)
 
 
 def test_datasets_are_replayed(dataset):
     opened = source(dataset.id)
-    assert (opened.label, opened.body) == (dataset.id, ROBOTS["leaper"])
-    assert len(opened.takes(ROBOTS["leaper"], range(1))) == 1
-    tracks = take(opened, ROBOTS["leaper"], range(10))
+    assert (opened.label, opened.stage) == (dataset.id, LEAPER)
+    assert len(opened.takes(LEAPER, range(1))) == 1
+    tracks = take(opened, LEAPER, range(10))
     assert [track.seed for track in tracks] == [7, 8]
     for track, episode in zip(tracks, dataset, strict=True):
         assert_same(track.actions, episode.actions.astype(float))
@@ -84,16 +107,16 @@ def test_datasets_are_replayed(dataset):
 
 
 def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
-    monkeypatch.setitem(walk.WEIGHTS, "healthy", 0.5)
+    monkeypatch.setitem(walk.BONUSES, "healthy", 0.5)
     with pytest.raises(ValueError) as error:
-        take(source(dataset.id), ROBOTS["leaper"], range(1))
+        take(source(dataset.id), LEAPER, range(1))
     assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")
-    assert str(error.value).endswith(f"; tools/collect.py --verify={dataset.id} tells more")
+    assert str(error.value).endswith(f"; arc-suite collect --verify={dataset.id} tells more")
 
 
 def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
     with pytest.raises(ValueError, match=f"^{dataset.id}: expected tracks of tick, got those of leaper$"):
-        source(dataset.id).takes(ROBOTS["tick"], range(1))
+        source(dataset.id).takes(TICK, range(1))
     for name, message in (
         ("arc_suite/leaper/niosy-v0", f"unknown dataset 'arc_suite/leaper/niosy-v0'; did you mean {dataset.id!r}?"),
         ("noisy-v0", "unknown dataset 'noisy-v0'; did you mean"),
@@ -104,4 +127,4 @@ def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
         assert str(error.value).startswith(message)
     (dataset.path / "data" / "main_data.hdf5").write_bytes(b"HDF")
     with pytest.raises(ValueError, match="is damaged"):
-        take(source(dataset.id), ROBOTS["leaper"], range(1))
+        take(source(dataset.id), LEAPER, range(1))

@@ -1,0 +1,226 @@
+"""Demonstrators: the published law, rows and single ones, any control step."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import arc_suite
+from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of
+from arc_suite.cpg.presets import TUNINGS, Bend, Preset
+from arc_suite.models.sizing import control_timestep
+from arc_suite.policies import alone
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.style import record
+
+# preset medium: centre, stance and swing bends in degrees by rank from the front.
+MEDIUM = {
+    "queen": {
+        "kd": 0.18,
+        "settle": 15,
+        "frequency": 1.5,
+        "hip": 26,
+        "knee": ((-25, 15, -45), (-25, 15, -45), (25, -15, 45)),
+        "ankle": ((15, 35, 35), (30, 0, 55), (-15, -35, -35)),
+    },
+    "bastion": {"kd": 0.15, "settle": 15, "frequency": 1.5, "hip": 26, "ankle": ((30, -20, 45),) * 3},
+    "tick": {
+        "kd": 0.18,
+        "settle": 15,
+        "frequency": 1.5,
+        "hip": 40,
+        "knee": ((0, 12, -40),) * 3,
+        "ankle": ((0, 0, 45),) * 3,
+    },
+    "leaper": {
+        "kd": 0.15,
+        "settle": 0,
+        "frequency": 1.2,
+        "hip": 30,
+        "knee": ((0, 0, -55),) * 2,
+        "ankle": ((0, 25, 75), (0, 0, -75)),
+    },
+}
+OFFSETS = {"l1": 0.5, "r1": 0, "l2": 0, "r2": 0.5, "l3": 0.5, "r3": 0, "fl": 0, "fr": 0.5, "rl": 0.5, "rr": 0}
+RANKS = {"l1": 0, "r1": 0, "l2": 1, "r2": 1, "l3": 2, "r3": 2, "fl": 0, "fr": 0, "rl": 1, "rr": 1}
+LEFT = ("l1", "l2", "l3", "fl", "rl")
+
+
+def expected_target(robot, joint, step):
+    """A joint's target by the law of the published demonstrators, rad."""
+    figures = MEDIUM[robot]
+    leg, part = joint.rsplit("_", 1)
+    hip = part == "hip"
+    centre, stance, swing = (0, 0, 0) if hip else figures[part][RANKS[leg]]
+    if step < figures["settle"]:
+        return math.radians(centre)
+    cycle = (figures["frequency"] * 0.05 * step + OFFSETS[leg]) % 1.0
+    if cycle < 0.6:
+        s = cycle / 0.6
+        sweep, bend = 1 - 2 * s, stance * math.sin(math.pi * s)
+    else:
+        w = (cycle - 0.6) / 0.4
+        sweep, bend = 2 * w - 1, swing * math.sin(math.pi * w)
+    angle = figures["hip"] * sweep * (-1 if leg in LEFT else 1) if hip else centre + bend
+    return math.radians(angle)
+
+
+@pytest.mark.parametrize("robot", MEDIUM)
+def test_action_is_the_published_law(robot):
+    joints = ROBOTS[robot].joint_names
+    n = len(joints)
+    task = arc_suite.load(robot, "walk").task.definition
+    demonstrator = Demonstrator(robot)
+    rng = np.random.default_rng(1)
+    ramp, start = (15, 0.2) if robot == "leaper" else (20, 0.3)
+    for step in range(200):
+        observation = rng.normal(0, 0.2, task.size)
+        angles, velocities = observation[5 : 5 + n], observation[11 + n : 11 + 2 * n]
+        targets = [expected_target(robot, joint, step) for joint in joints]
+        kp = 0.8 * (start + (1 - start) * min(1.0, step / ramp))
+        expected = np.clip(kp * (targets - angles) - MEDIUM[robot]["kd"] * velocities, -1, 1)
+        cycle_edges = [(MEDIUM[robot]["frequency"] * 0.05 * step + OFFSETS[j.rsplit("_", 1)[0]]) % 1 for j in joints]
+        sure = [min(abs(c - edge) for edge in (0.0, 0.6, 1.0)) > 1e-9 for c in cycle_edges]
+        action = demonstrator.act(task.split(observation))
+        assert action.shape == (n,)
+        assert_allclose(action[sure], expected[sure], atol=1e-12, err_msg=f"step {step}")
+
+
+def test_time_steps_blocks_and_rows_give_the_same_action():
+    environment = arc_suite.load("bastion", "walk", {"random": 0})
+    timestep = environment.reset()
+    single, act, rows = Demonstrator("bastion"), alone(Demonstrator("bastion")), Demonstrator("bastion")
+    for _ in range(30):
+        blocks = timestep.observation
+        action = single(timestep)
+        assert_array_equal(action, act(timestep))
+        for row in rows.act({name: np.stack([block, block]) for name, block in blocks.items()}):
+            assert_array_equal(action, row)
+        timestep = environment.step(action)
+
+
+def test_batch_rows_are_single_demonstrators_and_restart_alone():
+    rng = np.random.default_rng(0)
+    batch, singles = Demonstrator("tick"), [Demonstrator("tick") for _ in range(3)]
+    split = arc_suite.load("tick", "walk").task.definition.split
+    for step in range(60):
+        observations = rng.normal(0, 0.3, (3, 199))
+        restarting = {25: [1], 40: [0, 2]}.get(step, [])
+        batch.begin(restarting)
+        for row in restarting:
+            singles[row].begin([0])
+        actions = batch.act(split(observations))
+        for row, single in enumerate(singles):
+            assert_array_equal(actions[row], single.act(split(observations[row])))
+
+
+def test_first_timestep_restarts_the_clock():
+    environment = arc_suite.load("leaper", "walk", {"random": 0})
+    demonstrator = Demonstrator("leaper")
+    first = environment.reset()
+    before = demonstrator(first)
+    for _ in range(7):
+        demonstrator(environment.step(before))
+    assert_array_equal(demonstrator(first), before)
+
+
+def test_wrong_observation_and_names_are_one_line_errors():
+    blocks = "observation: expected blocks posture and velocities by name, as `split` of a task gives them, got "
+    for wrong, kind in ((np.zeros(199), "ndarray"), ({"observations": np.zeros(199)}, "dict")):
+        with pytest.raises(ValueError) as error:
+            Demonstrator("queen").act(wrong)
+        assert str(error.value) == blocks + kind
+    others = arc_suite.load("bastion", "walk").reset()
+    with pytest.raises(ValueError, match=r"^observation: expected those of 18 joints, got 12 angles and 12 velocit"):
+        Demonstrator("queen")(others)
+    with pytest.raises(ValueError, match=r"^presets: expected a body named 'queen' to have the 18 joints of queen, g"):
+        Demonstrator(ROBOTS["bastion"].replace(name="queen"))
+    with pytest.raises(ValueError, match=r"^unknown preset 'meduim'; did you mean 'medium'\?"):
+        Demonstrator("queen", "meduim")
+    with pytest.raises(ValueError, match=r"^preset: queen has 6 legs, and phase_offsets is for 4$"):
+        Demonstrator("queen", TUNINGS["leaper"]["medium"])
+    with pytest.raises(ValueError, match=r"^preset: does not fit queen: KeyError: 'knee'$"):
+        Demonstrator("queen", TUNINGS["bastion"]["tuned"])
+    with pytest.raises(ValueError, match=r"^unknown robot 'quene'; did you mean 'queen'\?"):
+        Demonstrator("quene")
+
+
+# A robot of another package: its control step follows from its size, and its presets from nowhere.
+CREEPER = generator.generate(4, 2).replace(name="creeper")
+CREEPING = Preset(
+    stiffness=0.6,
+    damping=0.1,
+    settle=0,
+    ramp=1,
+    ramp_start=1.0,
+    frequency=1.2,
+    duty_factor=0.6,
+    phase_offsets=(0.0, 0.5, 0.5, 0.0),
+    sweep=20,
+    centre={"knee": 0},
+    bends={"knee": Bend(stance=0, swing=30)},
+)
+
+
+@pytest.mark.parametrize("height", [None, 0.05, 4.0])
+def test_a_registered_robot_moves_at_the_frequency_that_its_preset_asks_for(height, monkeypatch):
+    body = CREEPER if height is None else generator.scaled(CREEPER, height / 0.4).replace(name="creeper")
+    monkeypatch.setitem(ROBOTS, "creeper", body)
+    monkeypatch.setitem(TUNINGS, "creeper", {"medium": CREEPING, "fast": CREEPING._replace(frequency=1.8)})
+    environment = arc_suite.load("creeper", "walk", {"time_limit": 400 * control_timestep(body)})
+    step = environment.control_timestep()
+    assert step == pytest.approx(control_timestep(body)) and abs(step - 0.05) > 0.005
+    for preset, frequency in (("medium", 1.2), ("fast", 1.8)):
+        track = record(environment, Demonstrator("creeper", preset), seed=0)
+        actions = track.actions[:, 0] - track.actions[:, 0].mean()
+        spectrum = abs(np.fft.rfft(actions))
+        found = np.fft.rfftfreq(len(actions), track.time_step)[spectrum.argmax()]
+        assert found == pytest.approx(frequency, abs=1.0 / (len(actions) * step)), preset
+
+
+def test_a_robots_numbers_go_by_its_name():
+    queen = ROBOTS["queen"]
+    heavier = queen.replace(density=10.001)
+    assert presets_of(heavier) is TUNINGS["queen"]
+    blocks = arc_suite.load("queen", "walk").reset(0).observation
+    for preset in PRESETS:
+        ours, theirs = (Demonstrator(body, preset) for body in (queen, heavier))
+        for _ in range(20):
+            assert_array_equal(ours.act(blocks), theirs.act(blocks))
+
+
+def test_ranks_and_sides_of_a_hip():
+    medium = TUNINGS["queen"]["medium"]
+    led = medium._replace(sweep=(1.0, 2.0, 3.0), centre=medium.centre | {"hip": (10.0, 20.0, 30.0)})
+    hips = [i for i, name in enumerate(ROBOTS["queen"].joint_names) if name.endswith("hip")]
+    laid = pattern(ROBOTS["queen"], led)
+    assert_allclose(np.degrees(laid.sweep[hips]), [-1, -2, -3, 1, 2, 3])
+    assert_allclose(np.degrees(laid.centre[hips]), [-10, -20, -30, 10, 20, 30])
+
+
+def test_settling_is_a_crouch_or_the_centre():
+    medium = TUNINGS["bastion"]["medium"]
+    crouching = medium._replace(settle=4, crouch={"hip": 10, "ankle": (60, 50, 40)})
+    still = np.zeros((2, 12))
+    targets = []
+    for preset in (medium, crouching):
+        control = Prescribed.fit(ROBOTS["bastion"], preset._replace(stiffness=0.1, ramp_start=1.0))
+        targets.append([np.degrees(control(np.array(clock), None, *still) / 0.1) for clock in (0, 3, 4)])
+    assert_allclose(targets[0], np.tile([0, 30], (3, 6)), atol=1e-9)
+    left = [-10, 60, -10, 50, -10, 40]
+    assert_allclose(targets[1][:2], [left + [abs(angle) for angle in left]] * 2, atol=1e-9)
+    assert abs(targets[1][2] - targets[1][1]).max() > 10
+
+
+def test_stacked_controls_are_single_ones():
+    body, presets = ROBOTS["queen"], TUNINGS["queen"]
+    controls = [Prescribed.fit(body, preset) for preset in presets.values()]
+    stacked = Prescribed.stacked(controls)
+    random = np.random.default_rng(0)
+    for clock in (0, 3, 14, 15, 40, 500):
+        angles, velocities = random.normal(0.0, 0.3, (2, len(presets), 18))
+        actions = stacked(np.full(len(presets), clock), None, angles, velocities)
+        for row, control in enumerate(controls):
+            assert_array_equal(actions[row], control(np.array(clock), None, angles[row], velocities[row]))

@@ -1,0 +1,46 @@
+"""What the presets of the four robots earn, and how they walk."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from returns import RETURNS
+
+import arc_suite
+from arc_suite import evaluation
+from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.cpg.presets import TUNINGS
+from arc_suite.robots import ROBOTS
+from arc_suite.tuning import Judge
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", RETURNS)
+def test_medium_earns_the_published_return(robot):
+    environment = arc_suite.load(robot, "walk")
+    results = evaluation.episodes(environment, Demonstrator(robot))
+    returns = RETURNS[robot]
+    assert_allclose(np.mean([episode.total for episode in results]), returns.medium, rtol=returns.within)
+    assert {episode.length for episode in results} == {1000}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", RETURNS)
+def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
+    presets = [TUNINGS[robot][name] for name in ("tuned", "medium")]
+    score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets, range(10))
+    returns = RETURNS[robot]
+    assert_allclose(1000 * score.rewards[0].mean(), returns.tuned, rtol=returns.tuned_within)
+    assert not score.falls.any()
+    for cost, (tuned, medium) in score.style.items():
+        assert tuned.mean() <= medium.mean(), cost
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
+    environment = arc_suite.load(robot, "walk")
+    episodes = {preset: evaluation.run(environment, Demonstrator(robot, preset), seed=1) for preset in PRESETS}
+    assert {episode.length for episode in episodes.values()} == {1000}
+    speeds = {preset: episode.progress["speed"] for preset, episode in episodes.items()}
+    assert 0.0 < speeds["slow"] < speeds["medium"]
+    target = environment.task.settings.parameters.target_velocity
+    assert_allclose(speeds["medium"], target, rtol=0.02)

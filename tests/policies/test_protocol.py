@@ -1,0 +1,129 @@
+"""The protocol of acting: every policy, in rows that begin at different times, acts as in the episode alone."""
+
+import dm_env
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import arc_suite
+from arc_suite import evaluation
+from arc_suite.policies import POLICIES, Individuals, Mixture, Script, Sum, alone, policy
+from arc_suite.robots import ROBOTS, generator
+
+# (row, control step at which it begins, seed) of episodes; a row's last step is that before the next begins.
+EPISODES = ((0, 0, 4), (1, 0, 5), (2, 0, 6), (1, 7, 7), (0, 20, 8), (2, 20, 4), (1, 31, 9), (1, 32, 0))
+ROWS, STEPS = 3, 300
+
+OWN = """
+import numpy as np
+def make(robot):
+    past = []
+    def act(timestep):
+        past.append(timestep.reward or 0.0)
+        assert timestep.first() == (len(past) == 1) == (timestep.reward is None)
+        return np.sin(sum(past) + timestep.observation["posture"][5:] * len(past))
+    return act
+"""
+
+
+@pytest.fixture(autouse=True)
+def own(tmp_path, monkeypatch):
+    (tmp_path / "own_protocol.py").write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+
+
+def felt(joints, seed, step):
+    """Blocks and the reward of a step of an episode, which depend on its seed alone."""
+    random = np.random.default_rng((seed, step))
+    blocks = {"posture": random.normal(0.0, 0.3, 5 + joints), "velocities": random.normal(0.0, 0.3, 6 + joints)}
+    return blocks, random.normal()
+
+
+def acted_alone(made, joints, seed, length):
+    act, actions = alone(made, seed), []
+    for step in range(length):
+        blocks, reward = felt(joints, seed, step)
+        actions.append(act(dm_env.transition(reward, blocks) if step else dm_env.restart(blocks)))
+    return np.array(actions)
+
+
+def acted_in_rows(made, joints):
+    """The actions of every episode, by its number."""
+    playing, actions = [None] * ROWS, [[] for _ in EPISODES]
+    for step in range(STEPS):
+        beginning = [number for number, (_, first, _) in enumerate(EPISODES) if first == step]
+        for number in beginning:
+            playing[EPISODES[number][0]] = number
+        if beginning:
+            made.begin([EPISODES[number][0] for number in beginning], [EPISODES[number][2] for number in beginning])
+        told = [felt(joints, EPISODES[number][2], step - EPISODES[number][1]) for number in playing]
+        blocks, rewards = zip(*told, strict=True)
+        stacked = {name: np.stack([block[name] for block in blocks]) for name in blocks[0]}
+        for number, action in zip(playing, made.act(stacked, np.array(rewards)), strict=True):
+            actions[number].append(action)
+    return [np.array(action) for action in actions]
+
+
+VARIANTS = [
+    *((name, {}) for name in POLICIES),
+    *((name, {"noise": 0.1}) for name in POLICIES),
+    ("cpg", {"presets": ("slow", "medium", "fast")}),
+    ("cpg", {"presets": ("medium", "fast"), "noise": 0.1}),
+    ("own_protocol:make", {}),
+    ("own_protocol:make", {"noise": 0.1}),
+]
+
+
+@pytest.mark.parametrize("body", [ROBOTS["leaper"], generator.generate(5, 2)], ids=["leaper", "made"])
+@pytest.mark.parametrize(("name", "settings"), VARIANTS)
+def test_a_row_acts_as_its_episode_alone(name, settings, body):
+    joints = len(body.joint_names)
+    together = acted_in_rows(policy(name, body, rows=ROWS, **settings), joints)
+    for (_, _, seed), actions in zip(EPISODES, together, strict=True):
+        made = policy(name, body, **settings)
+        acted_alone(made, joints, seed + 1, 3)  # an episode before leaves nothing behind
+        assert_array_equal(actions, acted_alone(made, joints, seed, len(actions)))
+    same = {seed: actions for (_, _, seed), actions in zip(EPISODES, together, strict=True)}
+    assert len(together[0]) == 20 < len(same[4]) == STEPS - 20
+    assert_array_equal(together[0], same[4][:20])
+
+
+def test_policies_of_one_row_play_episodes_and_act_on_time_steps():
+    environment = arc_suite.load("tick", "walk", {"time_limit": 1.0})
+    for name in POLICIES:
+        steps = list(evaluation.rollout(environment, policy(name, "tick"), seed=3))
+        act, time_step = alone(policy(name, "tick"), seed=3), environment.reset(3)
+        for expected in steps[1:]:
+            time_step = environment.step(act(time_step))
+            assert time_step.reward == expected.reward
+
+
+def test_scripts_end_in_zeros():
+    made = Script(lambda seed: seed * np.ones((2, 4)), 2, 4)
+    assert not made.act(None, None).any()
+    made.begin([1], [3])
+    assert [made.act(None, None).tolist() for _ in range(3)] == [[[0.0] * 4, [value] * 4] for value in (3.0, 3.0, 0.0)]
+
+
+def test_sums_and_mixtures():
+    ones, twos = (Script(lambda seed, value=value: np.full((9, 1), value), 3, 1) for value in (1.0, 2.0))
+    both = Sum(ones, twos)
+    both.begin(range(3), range(3))
+    assert_array_equal(both.act(None, None), [[3.0]] * 3)
+    mixture = Mixture([ones, twos], 3)
+    mixture.begin(range(3), [4, 7, 6])
+    assert_array_equal(mixture.act(None, None), [[1.0], [2.0], [1.0]])
+
+
+def test_actions_that_are_none_are_one_line_that_tells_where():
+    blocks = {"posture": np.zeros((2, 3))}
+    for action, problem in (
+        (np.zeros(3), "action: expected shape (2,), got (3,)"),
+        ("left", "action: expected 2 numbers, got str"),
+        ([0.0, np.nan], "action[1]: expected a number from -1 to 1, got nan"),
+    ):
+        made = Individuals(lambda action=action: lambda time_step: action, 2, 2, "policy 'mine'")
+        made.begin([1], [7])
+        with pytest.raises(ValueError) as error:
+            made.act(blocks, np.zeros(2))
+        assert str(error.value) == f"policy 'mine': episode of seed 7, step 0: {problem}"

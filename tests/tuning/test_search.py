@@ -1,0 +1,34 @@
+"""The search for a demonstrator's numbers: its course."""
+
+import numpy as np
+import pytest
+
+from arc_suite.cpg.presets import TUNINGS
+from arc_suite.robots import ROBOTS
+from arc_suite.tuning import Judge, Search
+
+SETTINGS = {"robot": "bastion", "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
+
+
+@pytest.mark.slow
+def test_a_search_goes_on_where_it_was_broken_off():
+    straight, resumed = Search(**SETTINGS), Search(**SETTINGS)
+    generations = [straight.step() for _ in range(4)]
+    for generation in generations[:3]:
+        assert resumed.step(generation.fitness) is None
+    assert resumed.step() == generations[3]
+    assert resumed.result() == straight.result()
+    assert len(generations[0].fitness) == straight.candidates
+    assert generations[0] != generations[1]
+
+
+@pytest.mark.slow
+def test_a_search_learns():
+    search = Search(**SETTINGS | {"episodes": 1, "steps": 80})
+    first = search.step()
+    for _ in range(14):
+        last = search.step()
+    assert np.median(last.fitness) > np.median(first.fitness)
+    score = Judge(ROBOTS["bastion"], 2, 2, 80)([search.result(), TUNINGS["bastion"]["medium"]], [0, 1])
+    tuned, medium = score.rewards.mean(axis=-1)
+    assert tuned > medium

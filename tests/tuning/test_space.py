@@ -1,0 +1,39 @@
+"""The space of a search: numbers of presets as vectors."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from arc_suite.cpg.demonstrator import pattern
+from arc_suite.cpg.presets import TUNINGS
+from arc_suite.robots import ROBOTS
+from arc_suite.tuning import Space
+
+
+@pytest.mark.parametrize("robot", TUNINGS)
+def test_space_holds_the_preset_that_it_is_about(robot):
+    body, medium = ROBOTS[robot], TUNINGS[robot]["medium"]
+    space = Space(body, medium)
+    assert len(space.ranges()) == space.vector().size
+    same = space.preset(space.vector())
+    for ours, published in zip(pattern(body, same), pattern(body, medium), strict=True):
+        assert_allclose(ours, published, atol=1e-12)
+    for name in ("stiffness", "damping", "settle", "ramp", "ramp_start", "frequency"):
+        assert getattr(same, name) == getattr(medium, name)
+
+
+def test_a_lead_moves_the_clock_of_all_legs():
+    body, medium = ROBOTS["leaper"], TUNINGS["leaper"]["medium"]
+    space = Space(body, medium)
+    led = space.preset(space.vector(lead=0.75))
+    assert led.phase_offsets == (0.75, 0.25, 0.25, 0.75)
+    assert led._replace(phase_offsets=medium.phase_offsets) == space.preset(space.vector())
+
+
+def test_every_number_of_a_vector_counts_and_stays_within_bounds():
+    space = Space(ROBOTS["tick"], TUNINGS["tick"]["medium"])
+    vector, (scale, low, high, _) = space.vector(0.1), np.transpose(space.ranges())
+    presets = [space.preset(vector - step) for step in np.diag(0.5 * scale)]
+    assert len({str(preset) for preset in presets}) == vector.size
+    assert space.preset(np.full(vector.size, 1e9)) == space.preset(high)
+    assert space.preset(np.full(vector.size, -1e9)) == space.preset(low)
