@@ -42,6 +42,7 @@ def distinct(pictures):
     return len({picture.tobytes() for picture in pictures})
 
 
+@pytest.mark.slow
 def test_png_of_the_demonstrator_is_a_gait_cycle(tmp_path):
     done = render(tmp_path, "--robot=queen", "--policy=cpg", "--output=queen.png")
     assert done.returncode == 0, done.stderr
@@ -59,6 +60,7 @@ def test_png_of_any_other_policy_is_one_view(tmp_path):
     assert view.std() > 10.0
 
 
+@pytest.mark.slow
 def test_png_of_all_robots_is_a_panel(tmp_path):
     done = render(tmp_path, "--robot=all", "--steps=3", "--output=robots.png")
     assert done.returncode == 0, done.stderr
@@ -66,6 +68,7 @@ def test_png_of_all_robots_is_a_panel(tmp_path):
     assert distinct(views_of(tmp_path / "robots.png", 2, 2)) == 4
 
 
+@pytest.mark.slow
 def test_gif_shows_every_control_step_in_real_time(tmp_path):
     done = render(tmp_path, "--robot=bastion", "--steps=6", "--preset=fast", "--output=bastion.gif")
     assert done.returncode == 0, done.stderr
@@ -78,6 +81,7 @@ def test_gif_shows_every_control_step_in_real_time(tmp_path):
     assert distinct(frames) == 6
 
 
+@pytest.mark.slow
 def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     """Under the random policy Leaper falls long before 200 steps; odd sizes become even, as yuv420p needs."""
     done = render(

@@ -254,6 +254,7 @@ def test_task_settings_reach_the_task():
     assert settings.weights["posture"] == 0.0 and settings.parameters.target_velocity == 1.0
 
 
+@pytest.mark.slow
 @EVERY_ID
 def test_both_time_limits_agree(env_id):
     def last_step(env, before_last=lambda env: None):
@@ -488,6 +489,7 @@ def test_vector_env_is_its_rows(env_id):
                 break
 
 
+@pytest.mark.slow
 def test_vector_env_in_spawned_processes():
     def make(mode, **kwargs):
         return gymnasium.make_vec(IDS[0], num_envs=2, vectorization_mode=mode, vector_kwargs=kwargs)
