@@ -112,8 +112,7 @@ class Stride(NamedTuple):
 
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
         """Return the actions (..., joints) after `clock` (...) control steps."""
-        w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
-        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))[..., None]
+        yaw = rotations.yaw(np.asarray(quaternion))[..., None]
         # Turned to the left, legs on the left take longer strides.
         pattern = self.pattern._replace(
             sweep=self.pattern.sweep * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))
