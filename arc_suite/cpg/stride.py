@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import checks, rotations
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.models.sizing import GRAVITY, control_timestep, natural_frequency, sized
 from arc_suite.models.standing import standing

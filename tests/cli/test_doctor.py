@@ -57,6 +57,7 @@ def test_a_wrong_flag_is_one_line():
     assert done.stderr.startswith("doctor.py: Unknown command line flag 'verbose'")
 
 
+@pytest.mark.slow
 def test_wrong_pair(tmp_path):
     pretend(tmp_path, "mujoco", "4.0.0")
     status, found, verdict = doctor(tmp_path)

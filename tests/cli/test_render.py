@@ -101,6 +101,7 @@ def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "frames", "milliseconds"), [(1.0, 6, 350), (16.0, 6, 1390), (0.1, 3, 110)])
 def test_films_keep_the_pace_of_any_body(tmp_path, scale, frames, milliseconds):
     """A giant's control step is longer, a mite's shorter than what players show: some of its frames are left out."""
@@ -130,6 +131,7 @@ def test_a_film_of_frames_between_hundredths_keeps_their_sum(tmp_path):
     assert (film.n_frames, total) == (20, 670)
 
 
+@pytest.mark.slow
 def test_settings_of_the_task_are_seen(tmp_path):
     plain = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png")
     quick = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png", "--set=velocity_band=9")
@@ -137,6 +139,7 @@ def test_settings_of_the_task_are_seen(tmp_path):
     assert quick.stdout != plain.stdout
 
 
+@pytest.mark.slow
 def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
     (tmp_path / "imageio_ffmpeg.py").write_text("raise ModuleNotFoundError(\"No module named 'imageio_ffmpeg'\")")
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])

@@ -91,6 +91,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
         assert (other.returncode, other.stdout, other.stderr) == (1, "", message)
 
 
+@pytest.mark.slow
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
@@ -158,6 +159,7 @@ def test_other_tasks(tmp_path, task):
     )
 
 
+@pytest.mark.slow
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr

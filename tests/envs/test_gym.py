@@ -70,7 +70,7 @@ def test_import_registers_lazily_and_in_silence_however_often():
 @EVERY_ID
 @pytest.mark.parametrize("render_mode", [None, "rgb_array", "depth_array"])
 def test_check_env_warns_of_infinite_bounds_alone(env_id, render_mode):
-    env = gymnasium.make(env_id, render_mode=render_mode)
+    env = gymnasium.make(env_id, render_mode=render_mode, width=64, height=48)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         check_env(env.unwrapped)

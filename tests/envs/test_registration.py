@@ -115,6 +115,7 @@ if __name__ == "__main__":
     assert package(code) == ["(2, 107)"] * 2
 
 
+@pytest.mark.slow
 def test_names_import_what_they_name(package):
     code = """
 import arc_suite, gymnasium

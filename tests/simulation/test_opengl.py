@@ -65,10 +65,12 @@ def lines(outcome, changed=None):
     return [f"changed {changed or {}} removed []", "reward True", outcome, outcome, "reward True"]
 
 
+@pytest.mark.slow
 def test_chooses_egl_where_there_is_no_display(tmp_path):
     assert run(tmp_path) == lines("picture (48, 64, 3)", {"MUJOCO_GL": "egl"})
 
 
+@pytest.mark.slow
 def test_users_choice_stays(tmp_path):
     assert run(tmp_path, MUJOCO_GL="egl") == lines("picture (48, 64, 3)")
 
@@ -78,6 +80,7 @@ def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
     assert run(tmp_path, DISPLAY=":9876") == lines("picture (48, 64, 3)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sitecustomize", "variables", "changed", "message"),
     [
