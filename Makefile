@@ -1,18 +1,19 @@
 # make demo    Queen walks: installs everything, prints an episode's return, leaves out/queen.png and out/queen.mp4
-# make test    installs everything, runs all tests
-# make check   lint and tests: what CI runs
+# make check   lint and the fast tests: after every edit
+# make test    installs everything, runs all tests, on all cores
 # make check-sb3  stable-baselines3's checker and a short SAC run, in an environment of their own
+# make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make census  walks 500 random bodies and tells which do
 # make soak    two million steps: memory, threads and files stay what they are
-# make mutants plants mistakes and tells which test catches each; takes minutes
+# make mutants plants mistakes and tells which test catches each; takes hours
 # make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
 SHELL := /bin/bash
 VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-sb3 bench census soak mutants golden clean
+.PHONY: demo test check lint check-sb3 check-jax bench census soak mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -21,11 +22,16 @@ demo: $(INSTALLED)
 	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.png
 	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.mp4
 
+# Tests run in as many processes as there are cores; whoever has none left takes some from the others.
+PARALLEL := -n auto --dist worksteal
+
 test: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest
+	$(PYTHON) -m pytest $(PARALLEL)
 
-check: lint test
+check: lint $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) -m pytest $(PARALLEL) -m "not slow"
 
 lint: $(INSTALLED)
 	$(PYTHON) -m pip install -q -e '.[lint]'
@@ -47,6 +53,12 @@ check-sb3: setup.cfg
 	$(VENV)/bin/python -m pip install -q -e '.[sb3]'
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
 
+check-jax: VENV := .venv-jax
+check-jax: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[test,jax]'
+	$(VENV)/bin/python -m pytest tests/tasks/test_jax.py
+
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md
 
@@ -63,4 +75,4 @@ golden: $(INSTALLED)
 	$(PYTHON) tests/golden.py
 
 clean:
-	rm -rf .venv .venv-sb3 out build *.egg-info
+	rm -rf .venv .venv-sb3 .venv-jax out build *.egg-info

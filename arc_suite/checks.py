@@ -48,7 +48,7 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
         ValueError: it is no integer, or out of range; one line.
     """
     try:
-        number = operator.index(value)
+        number = low - 1 if isinstance(value, bool) else operator.index(value)
     except TypeError:
         number = low - 1
     if number < low or (high is not None and number > high):
@@ -71,7 +71,8 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
     """
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if not real or not math.isfinite(value) or not low <= value <= high:
-        raise ValueError(f"{what}: expected a finite number from {low:g} to {high:g}, got {value!r}")
+        kind = "number" if math.isfinite(high - low) else "finite number"
+        raise ValueError(f"{what}: expected a {kind} from {low:g} to {high:g}, got {value!r}")
     return float(value)
 
 

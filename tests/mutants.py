@@ -1,8 +1,10 @@
 """Plants mistakes on purpose, one at a time, in a copy of the project, and tells which test catches each.
 
-`python tests/mutants.py` runs all; exit status 1 if one survives. It takes minutes: `make mutants`.
+`python tests/mutants.py` runs all, or those whose names hold the words given; exit status 1 if one
+survives. It takes long: `make mutants`. With `--check` it only finds where each would be planted.
 """
 
+import concurrent.futures
 import os
 import pathlib
 import shutil
@@ -17,172 +19,229 @@ ROOT = pathlib.Path(__file__).parents[1]
 
 
 class Mutant(NamedTuple):
-    """A mistake: in a file of the package, one text in place of another that occurs once."""
+    """A mistake: one text in place of another, which occurs once in the whole package, wherever that is."""
 
     mistake: str
-    file: str
     old: str
     new: str
 
 
 MUTANTS = (
-    Mutant("swapped leg", "robots/queen.py", "leg.mirrored(leg.name.replace", "leg.replace(name=leg.name.replace"),
-    Mutant("mirrored axis keeps its sign", "spec.py", "axis=(-a, b, -c)", "axis=(a, b, -c)"),
+    # Bodies.
     Mutant(
-        "leg order",
-        "robots/leaper.py",
-        '(left, left.mirrored(left.name[0] + "r"))',
-        '(left.mirrored(left.name[0] + "r"), left)',
+        "swapped leg",
+        'leg.mirrored(leg.name.replace("l", "r")) for leg in LEFT_LEGS)),\n'
+        "    simulation=Simulation(),\n    camera=TrackingCamera(position=(0.0, -7.0, 3.0)",
+        'leg.replace(name=leg.name.replace("l", "r")) for leg in LEFT_LEGS)),\n'
+        "    simulation=Simulation(),\n    camera=TrackingCamera(position=(0.0, -7.0, 3.0)",
     ),
-    Mutant("dropped clip of the action", "tasks/walker.py", "return array.clip(-1.0, 1.0)", "return array"),
-    Mutant("dropped clip of the contact forces", "tasks/readings.py", ".clip(-1.0, 1.0)", ""),
-    Mutant("sign of a weight", "tasks/walk.py", '"smoothness": -0.02', '"smoothness": 0.02'),
-    Mutant("sign of the sweep", "cpg/demonstrator.py", "= -1.0 if leg.side", "= 1.0 if leg.side"),
+    Mutant("mirrored axis keeps its sign", "axis=(-a, b, -c)", "axis=(a, b, -c)"),
+    Mutant("leg order", '(left, left.mirrored(left.name[0] + "r"))', '(left.mirrored(left.name[0] + "r"), left)'),
+    Mutant("armature of the hip", "-40.0, 40.0),\n    armature=1.0", "-40.0, 40.0),\n    armature=2.0"),
+    Mutant("sign of zero kept", "float(value) + 0.0", "float(value)"),
+    Mutant("a body's joints not looked at", "body.joint_names != ROBOTS[body.name].joint_names", "False"),
+    Mutant("both sides of a body in step", "0.5 * (leg.side ==", "0.0 * (leg.side =="),
+    Mutant("feet of a random body above the floor", "(p.height - foot_radius) /", "p.height * 0.9 /"),
+    Mutant("a scaled robot keeps its name", 'name=f"{stem}_{how}"', "name=body.name"),
+    # Models.
+    Mutant("contact margin doubled", "default=0.005", "default=0.01"),
+    Mutant("ballast touches the floor", '_TOUCHES_NOTHING = {"contype": 0', '_TOUCHES_NOTHING = {"contype": 1'),
+    Mutant("wrong number of substeps", "SUBSTEPS = 25", "SUBSTEPS = 24"),
+    Mutant("joints of a giant as fast as a mite's", "_STIFFNESS / control_timestep(body)", "7.0"),
     Mutant(
-        "ignored seed",
-        "tasks/walk.py",
-        "RandomState(None if random is None else checks.seed(random))",
-        "RandomState()",
+        "contacts of a giant as hard as a mite's", '"solref": (simulation.contact_time, 1.0)', '"solref": (0.02, 1.0)'
     ),
-    Mutant("wrong number of substeps", "robots/sizing.py", "SUBSTEPS = 25", "SUBSTEPS = 24"),
-    Mutant(
-        "gait clock advances too late",
-        "tasks/walker.py",
-        "(self.phase + self._clock)",
-        "(self.phase + 0.5 * self._clock)",
-    ),
-    Mutant(
-        "previous action forgotten",
-        "tasks/walker.py",
-        "self._previous_action, self._action = self._action, action",
-        "self._previous_action, self._action = action, action",
-    ),
-    Mutant(
-        "velocity of the wrong frame",
-        "tasks/readings.py",
-        "angular_velocity=qvel[..., 3:6]",
-        "angular_velocity=qvel[..., 0:3]",
-    ),
-    Mutant(
-        "yaw rate penalised in place of pitch rate",
-        "tasks/rewards.py",
-        "component(readings.angular_velocity, 1)",
-        "component(readings.angular_velocity, 2)",
-    ),
-    Mutant("stance and swing exchanged", "tasks/rewards.py", "% TWO_PI < TWO_PI", "% TWO_PI > TWO_PI"),
-    Mutant("quaternion not normalised", "tasks/walk.py", "    qpos[3:7] /= np.linalg.norm(qpos[3:7])\n", ""),
-    Mutant(
-        "reset noise of the joints halved",
-        "tasks/walk.py",
-        "random.uniform(-joint, joint, joints)",
-        "random.uniform(0.0, joint, joints)",
-    ),
-    Mutant("fall reported as a time limit", "tasks/walk.py", "return 0.0 if failed", "return 1.0 if failed"),
-    Mutant("no sensors, so no contact forces", "physics.py", "option.disableflags = flags\n", "pass\n"),
-    Mutant("one substep too few", "physics.py", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
-    Mutant("contact margin doubled", "spec.py", "default=0.005", "default=0.01"),
-    Mutant("armature of the hip", "robots/tick.py", "armature=1.0", "armature=2.0"),
-    Mutant("ballast touches the floor", "robots/builder.py", '{"contype": 0,', '{"contype": 1,'),
-    Mutant("NaN let through", "tasks/walker.py", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
-    Mutant("feet in the air slip", "style/metrics.py", " * track.contacts", ""),
-    Mutant("early taken for late", "style/metrics.py", "actual * wanted.conj()", "wanted * actual.conj()"),
-    Mutant("mirror image of a foot's path forgotten", "style/metrics.py", " * (1.0, -1.0, 1.0)", ""),
-    Mutant("motors win back what they brake", "style/metrics.py", ".clip(0.0).sum()", ".sum()"),
-    Mutant("a foot that bounces strides", "style/metrics.py", "0.5 * foot_clearance(track)", "0.0"),
-    Mutant("order of tracks in a file", "style/files.py", "in range(count)]", "in range(count)[::-1]]"),
-    Mutant(
-        "a replay that differs let through",
-        "style/sources.py",
-        "np.array_equal(track.rewards, episode.rewards)",
-        "len(track.rewards) == episode.length",
-    ),
-    Mutant("rows share a seed", "vector.py", "checks.seed(first + row)", "checks.seed(first)"),
-    Mutant(
-        "observations of a batch handed out live",
-        "vector.py",
-        "self._observation = observation.copy()",
-        "self._observation = observation",
-    ),
+    # Arenas.
+    Mutant("triangles of the ground exchanged", "numpy.where(u > v, right, left)", "numpy.where(u > v, left, right)"),
+    # Simulations.
+    Mutant("no sensors, so no contact forces", "option.disableflags = flags\n", "pass\n"),
+    Mutant("one substep too few", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
+    Mutant("one substep of rows too few", "simulations.step(rows, nstep - 1)", "simulations.step(rows, nstep - 2)"),
+    Mutant("margin of a pair not summed", "model.geom_margin[both].sum()", "model.geom_margin[both].max()"),
+    Mutant("friction of a pair not mixed", "friction.max(axis=0)", "friction[0]"),
+    Mutant("Euler without damping", "        and model.dof_damping.any()\n", ""),
+    Mutant("clock not put back", "if self._taken and self._variable.value is None:", "if False:"),
+    Mutant("somebody's own clock taken", "if self._variable.value == self._clock:", "if True:"),
     Mutant(
         "divergence unseen",
-        "physics.py",
         "return simulations.warning[..., 1].any(axis=-1)",
         "return simulations.warning[..., 1].any(axis=-1) & False",
     ),
-    Mutant("both sides of a body in step", "gaits.py", "0.5 * (leg.side ==", "0.0 * (leg.side =="),
-    Mutant("steered the wrong way", "cpg/stride.py", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),
-    Mutant("joints of a giant as fast as a mite's", "robots/sizing.py", "_STIFFNESS / control_timestep(body)", "7.0"),
+    Mutant("fork unnoticed", "    count += 1\n", "    count += 0\n"),
+    Mutant("batch destroyed in a forked child", "        forks.keep(self._simulations)\n", ""),
+    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos)\n", ""),
+    Mutant("user's choice of OpenGL overwritten", '"MUJOCO_GL" not in os.environ and ', ""),
+    # Tasks.
     Mutant(
-        "contacts of a giant as hard as a mite's",
-        "robots/builder.py",
-        '"solref": (simulation.contact_time,',
-        '"solref": (0.02,',
+        "dropped clip of the contact forces",
+        "(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0)",
+        "(forces.shape[:-2] + (-1,))",
+    ),
+    Mutant("sign of a weight", '"smoothness": -0.02', '"smoothness": 0.02'),
+    Mutant("yaw rate penalised in place of pitch rate", "i) for i in (2, 3, 4))", "i) for i in (2, 3, 5))"),
+    Mutant("stance and swing exchanged", "% TWO_PI < TWO_PI", "% TWO_PI > TWO_PI"),
+    Mutant("gait clock advances too late", "phases[tick - 1] + turn", "phases[tick - 1] + 0.5 * turn"),
+    Mutant("a long episode's clock jumps", "np.argmin(np.abs(np.sin(0.5 * phases[ends])))", "-1"),
+    Mutant("previous action forgotten", "previous_action=memory.action", "previous_action=action"),
+    Mutant("quaternion not normalised", "    qpos[3:7] /= np.linalg.norm(qpos[3:7])\n", ""),
+    Mutant(
+        "reset noise of the joints halved",
+        "random.uniform(-joint, joint, joints)",
+        "random.uniform(0.0, joint, joints)",
     ),
     Mutant(
-        "feet of a random body above the floor", "robots/generator.py", "(p.height - foot_radius) /", "p.height * 0.9 /"
+        "speed of the state in place of the frame's",
+        "memory.tick + 1, component(readings.frame_position, 0)",
+        "memory.tick + 1, component(readings.torso_position, 0)",
     ),
-    Mutant("sign of zero kept", "spec.py", "float(value) + 0.0", "float(value)"),
-    Mutant("fork unnoticed", "forks.py", "    count += 1\n", "    count += 0\n"),
-    Mutant("batch destroyed in a forked child", "physics.py", "        forks.keep(self._simulations)\n", ""),
-    Mutant("picture of another moment", "physics.py", "        shared.pose(self)\n", ""),
-    Mutant("user's choice of OpenGL overwritten", "rendering.py", '"MUJOCO_GL" not in os.environ and ', ""),
-    Mutant("two threads in one vector environment", "vector.py", "not self._busy.acquire(blocking=False)", "False"),
-    Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
-    Mutant("no crouch", "cpg/demonstrator.py", "steps < self.settle", "steps < 0"),
     Mutant(
-        "a row walks by another's preset", "cpg/demonstrator.py", "for value in values]", "for value in values[::-1]]"
+        "the first step starts from nowhere", "_replace(x=component(readings.frame_position, 0) + 0.0)", "_replace()"
     ),
-    Mutant("all legs lead alike", "tuning/space.py", "offset + leads[rank]", "offset + leads[0]"),
-    Mutant("the fallen go on earning", "tuning/judge.py", "totals += rewards * upright", "totals += rewards"),
-    Mutant("a search is told its worst", "tuning/search.py", "[-value for value in fitness]", "fitness"),
-    Mutant("the same noise in all episodes", "data/actors.py", "default_rng((seed, 1))", "default_rng(1)"),
-    Mutant("a damaged episode is read", "data/episodes.py", "!= value:", "is value:"),
+    Mutant("wrong feet counted twice", "memory.wrong_in_all + wrong_feet", "memory.wrong_in_all + 2.0 * wrong_feet"),
+    Mutant(
+        "blocks declared in another order",
+        '{"posture": 5 + joints, "velocities": 6 + joints,',
+        '{"velocities": 6 + joints, "posture": 5 + joints,',
+    ),
+    Mutant("blocks cut one too early", "slice(end - size, end)", "slice(max(end - size - 1, 0), end - 1)"),
+    Mutant("blocks joined unchecked", "for name, block in blocks.items()] != self._declared", "for name, block in ()]"),
+    Mutant(
+        "feet stay in the ground", "(clear - readings.foot_heights).max", "0.0 * (clear - readings.foot_heights).max"
+    ),
+    Mutant("a memory written in place", "(1.0 - leak) * memory.motion", "memory.motion.__imul__(1.0 - leak)"),
+    Mutant(
+        "a command that is ignored", "numpy.where(numpy.isnan(memory.command), scheduled, memory.command)", "scheduled"
+    ),
+    Mutant("a schedule that does not end", "memory.tick % memory.ends[..., -1]", "memory.tick"),
+    Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
+    Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
+    # Environments.
+    Mutant("dropped clip of the action", "return array.clip(-1.0, 1.0)", "return array"),
+    Mutant("NaN let through", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
+    Mutant("ignored seed", "RandomState(None if random is None else checks.seed(random))", "RandomState()"),
+    Mutant("fall reported as a time limit", "return 0.0 if terminated else", "return 1.0 if terminated else"),
+    Mutant(
+        "a new stream carries on the old one",
+        "value, self.definition.first(), True",
+        "value, self.definition.first(), False",
+    ),
+    Mutant(
+        "a new stream of a row carries on the old one",
+        "self._streams_begin[row] = True",
+        "self._streams_begin[row] = False",
+    ),
+    Mutant("rows share a seed", "checks.seed(first + row) for", "checks.seed(first) for"),
+    Mutant(
+        "observations of a batch handed out live",
+        "self._observation = observation.copy()",
+        "self._observation = observation",
+    ),
+    Mutant("a command for all rows", "np.where(mask[:, None], value, present)", "value"),
+    Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
+    Mutant("two threads in one vector environment", "not self._busy.acquire(blocking=False)", "False"),
+    # Demonstrators and policies.
+    Mutant("sign of the sweep", "= -1.0 if leg.side", "= 1.0 if leg.side"),
+    Mutant("steered the wrong way", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),
+    Mutant("damping has the wrong sign", "- damping * velocities", "+ damping * velocities"),
+    Mutant("no crouch", "steps < self.settle", "steps < 0"),
+    Mutant("a row walks by another's preset", "for value in values]", "for value in values[::-1]]"),
+    Mutant("presets take turns from row to row", "= np.asarray(seeds) % len", "= np.asarray(rows) % len"),
+    Mutant("the same noise in all episodes", "default_rng((seed, 1))", "default_rng(1)"),
+    # Style.
+    Mutant("feet in the air slip", " * track.contacts", ""),
+    Mutant("early taken for late", "actual * wanted.conj()", "wanted * actual.conj()"),
+    Mutant("mirror image of a foot's path forgotten", " * (1.0, -1.0, 1.0)", ""),
+    Mutant("motors win back what they brake", ".clip(0.0).sum()", ".sum()"),
+    Mutant("a foot that bounces strides", "0.5 * foot_clearance(track)", "0.0"),
+    Mutant("order of tracks in a file", "index) for index in range(count)]", "index) for index in range(count)[::-1]]"),
+    Mutant(
+        "a replay that differs let through",
+        "np.array_equal(track.rewards, episode.rewards)",
+        "len(track.rewards) == episode.length",
+    ),
+    # Searches and datasets.
+    Mutant("all legs lead alike", "offset + leads[rank]", "offset + leads[0]"),
+    Mutant("the fallen go on earning", "totals += rewards * upright", "totals += rewards"),
+    Mutant("a search is told its worst", "[-value for value in fitness]", "fitness"),
+    Mutant("a damaged episode is read", "!= value:", "is value:"),
 )
 
 
-def plant(mutant: Mutant, folder: pathlib.Path) -> None:
-    """Copies the project to a folder and plants the mistake there.
+def place(mutant: Mutant) -> pathlib.Path:
+    """Return the one file of the package that holds a mutant's text once, as a path in the project.
 
     Raises:
-        ValueError: the text to replace does not occur once.
+        ValueError: there is none, or the text is there more often; one line.
     """
-    shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(".git", ".venv", "out", "__pycache__", "*.egg-info"))
-    path = folder / "arc_suite" / mutant.file
-    text = path.read_text()
-    if text.count(mutant.old) != 1:
-        raise ValueError(f"{mutant.file}: expected {mutant.old!r} once, found it {text.count(mutant.old)} times")
-    path.write_text(text.replace(mutant.old, mutant.new))
+    counts = {path: path.read_text().count(mutant.old) for path in sorted((ROOT / "arc_suite").rglob("*.py"))}
+    found = [str(path.relative_to(ROOT)) for path, count in counts.items() for _ in range(count)]
+    if len(found) != 1:
+        raise ValueError(f"{mutant.mistake}: expected {mutant.old!r} once in the package, found it in {found}")
+    return pathlib.Path(found[0])
 
 
-def caught_by(folder: pathlib.Path) -> str | None:
-    """The first test of a project that fails, or None."""
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-x",
-        "-q",
-        "--no-header",
-        "-p",
-        "no:cacheprovider",
-        "--ignore=tests/test_mutants.py",
-    ]
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
-    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    failed = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return failed[0].split(" - ")[0] if failed else None
+def copied(folder: pathlib.Path) -> pathlib.Path:
+    """Return a copy of the project in a folder."""
+    ignored = shutil.ignore_patterns(".git", ".venv*", "out", "__pycache__", "*.egg-info")
+    return pathlib.Path(shutil.copytree(ROOT, folder / "project", ignore=ignored))
+
+
+def caught_by(project: pathlib.Path, first: str = "") -> str | None:
+    """Return the first test of a project that fails, or None.
+
+    Args:
+        project: its folder.
+        first: a folder of tests to try before all others.
+    """
+    near = [["-m", "not slow", f"tests/{first}"]] if first and (project / "tests" / first).is_dir() else []
+    for selection in (*near, ["-m", "not slow"], ["-m", "slow"]):
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *selection]
+        environment = {**os.environ, "PYTHONPATH": str(project)}
+        result = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True)
+        failed = [line for line in result.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+        if failed:
+            return failed[0].split(" - ")[0]
+        if result.returncode:
+            return result.stderr.strip() or result.stdout.strip()
+    return None
+
+
+def tried(mutant: Mutant) -> str | None:
+    """Return the first test that catches a mutant, or None."""
+    path = place(mutant)
+    with tempfile.TemporaryDirectory() as folder:
+        project = copied(pathlib.Path(folder))
+        text = (project / path).read_text()
+        (project / path).write_text(text.replace(mutant.old, mutant.new))
+        return caught_by(project, path.parts[1])
 
 
 def main() -> int:
-    """Tries every mutant and prints a table."""
+    """Tries the mutants and prints a line for each."""
+    check, words = "--check" in sys.argv[1:], [word for word in sys.argv[1:] if word != "--check"]
+    mutants = [mutant for mutant in MUTANTS if all(word in mutant.mistake for word in words)]
+    lost = 0
+    for mutant in mutants:
+        try:
+            path = place(mutant)
+            compile((ROOT / path).read_text().replace(mutant.old, mutant.new), path, "exec")
+            if check:
+                print(f"{mutant.mistake:<48} {path}")
+        except (ValueError, SyntaxError) as error:
+            lost += 1
+            print(error)
+    if check or lost:
+        return int(lost > 0)
+    with tempfile.TemporaryDirectory() as folder:
+        if test := caught_by(copied(pathlib.Path(folder))):
+            print(f"without any mistake: {test}")
+            return 1
     survivors = 0
-    for mutant in tqdm(MUTANTS, unit="mutant"):
-        with tempfile.TemporaryDirectory() as folder:
-            copy = pathlib.Path(folder) / "project"
-            plant(mutant, copy)
-            test = caught_by(copy)
-        survivors += test is None
-        tqdm.write(f"{mutant.mistake:<40} {test or 'SURVIVES'}")
+    with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
+        tests = tqdm(pool.map(tried, mutants), total=len(mutants), unit="mutant", disable=None)
+        for mutant, test in zip(mutants, tests, strict=True):
+            survivors += test is None
+            tqdm.write(f"{mutant.mistake:<48} {test or 'SURVIVES'}")
     return int(survivors > 0)
 
 

@@ -15,6 +15,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.env_checker import check_env
 
 import arc_suite
+from arc_suite import registry
 from arc_suite.cli import program
 
 _STEPS = flags.DEFINE_integer("steps", 500, "Environment steps of the SAC run.", lower_bound=200)
@@ -43,7 +44,7 @@ def train(env_id: str) -> str:
 
 def main() -> int:
     """Prints a line for each check; returns the exit status."""
-    ids = [f"arc_suite/{domain}-{task}-v0" for domain, task in arc_suite.ALL_TASKS]
+    ids = [registry.env_id(robot, registry.task_of(task)) for robot, task in arc_suite.ALL_TASKS]
     jobs = [("check_env", check, env_id) for env_id in ids]
     jobs.append((f"SAC {_STEPS.value} steps", train, f"arc_suite/{_ROBOT.value}-walk-v0"))
     failed = False
@@ -54,7 +55,7 @@ def main() -> int:
         except Exception as error:  # the checker asserts, and an environment may raise anything
             problem = f"{type(error).__name__}: {error}"
         failed |= bool(problem)
-        print(f"{env_id:26}{name:18}{time.perf_counter() - start:6.1f} s  {problem or 'ok'}", flush=True)
+        print(f"{env_id:28}{name:18}{time.perf_counter() - start:6.1f} s  {problem or 'ok'}", flush=True)
     return int(failed)
 
 

@@ -10,12 +10,15 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from arc_suite import checks, rotations
 from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.models.sizing import GRAVITY, control_timestep, natural_frequency, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.gaits import Gait
 from arc_suite.robots.spec import Body, Leg
 from arc_suite.tasks.fitting import GAIT_FREQUENCY
+
+_LEAST_FROUDE = 1e-3
 
 LIFT = 0.2  # of the standing height: how far a foot is lifted in mid-swing
 
@@ -68,8 +71,8 @@ class Stride(NamedTuple):
         Raises:
             ValueError: such a speed cannot be.
         """
-        if not (isinstance(froude, (int, float)) and 1e-3 <= abs(froude) <= 1.0):
-            raise ValueError(f"froude: expected a number from 0.001 to 1, or negative, got {froude!r}")
+        if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
+            raise ValueError(f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {froude!r}")
         body = sized(body)
         pose = standing(body)
         cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / pose.height)
@@ -109,8 +112,7 @@ class Stride(NamedTuple):
 
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
         """Return the actions (..., joints) after `clock` (...) control steps."""
-        w, x, y, z = np.moveaxis(np.asarray(quaternion), -1, 0)
-        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))[..., None]
+        yaw = rotations.yaw(np.asarray(quaternion))[..., None]
         # Turned to the left, legs on the left take longer strides.
         pattern = self.pattern._replace(
             sweep=self.pattern.sweep * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))

@@ -5,13 +5,14 @@ all joints at zero they stand with every foot on the floor.
 """
 
 import math
+import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, SpecError, Torso, Vector
+from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Link, Solid, Torso, Vector
 
 LEGS = (4, 12)  # fewest and most
 LINKS = (1, 4)
@@ -36,6 +37,8 @@ _JOINT_NAMES = ("hip", "knee", "ankle", "toe")
 
 _HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-45.0, 45.0))
 _BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
+
+_CHANGED = re.compile("_(scaled|mutated)$")
 
 _HEIGHT = 0.4  # m
 _SPACING = 0.5  # of the height, between neighbouring legs of a side
@@ -65,7 +68,7 @@ class _Proportions(NamedTuple):
 
 
 def generate(legs: int, links: int, layout: str | None = None) -> Body:
-    """A body with so many legs of so many links.
+    """Make a body with a number of legs, each of a number of links.
 
     Pairs stand mirrored along a long torso, l1 and r1 in front. Radial legs stand around a round
     torso, counting counter-clockwise; of an odd number, leg1 points forward.
@@ -79,10 +82,9 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
         The body, `walker_<legs>x<links>`, 0.4 m high.
 
     Raises:
-        SpecError: a value out of range; one line that names it.
+        ValueError: a value out of range; one line that names it.
     """
-    _check_count("legs", legs, LEGS)
-    _check_count("links", links, LINKS)
+    legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
     layout = _check_layout(layout, legs)
     if layout == "radial":
         half_length = half_width = _SPACING * _HEIGHT * legs / (2.0 * math.pi)
@@ -93,7 +95,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
-    """A random body, the same for the same arguments.
+    """Make a random body, the same for the same arguments.
 
     Drawn are, where not given, 4 to 12 legs, 2 to 4 links and, for an even number of legs, the
     layout, radial for three in ten; and always:
@@ -118,14 +120,12 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         The body, `random_<seed>`.
 
     Raises:
-        SpecError: a value out of range; one line that names it.
+        ValueError: a value out of range; one line that names it.
     """
-    _check_count("seed", seed, (0, 2**32 - 1))
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(checks.seed(seed))
     drawn_legs, drawn_links = (int(random.integers(low, high + 1)) for low, high in (LEGS, (2, LINKS[1])))
     legs, links = drawn_legs if legs is None else legs, drawn_links if links is None else links
-    _check_count("legs", legs, LEGS)
-    _check_count("links", links, LINKS)
+    legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
     drawn_layout = "radial" if random.uniform() < 0.3 or legs % 2 else "pairs"
     layout = _check_layout(layout or drawn_layout, legs)
     half_length = math.exp(random.uniform(math.log(0.08), math.log(1.2)))
@@ -149,18 +149,19 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
 
 
 def scaled(body: Body, factor: float) -> Body:
-    """The body with all lengths multiplied, to be sized anew.
+    """Return a body with all lengths multiplied, to be sized anew.
 
     Args:
         body: to scale.
         factor: 0.01 to 100.
 
+    Returns:
+        The body, `<name>_scaled`: a robot's name would give it the robot's numbers.
+
     Raises:
-        SpecError: the factor, or a length of the scaled body, is out of range; one line that names it.
+        ValueError: the factor, or a length of the scaled body, is out of range; one line that names it.
     """
-    low, high = SCALE
-    if isinstance(factor, bool) or not isinstance(factor, (int, float)) or not low <= factor <= high:
-        raise SpecError(f"scale: expected a number from {low:g} to {high:g}, got {factor!r}")
+    factor = checks.number("scale", factor, *SCALE)
 
     def times(lengths: Sequence[float]) -> tuple[float, ...]:
         return tuple(factor * length for length in lengths)
@@ -176,11 +177,13 @@ def scaled(body: Body, factor: float) -> Body:
 
     torso = Torso(standing_height=factor * body.torso.standing_height, solids=tuple(map(solid, body.torso.solids)))
     ballast = tuple(map(solid, body.ballast))
-    return _opened(body.replace(torso=torso, ballast=ballast, legs=tuple(map(leg, body.legs))))
+    return _changed(body, "scaled", torso=torso, ballast=ballast, legs=tuple(map(leg, body.legs)))
 
 
 def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
-    """A body a little different, the same for the same arguments; mirrored legs stay mirrored and feet at their height.
+    """Return a body that differs a little, the same for the same arguments.
+
+    Mirrored legs stay mirrored, and feet at their height.
 
     Args:
         body: to change.
@@ -188,15 +191,12 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         amount: standard deviation of the logarithm of lengths, and of leg's headings in rad; 0 to 0.5.
 
     Returns:
-        The body, to be sized anew.
+        The body, `<name>_mutated`, to be sized anew.
 
     Raises:
-        SpecError: a value out of range, or a length grown out of range; one line that names it.
+        ValueError: a value out of range, or a length grown out of range; one line that names it.
     """
-    _check_count("seed", seed, (0, 2**32 - 1))
-    if isinstance(amount, bool) or not isinstance(amount, (int, float)) or not 0.0 <= amount <= 0.5:
-        raise SpecError(f"amount: expected a number from 0 to 0.5, got {amount!r}")
-    random = np.random.default_rng(seed)
+    random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
     legs: dict[str, Leg] = {}
     for leg in body.legs:
         if leg.name in legs:
@@ -205,7 +205,7 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         for other in body.legs:
             if other.name not in legs and leg.mirrored(other.name) == other:
                 legs[other.name] = changed.mirrored(other.name)
-    return _opened(body.replace(legs=tuple(legs[leg.name] for leg in body.legs)))
+    return _changed(body, "mutated", legs=tuple(legs[leg.name] for leg in body.legs))
 
 
 def _mutated_leg(leg: Leg, random: np.random.Generator, amount: float) -> Leg:
@@ -218,27 +218,22 @@ def _mutated_leg(leg: Leg, random: np.random.Generator, amount: float) -> Leg:
     return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(amount * random.standard_normal()))
 
 
-def _opened(body: Body) -> Body:
-    """The body with all that can be sized left open."""
+def _changed(body: Body, how: str, legs: Sequence[Leg], **fields) -> Body:
+    """Return a body with other legs and fields, a name that says how it came about, and all open that can be sized."""
 
     def opened(link: Link) -> Link:
         return link.replace(joint=link.joint and link.joint.replace(armature=None, damping=None, motor=None))
 
-    legs = tuple(leg.replace(links=tuple(map(opened, leg.links))) for leg in body.legs)
-    return body.replace(legs=legs, simulation=None, camera=None)
-
-
-def _check_count(name: str, value, bounds: tuple[int, int]) -> None:
-    low, high = bounds
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise SpecError(f"{name}: expected a whole number from {low} to {high}, got {value!r}")
+    stem = _CHANGED.sub("", body.name)[: MAX_NAME - len(how) - 1]
+    legs = tuple(leg.replace(links=tuple(map(opened, leg.links))) for leg in legs)
+    return body.replace(name=f"{stem}_{how}", legs=legs, simulation=None, camera=None, **fields)
 
 
 def _check_layout(layout: str | None, legs: int) -> str:
     if layout is None:
         return "radial" if legs % 2 else "pairs"
     if layout == "pairs" and legs % 2:
-        raise SpecError(f"layout: expected radial for an odd number of legs, got 'pairs' for {legs}")
+        raise ValueError(f"layout: expected radial for an odd number of legs, got 'pairs' for {legs}")
     return checks.name(layout, LAYOUTS, "layout")
 
 

@@ -21,7 +21,8 @@ Vector = tuple[float, float, float]
 
 MAX_LENGTH = 100.0  # metres; far above any creature, far below what upsets MuJoCo
 _LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
-_NAME = re.compile(r"[a-z0-9_]{1,32}")
+MAX_NAME = 32  # characters
+_NAME = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
 
@@ -42,14 +43,13 @@ class SpecError(ValueError):
 
 def _check_name(value: Any) -> str:
     if not isinstance(value, str) or not _NAME.fullmatch(value):
-        raise SpecError(f"expected 1 to 32 characters out of [a-z0-9_], got {_shown(value)}")
+        raise SpecError(f"expected 1 to {MAX_NAME} characters out of [a-z0-9_], got {_shown(value)}")
     return value
 
 
 def _check_number(value: Any, low: float, high: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise SpecError(f"expected a number, got {_shown(value)}")
-    if not low <= value <= high:  # also false for NaN
+    real = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not real or not low <= value <= high:  # also false for NaN
         raise SpecError(f"expected a number from {low:g} to {high:g}, got {_shown(value)}")
     return float(value) + 0.0  # -0.0 becomes 0.0: equal specs are to give equal texts
 

@@ -91,8 +91,7 @@ def picture(
         RenderingUnavailable: no OpenGL here.
     """
     for name, size, limit in (("height", height, MAX_HEIGHT), ("width", width, MAX_WIDTH)):
-        if size not in range(1, limit + 1):
-            raise ValueError(f"{name}: expected an integer from 1 to {limit}, got {size!r}")
+        checks.integer(name, size, 1, limit)
 
     def draw():
         decorated = _shared(body, arena)

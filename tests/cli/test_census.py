@@ -41,7 +41,7 @@ def test_a_reversed_sweep_walks_backwards():
         ("--count=0", "flag --count=0: 0 is not a positive integer"),
         ("--legs=3", "flag --legs=3: 3 is not an integer in the range [4, 12]"),
         ("--picture=missing/a.png", "cannot write missing/a.png: no such file or directory"),
-        ("--froude=2", "froude: expected a number from 0.001 to 1, or negative, got 2.0"),
+        ("--froude=2", "froude: expected a number from -1 to 1, got 2.0"),
     ],
 )
 def test_bad_arguments_are_one_line(argument, message):

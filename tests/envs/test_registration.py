@@ -149,7 +149,7 @@ class Misnamed(Walk):
                 "body": OTHER,
                 "walk": {"base_noise": 0.1, **{k: v for k, v in ROW.items() if k != "base_noise"}, "duty_factor": 2},
             },
-            "duty_factor: expected a finite number from 0 to 1, got 2",
+            "duty_factor: expected a number from 0 to 1, got 2",
         ),
         (
             {"body": OTHER, "walk": {k: v for k, v in ROW.items() if k not in ("base_noise", "healthy_range")}},

@@ -11,6 +11,8 @@ from arc_suite import models
 from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import SpecError
+from arc_suite.tasks import walk
+from arc_suite.tasks.fitting import fitted_settings
 
 
 def compiled(body):
@@ -62,15 +64,15 @@ def test_even_counts_stand_in_mirrored_pairs_and_odd_ones_around():
 @pytest.mark.parametrize(
     ("legs", "links", "message"),
     [
-        (3, 3, "legs: expected a whole number from 4 to 12, got 3"),
-        (6.0, 3, "legs: expected a whole number from 4 to 12, got 6.0"),
-        (True, 3, "legs: expected a whole number from 4 to 12, got True"),
-        (6, 0, "links: expected a whole number from 1 to 4, got 0"),
-        (6, None, "links: expected a whole number from 1 to 4, got None"),
+        (3, 3, "legs: expected an integer from 4 to 12, got 3"),
+        (6.0, 3, "legs: expected an integer from 4 to 12, got 6.0"),
+        (True, 3, "legs: expected an integer from 4 to 12, got True"),
+        (6, 0, "links: expected an integer from 1 to 4, got 0"),
+        (6, None, "links: expected an integer from 1 to 4, got None"),
     ],
 )
 def test_a_count_out_of_range_is_named(legs, links, message):
-    with pytest.raises(SpecError) as error:
+    with pytest.raises(ValueError) as error:
         generator.generate(legs, links)
     assert str(error.value) == message
 
@@ -79,7 +81,7 @@ def test_radial_legs_of_an_even_number_leave_the_front_free():
     ring = generator.generate(6, 3, "radial")
     headings = [math.degrees(math.atan2(leg.foot_position[1], leg.foot_position[0])) for leg in ring.legs]
     assert headings == pytest.approx([30.0, 90.0, 150.0, -150.0, -90.0, -30.0], abs=1e-9)
-    with pytest.raises(SpecError, match="^layout: expected radial for an odd number of legs, got 'pairs' for 7$"):
+    with pytest.raises(ValueError, match="^layout: expected radial for an odd number of legs, got 'pairs' for 7$"):
         generator.generate(7, 3, "pairs")
     with pytest.raises(ValueError, match="^unknown layout 'ring'; did you mean"):
         generator.generate(6, 3, "ring")
@@ -120,12 +122,12 @@ def test_what_is_asked_for_leaves_the_rest_of_a_random_body_as_it_is():
     assert (len(asked.legs), len(asked.legs[0].links), asked.legs[0].name) == (6, 3, "l1")
     assert asked.torso.solids[0].size[0] == generator.random_body(9, legs=8, links=2).torso.solids[0].size[0]
     for kwargs, message in (
-        ({"seed": -1}, "seed: expected a whole number from 0 to 4294967295, got -1"),
-        ({"seed": 1.5}, "seed: expected a whole number from 0 to 4294967295, got 1.5"),
-        ({"seed": 1, "legs": 13}, "legs: expected a whole number from 4 to 12, got 13"),
-        ({"seed": 1, "links": 9}, "links: expected a whole number from 1 to 4, got 9"),
+        ({"seed": -1}, "seed: expected an integer from 0 to 4294967295, got -1"),
+        ({"seed": 1.5}, "seed: expected an integer from 0 to 4294967295, got 1.5"),
+        ({"seed": 1, "legs": 13}, "legs: expected an integer from 4 to 12, got 13"),
+        ({"seed": 1, "links": 9}, "links: expected an integer from 1 to 4, got 9"),
     ):
-        with pytest.raises(SpecError) as error:
+        with pytest.raises(ValueError) as error:
             generator.random_body(**kwargs)
         assert str(error.value) == message
 
@@ -137,9 +139,10 @@ def test_scaled_bodies_have_all_lengths_multiplied():
     assert standing(double).mass == pytest.approx(8.0 * standing(body).mass, rel=1e-9)
     np.testing.assert_allclose(standing(double).soles, 2.0 * standing(body).soles, rtol=1e-12)
     assert double.simulation is None  # sized anew
-    assert generator.scaled(generator.scaled(generator.generate(4, 2), 2.0), 0.5) == generator.generate(4, 2)
+    back = generator.scaled(generator.scaled(generator.generate(4, 2), 2.0), 0.5)
+    assert back == generator.generate(4, 2).replace(name="walker_4x2_scaled")
     for factor in (0.0, math.nan, "2", 1e3):
-        with pytest.raises(SpecError, match="^scale: expected a number from 0.01 to 100, got "):
+        with pytest.raises(ValueError, match="^scale: expected a number from 0.01 to 100, got "):
             generator.scaled(body, factor)
     with pytest.raises(SpecError, match=r"^Solid\(chassis\).size: expected a number from 1e-06 to 100, got 3500.0$"):
         generator.scaled(generator.scaled(body, 100.0), 100.0)
@@ -150,7 +153,7 @@ def test_mutated_bodies_differ_a_little_and_stay_sound():
     child = generator.mutated(body, 3)
     assert child == generator.mutated(body, 3)
     assert child != generator.mutated(body, 4)
-    assert generator.mutated(body, 3, amount=0.0) == body
+    assert generator.mutated(body, 3, amount=0.0) == body.replace(name="random_1_mutated")
     lengths = [
         math.hypot(*new.end) / math.hypot(*old.end)
         for leg, former in zip(child.legs, body.legs, strict=True)
@@ -163,5 +166,16 @@ def test_mutated_bodies_differ_a_little_and_stay_sound():
     half = len(child.legs) // 2
     for left, right in zip(child.legs[:half], child.legs[half:], strict=True):
         assert left.mirrored(right.name) == right
-    with pytest.raises(SpecError, match=r"^amount: expected a number from 0 to 0.5, got 2$"):
+    with pytest.raises(ValueError, match=r"^amount: expected a number from 0 to 0.5, got 2$"):
         generator.mutated(body, 3, amount=2)
+
+
+def test_generated_bodies_do_not_take_the_names_of_robots():
+    for name, robot in ROBOTS.items():
+        scaled, mutated = generator.scaled(robot, 1.0), generator.mutated(robot, 0)
+        assert (scaled.name, mutated.name) == (f"{name}_scaled", f"{name}_mutated")
+        assert generator.mutated(scaled, 0).name == generator.mutated(mutated, 0).name == f"{name}_mutated"
+        assert walk.settings(scaled, {}).parameters.target_velocity == fitted_settings(scaled)["target_velocity"]
+    long = ROBOTS["queen"].replace(name="q" * 32)
+    assert generator.scaled(long, 2.0).name == "q" * 25 + "_scaled"
+    assert generator.mutated(long, 0).name == "q" * 24 + "_mutated"

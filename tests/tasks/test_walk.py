@@ -176,7 +176,7 @@ def test_overriding_one_weight_keeps_the_others():
         (("queen", "walk", {"weights": [1.0]}), "weights: expected a mapping of names to numbers, got [1.0]"),
         (
             ("queen", "walk", {"duty_factor": 1.5}),
-            "duty_factor: expected a finite number from 0 to 1, got 1.5",
+            "duty_factor: expected a number from 0 to 1, got 1.5",
         ),
         (
             ("queen", "walk", {"velocity_band": 0}),

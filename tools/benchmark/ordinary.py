@@ -55,6 +55,7 @@ class OrdinaryEnv(MujocoEnv):
         settings = walk.settings(ROBOTS[robot], {})
         self._weights, self._numbers = settings.weights, settings.parameters
         self._base_noise, self._joint_noise = settings.base_noise, settings.joint_noise
+        self._torso = self.model.body("torso").id
         self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
         self._terminate_when_unhealthy = terminate_when_unhealthy
         self._begin()
@@ -76,9 +77,9 @@ class OrdinaryEnv(MujocoEnv):
 
     def step(self, action):
         action = np.clip(action, -1.0, 1.0)
-        x_before = self.data.body("torso").xpos[0]
+        x_before = self.data.xpos[self._torso, 0]
         self.do_simulation(action, self.frame_skip)
-        x_velocity = (self.data.body("torso").xpos[0] - x_before) / self.dt
+        x_velocity = (self.data.xpos[self._torso, 0] - x_before) / self.dt
         self._phase = (self._phase + 2 * np.pi * self._numbers.gait_frequency * self.dt) % (2 * np.pi)
 
         observation = self._get_obs()

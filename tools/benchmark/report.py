@@ -19,6 +19,7 @@ TARGETS = {
     "vector env / threads x lean-model limit": 0.95,
     "vector env, most rows / reference rows": 0.95,
 }
+# A robot that is not here has a colour of matplotlib's.
 _COLORS = {"queen": "#b8860b", "bastion": "#2a7f8e", "tick": "#7a5195", "leaper": "#c8443c"}
 _MARKED = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re.DOTALL)
 
@@ -164,10 +165,10 @@ def _plot_singles(panel, results: dict) -> None:
     first = results["robots"][robots[0]]["contestants"]
     singles = [index for index, c in enumerate(first) if c["rows"] == c["workers"] == 1 and c["name"] != names.VECTOR]
     width = 0.85 / len(robots)
-    for column, robot in enumerate(robots):
-        speeds = [_speed(results["robots"][robot]["contestants"][index]) for index in singles]
+    for column, (robot, color, contestants) in enumerate(_colored(results)):
+        speeds = [_speed(contestants[index]) for index in singles]
         places = np.arange(len(singles)) + (column - (len(robots) - 1) / 2) * width
-        panel.bar(places, speeds, width, color=_COLORS[robot], label=robot)
+        panel.bar(places, speeds, width, color=color, label=robot)
     labels = [textwrap.fill(first[index]["name"], 11) for index in singles]
     panel.set_xticks(range(len(singles)), labels, fontsize=8)
     panel.tick_params(axis="x", length=0)
@@ -219,5 +220,5 @@ def _plot_growth(panel, growth: list[dict]) -> None:
 
 
 def _colored(results: dict) -> Iterator[tuple[str, str, list[dict]]]:
-    for robot, measured in results["robots"].items():
-        yield robot, _COLORS[robot], measured["contestants"]
+    for index, (robot, measured) in enumerate(results["robots"].items()):
+        yield robot, _COLORS.get(robot, f"C{index}"), measured["contestants"]

@@ -22,13 +22,20 @@ def bench(*arguments, folder):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True)
 
 
-@pytest.mark.slow
-def test_small_run_prints_tables_and_writes_results_plot_and_document(tmp_path):
-    document = tmp_path / "performance.md"
-    document.write_text("Before.\n<!-- benchmark -->\nold\n<!-- end of benchmark -->\nAfter.\n")
+@pytest.fixture(scope="module")
+def small_run(tmp_path_factory):
+    """What a small run printed, and the folder to which it wrote."""
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "performance.md").write_text("Before.\n<!-- benchmark -->\nold\n<!-- end of benchmark -->\nAfter.\n")
     small = ("--robots=queen,leaper", "--rows=1,4", "--workers=1,2", "--rounds=2", "--steps=2")
-    result = bench(*small, f"--document={document}", folder=tmp_path)
+    result = bench(*small, "--document=performance.md", folder=folder)
     assert (result.returncode, result.stderr) == (0, "")
+    return result, folder
+
+
+@pytest.mark.slow
+def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run):
+    result, folder = small_run
     lines = result.stdout.splitlines()
     for start in (
         "mj_step, full model",
@@ -45,7 +52,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(tmp_path):
         "4 links a leg",
     ):
         assert any(line.startswith(f"| {start}") for line in lines), start
-    results = json.loads((tmp_path / "results.json").read_text())
+    results = json.loads((folder / "results.json").read_text())
     assert list(results["robots"]) == ["queen", "leaper"]
     for robot in results["robots"].values():
         assert robot["size"]["rows"] == 4
@@ -53,11 +60,26 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(tmp_path):
             assert len(contestant["microseconds"]) == 2 and min(contestant["microseconds"]) > 0
         assert report.ratios(robot["contestants"]).keys() == report.TARGETS.keys()
     assert len(results["growth"]) == 24
-    assert document.read_text() == (
+    assert (folder / "performance.md").read_text() == (
         f"Before.\n<!-- benchmark -->\n{result.stdout.removesuffix(chr(10))}<!-- end of benchmark -->\nAfter.\n"
     )
-    pixels = np.asarray(Image.open(tmp_path / "plot.png").convert("RGB"))
-    assert min(pixels.shape[:2]) > 500 and len(np.unique(pixels.reshape(-1, 3), axis=0)) > 100
+    assert is_a_plot(folder / "plot.png")
+
+
+@pytest.mark.slow
+def test_robots_of_any_name_are_plotted_and_in_the_tables(small_run, tmp_path):
+    results = json.loads((small_run[1] / "results.json").read_text())
+    results["robots"] |= {name: results["robots"]["queen"] for name in ("hopper", "crawler")}
+    report.plot(results, tmp_path / "plot.png")
+    assert is_a_plot(tmp_path / "plot.png")
+    assert "|  | queen | leaper | hopper | crawler |" in report.tables(results)
+    colours = [colour for _, colour, _ in report._colored(results)]
+    assert len(set(colours)) == 4
+
+
+def is_a_plot(path):
+    pixels = np.asarray(Image.open(path).convert("RGB"))
+    return min(pixels.shape[:2]) > 500 and len(np.unique(pixels.reshape(-1, 3), axis=0)) > 100
 
 
 @pytest.mark.parametrize(
