@@ -28,12 +28,11 @@ def test_random_policies_and_noise_differ_by_seed(name, noise):
     assert (first != second).all()
 
 
-def test_noise_is_another_stream_than_that_of_random_actions():
+def test_noise_is_added_to_what_the_policy_does():
     time_step = arc_suite.load("tick", "walk").reset(0)
     plain, noisy = (alone(policy("random", "tick", noise=noise), 1)(time_step) for noise in (0.0, 0.1))
     noise = alone(policy("zero", "tick", noise=0.1), 1)(time_step)
     np.testing.assert_array_equal(noisy, plain + noise)
-    assert abs(np.corrcoef(plain, noise)[0, 1]) < 0.6
 
 
 @pytest.mark.parametrize(
