@@ -28,6 +28,7 @@ def run(*arguments, path=""):
     return subprocess.run(command, capture_output=True, text=True, env=environment)
 
 
+@pytest.mark.slow
 def test_collect_continue_verify_and_minaris_own_command(root):
     done = run("--steps=20", "--episodes=3")
     assert done.returncode == 0, done.stderr
