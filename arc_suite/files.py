@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def folder(path: str | os.PathLike) -> Path:
-    """A folder, made if need be.
+    """Make a folder where there is none, and return it.
 
     Raises:
         OSError: it cannot be made; one line that names it.
@@ -25,7 +25,7 @@ def folder(path: str | os.PathLike) -> Path:
 
 @contextlib.contextmanager
 def writing(path: str | os.PathLike) -> Iterator[Path]:
-    """Writes a file atomically: `with writing("a.png") as temporary: save(temporary)`.
+    """Write a file atomically: `with writing("a.png") as temporary: save(temporary)`.
 
     The temporary file lies beside the target and has its extension; it takes the target's place
     when the block ends, unless the block has deleted it, and is deleted if the block raises. Open
@@ -60,7 +60,7 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
-    """Writes a file of JSON as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
+    """Write a file of JSON as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.
 
     Args:
         path: the target; with None nothing is written.

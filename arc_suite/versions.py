@@ -10,7 +10,7 @@ NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.4
 
 
 def installed(package: str) -> str | None:
-    """The version of a package that is installed, or None."""
+    """Return the version of an installed package; None for one that is not installed."""
     try:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
@@ -23,7 +23,7 @@ def recorded() -> dict[str, str | None]:
 
 
 def problems() -> list[str]:
-    """One line with the remedy for every package that is missing or has a version for which the suite was not made."""
+    """Return a line with the remedy for every package that is missing or has a version that does not fit."""
     lines = []
     for package, needed in NEEDS.items():
         version = installed(package)
@@ -35,7 +35,7 @@ def problems() -> list[str]:
 
 @contextlib.contextmanager
 def explained():
-    """Says which package is to blame, in one line, where an import fails and one is.
+    """Name the package that is to blame, in one line, where imports in this context fail.
 
     Raises:
         ImportError: instead of what was raised, if a package is missing or has another version.

@@ -34,10 +34,10 @@ class Arena(ABC):
 
     @property
     def is_level(self) -> bool:
-        """Whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
+        """Return whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
         return False
 
     @property
     def lists_contacts(self) -> bool:
-        """Whether a list of all pairs of geoms that may touch is faster than a search: if the ground is few geoms."""
+        """Return whether a list of all pairs of geoms that may touch is faster than a search: where geoms are few."""
         return True

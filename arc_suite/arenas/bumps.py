@@ -61,12 +61,12 @@ class Bumps(Arena):
 
     @property
     def _halves(self) -> tuple[float, float]:
-        """Half of the field's length and width, m."""
+        """Return half of the field's length and width, m."""
         return _LENGTH * self.unit, 0.5 * _WIDTH * self.unit
 
     @functools.cached_property
     def _shares(self) -> np.ndarray:
-        """Height of every node as a share of the highest, (rows, columns), in the precision MuJoCo keeps."""
+        """Return the height of every node as a share of the highest, (rows, columns), in the precision MuJoCo keeps."""
         x = np.arange(-_LENGTH, _LENGTH + _CELL, _CELL)
         y = np.arange(-0.5 * _WIDTH, 0.5 * _WIDTH + _CELL, _CELL)
         turn = 2.0 * math.pi / _WAVE

@@ -25,5 +25,5 @@ class Flat(Arena):
 
     @property
     def is_level(self) -> bool:
-        """True."""
+        """Return True."""
         return True

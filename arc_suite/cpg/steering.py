@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import robots, rotations
+from arc_suite.cpg.law import felt
 from arc_suite.models.sizing import control_timestep, natural_frequency, sized
 from arc_suite.models.standing import Standing, standing
 from arc_suite.robots.spec import Body
@@ -125,18 +126,19 @@ class Steered:
         self._damping = (2.0 * inertia * frequency - friction).clip(0.0) / gear
         self._state = None
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
+    def begin(self, rows: Sequence[int]) -> None:
         """Start episodes in some rows, given by their indices."""
         if self._state is not None:
             for field in self._state:
                 field[rows] = 0.0
 
-    def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
-        """Return the actions (rows, joints) of a control step."""
-        posture, velocities, clock, commanded = (
-            np.asarray(observation[name], dtype=float) for name in ("posture", "velocities", "gait_clock", "command")
-        )
-        rows = len(posture)
+    def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
+        quaternion, angles, velocities = felt(observation, len(self._neutral))
+        if missing := {"gait_clock", "command"} - observation.keys():
+            raise ValueError(f"observation: expected a block {min(missing)}, as the task steer has")
+        clock, commanded = (np.asarray(observation[name], dtype=float) for name in ("gait_clock", "command"))
+        rows = len(angles)
         if self._state is None or len(self._state[0]) != rows:
             self._state = np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 1))
         command, integral, size = self._state
@@ -150,12 +152,13 @@ class Steered:
         size.clip(0.0, 1.0, out=size)
         asked = (command + integral + self._manner.gain * (command - motion)) * self._units
         phase = np.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi)
-        sweeps, raised, lifts = self._directions(asked, posture[:, 1:5])
+        sweeps, raised, lifts = self._directions(asked, quaternion)
         targets, ahead = (
-            self._neutral + size * (raised + self._targets(phase + later, sweeps, lifts)) for later in (0.0, self._cycles)
+            self._neutral + size * (raised + self._targets(phase + later, sweeps, lifts))
+            for later in (0.0, self._cycles)
         )
         speeds = (ahead - targets) / self._step
-        error, slip = targets - posture[:, 5:], velocities[:, 6:] - speeds
+        error, slip = self._neutral + targets - angles, velocities - speeds
         return (self._stiffness * error - self._damping * slip).clip(-1.0, 1.0)
 
     def _directions(self, asked, quaternion):
@@ -174,7 +177,7 @@ class Steered:
             lifts[:, leg.joints] = leg.lift
         return sweeps, raised, lifts
 
-    def _targets(self, phase, sweeps, lifts) -> np.ndarray:
+    def _swung(self, phase, sweeps, lifts) -> np.ndarray:
         """Departures (rows, joints) from the neutral pose at phases (rows,) of the clock, cycles."""
         targets = np.zeros_like(sweeps)
         for leg in self._legs:

@@ -44,7 +44,7 @@ def _one_at_a_time(method):
 class VectorEnv(gymnasium.vector.VectorEnv):
     """Rows of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
 
-    A row seeded s is bit-equal to `arc_suite.gym.Env` seeded s, from step to step and from episode
+    A row seeded s is bit-equal to `arc_suite.envs.gym.Env` seeded s, from step to step and from episode
     to episode, whatever the number of threads. Spaces, observations and `reward_terms` are that
     environment's, batched as `SyncVectorEnv` does. Arrays handed out are the caller's own.
 

@@ -3,9 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-import numpy as np
-
-from arc_suite.policies import Policy
+from arc_suite.policies import Policy, alone
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting
 
@@ -45,14 +43,12 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
     Yields:
         The `TimeStep` of the reset and of every step; the environment stands there meanwhile.
     """
+    act, length = alone(policy, seed), 0
     timestep = environment.reset(seed)
-    policy.begin([0], [seed])
     yield timestep
-    length, reward = 0, 0.0
     while not timestep.last() and length != max_steps:
-        blocks = {name: block[None] for name, block in timestep.observation.items()}
-        timestep = environment.step(policy.act(blocks, np.array([reward]))[0])
-        length, reward = length + 1, timestep.reward
+        timestep = environment.step(act(timestep))
+        length += 1
         yield timestep
 
 

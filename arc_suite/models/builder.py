@@ -1,4 +1,4 @@
-"""Turns a `Body` into one PyMJCF root element: the dynamics, and nothing that is only for show."""
+"""From a `Body` to one PyMJCF root element: the dynamics, and nothing that is only for show."""
 
 import math
 
@@ -20,7 +20,7 @@ _ASPECT, _MARGIN = 4.0 / 3.0, 1.3  # of the picture; room for legs that swing
 
 
 def build(body: Body) -> mjcf.RootElement:
-    """Assembles the body in an empty world: no floor, no decorations.
+    """Assemble the body in an empty world: no floor, no decorations.
 
     Every element is named: bodies, geoms and sites after the part, joints and motors
     `<leg>_<joint>`. The legs are written into the one root, since PyMJCF's `attach` would add a
@@ -61,7 +61,7 @@ def build(body: Body) -> mjcf.RootElement:
 
 
 def contact(simulation: Simulation) -> dict:
-    """How floor and robot touch, as attributes of a geom; what has no dimension is the same for all."""
+    """Return how floor and robot touch, as attributes of a geom; what has no dimension is the same for all."""
     return {
         "condim": 3,
         "friction": (1.0, 0.5, 0.5),
@@ -121,7 +121,7 @@ def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> No
 
 
 def _add_cameras(torso, body: Body) -> None:
-    """Adds `tracking`, the side view of the spec, and two that the body fills: `portrait` and `profile`."""
+    """Add `tracking`, the side view of the spec, and two that the body fills: `portrait` and `profile`."""
     camera = body.camera
     torso.add("camera", name="tracking", mode="trackcom", pos=camera.position, xyaxes=camera.xyaxes)
     for name, azimuth, elevation in _VIEWS:
@@ -129,7 +129,7 @@ def _add_cameras(torso, body: Body) -> None:
 
 
 def _framing(body: Body, azimuth: float, elevation: float) -> dict:
-    """The nearest place from which a camera that looks in a direction sees the whole standing body.
+    """Return the nearest place from which a camera that looks in a direction sees the whole standing body.
 
     With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
     the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and

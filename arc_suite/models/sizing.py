@@ -1,4 +1,4 @@
-"""Sizes what a body leaves open: motors, armature, damping, constants of the simulation, camera.
+"""What a body leaves open, sized to it: motors, armature, damping, constants of the simulation, camera.
 
 Everything follows from the standing pose by rules without dimension, so that bodies of one shape
 and different size are dynamically similar: lengths scale with the height h, times with
@@ -37,12 +37,12 @@ _LEAST_ARMATURE = 0.3
 
 
 def control_timestep(body: Body) -> float:
-    """Seconds between two actions."""
+    """Return the time between two actions, s."""
     return SUBSTEPS * simulation(body).timestep
 
 
 def simulation(body: Body) -> Simulation:
-    """The body's constants, or those of its size: times scale with sqrt(h), lengths with h."""
+    """Return the body's constants, or those of its size: times scale with sqrt(h), lengths with h."""
     if body.simulation:
         return body.simulation
     scale = body.torso.standing_height / _REFERENCE_HEIGHT
@@ -56,19 +56,20 @@ def simulation(body: Body) -> Simulation:
 
 
 def natural_frequency(body: Body) -> float:
-    """Of the position control of the body's joints, rad/s."""
+    """Return the natural frequency of the position control of the body's joints, rad/s."""
     return _STIFFNESS / control_timestep(body)
 
 
 @functools.lru_cache(maxsize=256)
 def sized(body: Body) -> Body:
-    """The body with everything filled in that it leaves open; a body that leaves nothing open is returned as it is.
+    """Return the body with everything filled in that it leaves open.
 
     Args:
         body: the spec.
 
     Returns:
-        A body without None among armatures, dampings, motors, simulation and camera.
+        A body without None among armatures, dampings, motors, simulation and camera; the same one if
+        it leaves nothing open.
     """
     complete = all(None not in (j.armature, j.damping, j.motor) for leg in body.legs for j in leg.joints)
     if complete and body.simulation and body.camera:

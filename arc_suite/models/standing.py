@@ -1,4 +1,4 @@
-"""How a body stands with all joints at zero: what its proportions, motors and gait are derived from."""
+"""The standing pose of a body, all joints at zero, from which its proportions, motors and gait are derived."""
 
 import functools
 from typing import NamedTuple
@@ -37,7 +37,7 @@ class Standing(NamedTuple):
 
 @functools.lru_cache(maxsize=256)
 def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
-    """Measure the standing pose of a body; armature, damping, motors and constants play no part.
+    """Return the mechanics of a body's standing pose; armature, damping, motors and constants play no part.
 
     Args:
         body: the spec.
@@ -82,7 +82,7 @@ def _model(body: Body) -> mujoco.MjModel:
 
 
 def _unpowered(body: Body) -> Body:
-    """The body with everything that is left to be sized set to what does not matter to its standing pose."""
+    """Return the body with everything that is left to be sized set to what does not matter to its standing pose."""
 
     def plain(joint: Joint | None) -> Joint | None:
         return joint and joint.replace(armature=0.0, damping=0.0, motor=Motor(gear=1.0))
@@ -94,7 +94,7 @@ def _unpowered(body: Body) -> Body:
 
 
 def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
-    """Vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the centre of mass.
+    """Return vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the centre of mass.
 
     The least-norm solution of the balance of force and moments; no foot is taken to carry less
     than a quarter of its equal share, since in walking every foot has its turn.
@@ -105,7 +105,7 @@ def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
 
 
 def stability_margin(centre, soles) -> float:
-    """Signed distance, seen from above, of a point from the edge of the convex hull of others, > 0 inside.
+    """Return how far inside the convex hull of other points a point lies, seen from above; < 0 outside.
 
     Args:
         centre: (2,) or more, the point.

@@ -1,4 +1,4 @@
-"""The four creatures of the paper, as data: domain name -> `Body`."""
+"""The four robots of the paper, as data: domain name -> `Body`."""
 
 from collections.abc import Mapping
 from typing import Any

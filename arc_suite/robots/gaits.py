@@ -15,7 +15,7 @@ TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
 
 
 class Gait(NamedTuple):
-    """When legs stand.
+    """When each leg stands and when it swings.
 
     Attributes:
         duty_factor: share of a cycle in stance.
@@ -27,11 +27,12 @@ class Gait(NamedTuple):
 
 
 def metachronal(body: Body, duty_factor: float) -> Gait:
-    """The one rule behind most gaits of animals: waves of swinging legs from the rear to the front.
+    """Return the metachronal gait of a body: waves of swinging legs run from the rear to the front.
 
-    On each side a leg takes off when the one behind it touches down, 1 - duty factor of a cycle
-    later; the two sides are half a cycle apart (Wilson, "Insect walking", 1966). Six legs make a
-    tripod gait at 1/2, a tetrapod at 2/3, a ripple at 3/4 and a wave at 5/6.
+    It is the rule behind most gaits of animals. On each side a leg takes off when the one behind it
+    touches down, 1 - duty factor of a cycle later; the two sides are half a cycle apart (Wilson,
+    "Insect walking", 1966). Six legs make a tripod gait at 1/2, a tetrapod at 2/3, a ripple at 3/4
+    and a wave at 5/6.
     """
     offsets = []
     for leg, rank in zip(body.legs, body.ranks, strict=True):
@@ -41,7 +42,7 @@ def metachronal(body: Body, duty_factor: float) -> Gait:
 
 
 def _alternating(body: Body, duty_factor: float) -> Gait:
-    """Every leg half a cycle from its neighbours, in front, behind and across."""
+    """Return the gait in which every leg is half a cycle from its neighbours, in front, behind and across."""
     return _of_groups(body, duty_factor, lambda rank, right: 0.5 * ((rank + right) % 2))
 
 
@@ -81,14 +82,14 @@ NAMES = tuple(_GAITS)
 
 
 def fitting(body: Body) -> tuple[str, ...]:
-    """Names of the gaits that a body has the legs for."""
+    """Return the names of the gaits that a body has the legs for."""
     sides = [leg.side for leg in body.legs]
     even = sides.count("left") == sides.count("right")
     return tuple(name for name, gait in _GAITS.items() if gait.fits(len(sides), even))
 
 
 def gait(body: Body, name: str) -> Gait:
-    """A gait by name.
+    """Return the gait of a body by name.
 
     Raises:
         ValueError: no such gait, or none for these legs; one line that lists those that fit.

@@ -270,7 +270,7 @@ def _around(legs: int, p: _Proportions) -> tuple[Leg, ...]:
 
 
 def _leg(name: str, mount: Vector, heading: float, reach: float, p: _Proportions) -> Leg:
-    """A leg that points to a heading (degrees, counter-clockwise from forward) and ends on the floor."""
+    """Return a leg that points to a heading (degrees, counter-clockwise from forward) and ends on the floor."""
     links = len(p.profile)
     foot_radius = 0.06 * p.height
     out = reach * p.height / sum(share * _cos(elevation) for share, elevation in p.profile)

@@ -35,7 +35,7 @@ class SpecError(ValueError):
     """
 
     def __init__(self, reason: str, field: str | None = None, owner: str | None = None):
-        """Words the error; `owner` tells whose field it is."""
+        """Word the error; `owner` tells whose field it is."""
         super().__init__(": ".join(part for part in (".".join(filter(None, (owner, field))), reason) if part))
         self.reason = reason
         self.field = field
@@ -93,7 +93,7 @@ def _shown(value: Any) -> str:
 
 
 def _field(check, *args, default=dataclasses.MISSING, optional=False):
-    """A dataclass field whose value passes through `check(value, *args)`; None may pass if optional."""
+    """Return a dataclass field whose value passes through `check(value, *args)`; None may pass if optional."""
 
     def checked(value):
         return None if optional and value is None else check(value, *args)
@@ -126,7 +126,7 @@ def _position(**kwargs):
 
 
 class _Spec:
-    """Runs every field's check, then the checks that concern several fields at once."""
+    """Base of all specs: checks every field, then what concerns several fields at once."""
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
@@ -138,7 +138,7 @@ class _Spec:
         self._check_whole()
 
     def _check_whole(self) -> None:
-        """Checks between fields; a subclass with any overrides this."""
+        """Check what concerns several fields; a subclass for which there is any overrides this."""
 
     def _fail(self, field: str, message: str) -> NoReturn:
         raise SpecError(message, field, self._label())
@@ -149,7 +149,7 @@ class _Spec:
         return f"{kind}({name})" if isinstance(name, str) and _NAME.fullmatch(name) else kind
 
     def replace(self, **changes):
-        """A copy with some fields changed, validated like any other."""
+        """Return a copy with some fields changed, checked like any other."""
         return dataclasses.replace(self, **changes)
 
 
@@ -188,7 +188,7 @@ class Joint(_Spec):
             self._fail("range_deg", f"expected low <= 0 <= high and low < high, got {_shown(self.range_deg)}")
 
     def mirrored(self) -> Joint:
-        """The joint of the leg across the x-z plane, so that equal angles give mirrored poses.
+        """Return the joint of the leg across the x-z plane, so that equal angles give mirrored poses.
 
         A reflection at y -> -y turns an axis (a, b, c) into (-a, b, -c). A vertical axis stays
         instead, by the convention of the published robots, and its range changes sign.
@@ -214,7 +214,7 @@ class Link(_Spec):
             self._fail("end", "expected a point away from the link's origin")
 
     def mirrored(self) -> Link:
-        """The link of the leg across the x-z plane."""
+        """Return the link of the leg across the x-z plane."""
         return self.replace(end=_reflected(self.end), joint=self.joint and self.joint.mirrored())
 
 
@@ -252,27 +252,35 @@ class Leg(_Spec):
 
     @property
     def joints(self) -> tuple[Joint, ...]:
-        """The joints, from the torso outwards."""
+        """Return the joints, from the torso outwards."""
         return tuple(link.joint for link in self.links if link.joint)
 
     @property
     def side(self) -> str:
-        """'left' or 'right', by where the foot stands; 'left' on the midline."""
+        """Return 'left' or 'right', by where the foot stands; 'left' on the midline."""
         return "right" if self.foot_position[1] < -1e-9 else "left"  # rounding must not tell sides
 
     @property
     def foot_position(self) -> Vector:
-        """The foot in the torso's frame with all joints at zero."""
-        x, y, z = (sum(link.end[i] for link in self.links) for i in range(3))
+        """Return where the foot is in the torso's frame with all joints at zero."""
+        return self.points[-1]
+
+    @property
+    def points(self) -> tuple[Vector, ...]:
+        """Return the origin of every link, and last of the foot, in the torso's frame with all joints at zero."""
         cos, sin = math.cos(math.radians(self.yaw_deg)), math.sin(math.radians(self.yaw_deg))
-        return (self.mount[0] + cos * x - sin * y, self.mount[1] + sin * x + cos * y, self.mount[2] + z)
+        points = [self.mount]
+        for link in self.links:
+            (x, y, z), (a, b, c) = points[-1], link.end
+            points.append((x + (cos * a - sin * b), y + (sin * a + cos * b), z + c))
+        return tuple(points)
 
     def full_name(self, part: Link | Foot | Joint) -> str:
-        """The name of a link's or foot's body, or of a joint and its motor, in the model."""
+        """Return the name of a link's or foot's body, or of a joint and its motor, in the model."""
         return f"{self.name}_{part.name}"
 
     def mirrored(self, name: str) -> Leg:
-        """The leg across the x-z plane, under another name."""
+        """Return the leg across the x-z plane, under another name."""
         return self.replace(
             name=name,
             mount=_reflected(self.mount),
@@ -306,7 +314,7 @@ class Solid(_Spec):
             self._fail("name", "'floor' is what the body stands on")
 
     def mirrored(self):
-        """The shape across the x-z plane."""
+        """Return the shape across the x-z plane."""
         x, y, z = self.euler_deg
         return self.replace(position=_reflected(self.position), euler_deg=(-x, y, -z))
 
@@ -367,10 +375,10 @@ class Body(_Spec):
     """A whole creature.
 
     The legs' order is that of bodies, actions, joint angles, joint velocities and contact forces.
-    What is None is sized to the body before it is built; see `arc_suite.robots.sizing`.
+    What is None is sized to the body before it is built; see `arc_suite.models.sizing`.
 
     Attributes:
-        name: the model's name.
+        name: of the body and its model; a robot's name gives it the robot's numbers.
         torso: the root.
         legs: every leg, right ones included.
         camera: the side view that follows the body; None: placed to suit the body.
@@ -397,7 +405,7 @@ class Body(_Spec):
         _check_unique(self, "legs", self.joint_names)
 
     def _check_inertia(self):
-        """MuJoCo refuses moving parts of no inertia to speak of; that of a ball is 8/15 pi density radius^5."""
+        """Refuse moving parts whose inertia is too small for MuJoCo; that of a ball is 8/15 pi density radius^5."""
         least = (_LEAST_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2
         for leg in self.legs:
             for part in (*leg.links, leg.foot):
@@ -411,29 +419,29 @@ class Body(_Spec):
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the joints, and of their motors, in the order of the action."""
+        """Return the names of the joints, and of their motors, in the order of the action."""
         return tuple(leg.full_name(joint) for leg in self.legs for joint in leg.joints)
 
     @property
     def part_names(self) -> tuple[str, ...]:
-        """Names of the rigid bodies in the order of the contact forces, the torso first."""
+        """Return the names of the rigid bodies in the order of the contact forces, the torso first."""
         return ("torso", *(leg.full_name(part) for leg in self.legs for part in (*leg.links, leg.foot)))
 
     @property
     def foot_names(self) -> tuple[str, ...]:
-        """Names of the feet's bodies, in the order of the legs."""
+        """Return the names of the feet's bodies, in the order of the legs."""
         return tuple(leg.full_name(leg.foot) for leg in self.legs)
 
     @property
     def ranks(self) -> tuple[int, ...]:
-        """For each leg, how many legs of its side stand in front of it: 0 is the front leg."""
+        """Return for each leg how many legs of its side stand in front of it: 0 is the front leg."""
         return tuple(
             sum(other.side == leg.side and other.foot_position[0] > leg.foot_position[0] for other in self.legs)
             for leg in self.legs
         )
 
     def mirrored(self) -> Body:
-        """The body across the x-z plane; every part keeps its name and place in the order."""
+        """Return the body across the x-z plane; every part keeps its name and place in the order."""
         solids = tuple(solid.mirrored() for solid in self.torso.solids)
         return self.replace(
             torso=self.torso.replace(solids=solids),

@@ -1,4 +1,4 @@
-"""Bodies as JSON: the fields of `arc_suite.spec` by name, tuples as lists, defaults left out.
+"""Bodies as JSON: the fields of `arc_suite.robots.spec` by name, tuples as lists, defaults left out.
 
 A file holds one object, the fields of a `Body`; wherever a field is a spec, its object stands
 there. Nothing else can be said in it: no includes, no paths, no markup.
@@ -20,7 +20,7 @@ _NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
 def load_body(path: str | os.PathLike) -> Body:
-    """Reads a body.
+    """Read a body from a file.
 
     Raises:
         SpecError: not JSON, or no body; one line that names the file and the field by its path
@@ -41,7 +41,7 @@ def load_body(path: str | os.PathLike) -> Body:
 
 
 def save_body(body: Body, path: str | os.PathLike) -> None:
-    """Writes a body, as it is: what it leaves open stays open.
+    """Write a body to a file as it is: what it leaves open stays open.
 
     Raises:
         OSError: the file cannot be written.
@@ -50,13 +50,13 @@ def save_body(body: Body, path: str | os.PathLike) -> None:
 
 
 def body_to_json(body: Body) -> str:
-    """The text of a file, ending in a newline; equal bodies give equal texts."""
+    """Return a body as the text of a file, ending in a newline; equal bodies give equal texts."""
     text = json.dumps(_plain(body), indent=2, allow_nan=False)
     return _NUMBERS.sub(lambda match: f"[{' '.join(match[1].split())}]", text) + "\n"
 
 
 def body_from_json(text: str | bytes) -> Body:
-    """The body that a text describes.
+    """Return the body that a text describes.
 
     Raises:
         SpecError: one line that names the field.
@@ -96,7 +96,7 @@ def _plain(value: Any) -> Any:
 
 
 def _spec(kind: type, value: Any, path: str) -> Any:
-    """The spec of a kind that an object describes; `path` leads to it from the top."""
+    """Return the spec of a kind that an object describes; `path` leads to it from the top."""
     if not isinstance(value, dict):
         raise SpecError(f"expected an object with the fields of a {kind.__name__}, got {_shown(value)}", None, path)
     fields = {field.name: field for field in dataclasses.fields(kind)}

@@ -28,7 +28,7 @@ _STABLE = 0.05  # of h: static stability margin that is enough throughout a cycl
 
 
 def fitted_settings(body: Body) -> dict:
-    """A row of walk's table for any body: the same keys, units as in `rewards.Parameters`."""
+    """Return a row of walk's table for any body: the same keys, units as in `terms.Parameters`."""
     height = body.torso.standing_height
     speed = TARGET_FROUDE * math.sqrt(GRAVITY * height)
     gait = fitted_gait(body)

@@ -50,6 +50,7 @@ def test_bad_arguments_are_one_line(argument, message):
     assert done.stderr.splitlines()[-1] == f"walk_census.py: {message}"
 
 
+@pytest.mark.slow
 def test_failures_are_shown_in_a_picture(tmp_path):
     path = tmp_path / "failures.png"
     done = census(*BODIES, "--count=1", "--in_phase", "--picture", path)

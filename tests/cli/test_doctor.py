@@ -42,6 +42,7 @@ def test_healthy():
     assert found["picture"][1].startswith("drawn by egl, ")
 
 
+@pytest.mark.slow
 def test_it_goes_on_where_nobody_reads_on():
     line = f"{sys.executable} -m arc_suite.doctor | head -n 1; exit ${{PIPESTATUS[0]}}"
     environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
@@ -56,6 +57,7 @@ def test_a_wrong_flag_is_one_line():
     assert done.stderr.startswith("doctor.py: Unknown command line flag 'verbose'")
 
 
+@pytest.mark.slow
 def test_wrong_pair(tmp_path):
     pretend(tmp_path, "mujoco", "4.0.0")
     status, found, verdict = doctor(tmp_path)
@@ -64,6 +66,7 @@ def test_wrong_pair(tmp_path):
     assert found["dm-control"][0] == "ok"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("variables", "line"),
     [
@@ -92,6 +95,7 @@ def test_a_driver_that_crashes_takes_only_the_picture_along(tmp_path):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="takes cores away")
 def test_cores_that_are_not_ours(tmp_path):
     (tmp_path / "sitecustomize.py").write_text("import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})")

@@ -7,6 +7,7 @@ import re
 
 import programs
 import pytest
+from returns import RETURNS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "evaluate.py"
 
@@ -21,8 +22,8 @@ def test_table_of_all_robots():
     rows = {line.split()[0]: line for line in result.stdout.splitlines()[2:]}
     assert list(rows) == ["queen", "bastion", "tick", "leaper", "all"]
     assert re.match(r"all +IQM of return / paper's cpg: 0\.\d{3} \[0\.\d{3}, 0\.\d{3}\]$", rows.pop("all"))
-    for robot, expert in {"queen": "2048", "bastion": "2311", "tick": "1971", "leaper": "2630"}.items():
-        assert rows[robot].split()[7] == expert
+    for robot, returns in RETURNS.items():
+        assert rows[robot].split()[7] == f"{returns.paper:.0f}"
 
 
 def test_figures_of_a_demonstrator():
@@ -30,10 +31,10 @@ def test_figures_of_a_demonstrator():
     assert result.returncode == 0, result.stderr
     fields = result.stdout.splitlines()[-1].split()
     assert fields[0] == "queen"
-    assert float(fields[1]) == pytest.approx(2049, rel=0.015)
+    assert float(fields[1]) == pytest.approx(RETURNS["queen"].medium, rel=0.015)
     iqm, low, high = (float(field.strip("[],")) for field in fields[4:7])
     assert low <= iqm <= high
-    assert iqm == pytest.approx(2049, rel=0.015)
+    assert iqm == pytest.approx(RETURNS["queen"].medium, rel=0.015)
     assert fields[8] == "1000.0"
     assert result.stdout.splitlines()[0].split()[-2:] == ["speed", "gait_compliance"]
     assert float(fields[9]) == pytest.approx(0.5, abs=0.05)
@@ -51,7 +52,7 @@ def test_json_holds_every_episode_and_the_versions(tmp_path):
     assert len(totals) == 3
     assert figures["return"]["mean"] == pytest.approx(sum(totals) / 3)
     assert figures["length"]["episodes"] == 3
-    assert figures["expert_return"] == 2630
+    assert figures["expert_return"] == RETURNS["leaper"].paper
     for package in ("mujoco", "dm_control", "numpy"):
         assert report["versions"][package] == importlib.metadata.version(package)
     assert "arc_suite" in report["versions"]
@@ -69,7 +70,7 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
     assert report["task_kwargs"] == {"target_velocity": 0.25, "weights": {"posture": -0.01}, "gait": "wave"}
     assert "return_over_expert" not in report
     plain = evaluate("--robot=queen", "--policy=random", "--episodes=1").stdout.splitlines()[2].split()
-    assert plain[7] == "2048"
+    assert plain[7] == f"{RETURNS['queen'].paper:.0f}"
     assert plain[1] != rows[0][1]
 
 

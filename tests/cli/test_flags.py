@@ -32,6 +32,7 @@ def test_evaluate_takes_a_spec_and_a_body_made_to_order():
     assert done.stdout.splitlines()[-1].split()[0] == "walker_4x2"
 
 
+@pytest.mark.slow
 def test_render_takes_a_body_made_to_order(tmp_path):
     path = tmp_path / "walker.png"
     done = run("render.py", "--legs=5", "--steps=5", "--width=64", "--height=48", "--output", path)

@@ -78,6 +78,7 @@ def test_an_interrupt_is_one_line_and_exit_status_130(tool, kind, message):
     assert (done.returncode, done.stdout, done.stderr) == (130, "", f"count.py: {message}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("redirection", ["", "2>&1"])
 def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
     target = tmp_path / "a.json"

@@ -42,6 +42,7 @@ def distinct(pictures):
     return len({picture.tobytes() for picture in pictures})
 
 
+@pytest.mark.slow
 def test_png_of_the_demonstrator_is_a_gait_cycle(tmp_path):
     done = render(tmp_path, "--robot=queen", "--policy=cpg", "--output=queen.png")
     assert done.returncode == 0, done.stderr
@@ -59,6 +60,7 @@ def test_png_of_any_other_policy_is_one_view(tmp_path):
     assert view.std() > 10.0
 
 
+@pytest.mark.slow
 def test_png_of_all_robots_is_a_panel(tmp_path):
     done = render(tmp_path, "--robot=all", "--steps=3", "--output=robots.png")
     assert done.returncode == 0, done.stderr
@@ -66,6 +68,7 @@ def test_png_of_all_robots_is_a_panel(tmp_path):
     assert distinct(views_of(tmp_path / "robots.png", 2, 2)) == 4
 
 
+@pytest.mark.slow
 def test_gif_shows_every_control_step_in_real_time(tmp_path):
     done = render(tmp_path, "--robot=bastion", "--steps=6", "--preset=fast", "--output=bastion.gif")
     assert done.returncode == 0, done.stderr
@@ -78,6 +81,7 @@ def test_gif_shows_every_control_step_in_real_time(tmp_path):
     assert distinct(frames) == 6
 
 
+@pytest.mark.slow
 def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     """Under the random policy Leaper falls long before 200 steps; odd sizes become even, as yuv420p needs."""
     done = render(
@@ -97,6 +101,7 @@ def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     assert np.abs(frames[0].astype(int) - frames[-1]).mean() > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("scale", "frames", "milliseconds"), [(1.0, 6, 350), (16.0, 6, 1390), (0.1, 3, 110)])
 def test_films_keep_the_pace_of_any_body(tmp_path, scale, frames, milliseconds):
     """A giant's control step is longer, a mite's shorter than what players show: some of its frames are left out."""
@@ -126,6 +131,7 @@ def test_a_film_of_frames_between_hundredths_keeps_their_sum(tmp_path):
     assert (film.n_frames, total) == (20, 670)
 
 
+@pytest.mark.slow
 def test_settings_of_the_task_are_seen(tmp_path):
     plain = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png")
     quick = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png", "--set=velocity_band=9")
@@ -133,6 +139,7 @@ def test_settings_of_the_task_are_seen(tmp_path):
     assert quick.stdout != plain.stdout
 
 
+@pytest.mark.slow
 def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
     (tmp_path / "imageio_ffmpeg.py").write_text("raise ModuleNotFoundError(\"No module named 'imageio_ffmpeg'\")")
     path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])

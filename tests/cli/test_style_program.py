@@ -27,6 +27,7 @@ def run(*arguments, path=""):
     return subprocess.run([sys.executable, TOOL, *arguments], capture_output=True, text=True, env=environment)
 
 
+@pytest.mark.slow
 def test_report_of_two_policies(tmp_path):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
     figures, folder = tmp_path / "style.json", tmp_path / "pictures" / "leaper"
@@ -63,6 +64,7 @@ def test_report_of_two_policies(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["gait.png", "path.png", "reward.png", "speed.png"]
 
 
+@pytest.mark.slow
 def test_a_saved_body_beside_a_policy(tmp_path):
     saved, figures = tmp_path / "spider.npz", tmp_path / "style.json"
     done = run(f"--spec={SPIDER}", "--episodes=2", "--seed=4", f"--save={saved}", f"--json={figures}")
@@ -89,6 +91,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
         assert (other.returncode, other.stdout, other.stderr) == (1, "", message)
 
 
+@pytest.mark.slow
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
@@ -156,6 +159,7 @@ def test_other_tasks(tmp_path, task):
     )
 
 
+@pytest.mark.slow
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr

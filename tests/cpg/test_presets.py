@@ -35,6 +35,7 @@ def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
         assert tuned.mean() <= medium.mean(), cost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
     environment = arc_suite.load(robot, "walk")

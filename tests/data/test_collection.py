@@ -95,6 +95,7 @@ def test_minari_opens_a_dataset_whose_environment_replays_it_to_the_bit(settings
     assert data.open(ID).settings == settings
 
 
+@pytest.mark.slow
 def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
     collect(ID, data.Settings(SPIDER, **SHORT), 1)
     code = f"import minari; e = minari.load_dataset({ID!r}).recover_environment(); print(e.reset(seed=5)[0].sum())"

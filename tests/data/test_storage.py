@@ -85,6 +85,7 @@ def killed_at(count, **arguments):
     return process.exitcode == 9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "scenario",
     ["new", "more episodes", *(slowly(name) for name in ("new after another", "overwrite", "overwrite twice"))],
@@ -178,6 +179,7 @@ def test_finished_episodes_are_kept(accident, status, line):
     assert digests()[:4] == digests(f"{ID[:-3]}-b-v0")
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
     def full():
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))

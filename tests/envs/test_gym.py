@@ -70,7 +70,7 @@ def test_import_registers_lazily_and_in_silence_however_often():
 @EVERY_ID
 @pytest.mark.parametrize("render_mode", [None, "rgb_array", "depth_array"])
 def test_check_env_warns_of_infinite_bounds_alone(env_id, render_mode):
-    env = gymnasium.make(env_id, render_mode=render_mode)
+    env = gymnasium.make(env_id, render_mode=render_mode, width=64, height=48)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         check_env(env.unwrapped)
@@ -254,6 +254,7 @@ def test_task_settings_reach_the_task():
     assert settings.weights["posture"] == 0.0 and settings.parameters.target_velocity == 1.0
 
 
+@pytest.mark.slow
 @EVERY_ID
 def test_both_time_limits_agree(env_id):
     def last_step(env, before_last=lambda env: None):
@@ -488,6 +489,7 @@ def test_vector_env_is_its_rows(env_id):
                 break
 
 
+@pytest.mark.slow
 def test_vector_env_in_spawned_processes():
     def make(mode, **kwargs):
         return gymnasium.make_vec(IDS[0], num_envs=2, vectorization_mode=mode, vector_kwargs=kwargs)

@@ -60,6 +60,7 @@ def test_guides_robot_walks(package):
     assert package(code) == ["200 True"] * 3
 
 
+@pytest.mark.slow
 def test_every_face(package):
     code = """
 import arc_suite, gymnasium, numpy as np
@@ -98,6 +99,7 @@ for call in (
     ]
 
 
+@pytest.mark.slow
 def test_processes_that_share_no_memory_import_it(package):
     code = """
 import gymnasium, numpy as np
@@ -113,6 +115,7 @@ if __name__ == "__main__":
     assert package(code) == ["(2, 107)"] * 2
 
 
+@pytest.mark.slow
 def test_names_import_what_they_name(package):
     code = """
 import arc_suite, gymnasium

@@ -262,6 +262,7 @@ def test_statistics_are_recorded_in_both_modes():
         assert len(lengths) > 3 and max(lengths) == 20
 
 
+@pytest.mark.slow
 def test_render_shows_each_row_and_disturbs_nothing():
     size = {"width": 80, "height": 60}
     batch, twin = make("queen", 2, render_mode="rgb_array", **size), make("queen", 2)

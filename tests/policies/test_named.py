@@ -21,10 +21,18 @@ def test_policies_act_on_time_steps(name):
     assert (name == "zero") == (not first.any())
 
 
-def test_random_policies_differ_by_seed():
+@pytest.mark.parametrize(("name", "noise"), [("random", 0.0), ("zero", 0.1), ("cpg", 0.1)])
+def test_random_policies_and_noise_differ_by_seed(name, noise):
     time_step = arc_suite.load("tick", "walk").reset(0)
-    first, second = (alone(policy("random", "tick"), seed)(time_step) for seed in (1, 2))
+    first, second = (alone(policy(name, "tick", noise=noise), seed)(time_step) for seed in (1, 2))
     assert (first != second).all()
+
+
+def test_noise_is_added_to_what_the_policy_does():
+    time_step = arc_suite.load("tick", "walk").reset(0)
+    plain, noisy = (alone(policy("random", "tick", noise=noise), 1)(time_step) for noise in (0.0, 0.1))
+    noise = alone(policy("zero", "tick", noise=0.1), 1)(time_step)
+    np.testing.assert_array_equal(noisy, plain + noise)
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,7 @@ REFUSED = {
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 
 
+@pytest.mark.slow
 @forks
 @pytest.mark.parametrize("then", ["use", "collect", "exit"])
 @pytest.mark.parametrize("what", REFUSED)
@@ -107,6 +108,7 @@ def rollout(seed, picture, sender=None):
     return result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
 def test_environments_made_in_the_child_work(method):
     context = multiprocessing.get_context(method)
@@ -121,6 +123,7 @@ def test_environments_made_in_the_child_work(method):
     assert child.exitcode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
 def test_async_vector_environments_work(method):
     kwargs = {"vectorization_mode": "async", "vector_kwargs": {"context": method}}
@@ -134,6 +137,7 @@ def test_async_vector_environments_work(method):
         assert [float(reward[row]) for reward in rewards] == [env.step(np.zeros(18, np.float32))[1] for _ in range(3)]
 
 
+@pytest.mark.slow
 @forks
 def test_pictures_in_forked_children_of_a_process_that_made_none():
     code = (

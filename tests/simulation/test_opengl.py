@@ -65,18 +65,22 @@ def lines(outcome, changed=None):
     return [f"changed {changed or {}} removed []", "reward True", outcome, outcome, "reward True"]
 
 
+@pytest.mark.slow
 def test_chooses_egl_where_there_is_no_display(tmp_path):
     assert run(tmp_path) == lines("picture (48, 64, 3)", {"MUJOCO_GL": "egl"})
 
 
+@pytest.mark.slow
 def test_users_choice_stays(tmp_path):
     assert run(tmp_path, MUJOCO_GL="egl") == lines("picture (48, 64, 3)")
 
 
+@pytest.mark.slow
 def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
     assert run(tmp_path, DISPLAY=":9876") == lines("picture (48, 64, 3)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("sitecustomize", "variables", "changed", "message"),
     [
@@ -164,12 +168,14 @@ print(dm_control._render.BACKEND)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", ["first", "last"])
 def test_dm_control_draws_in_the_same_process(order, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "egl")
     assert script(NEIGHBOURS, order) == ["egl"]
 
 
+@pytest.mark.slow
 def test_pictures_are_those_of_a_context_of_ones_own():
     from dm_control.mujoco import Physics  # after arc_suite, which chooses the backend
 
@@ -187,6 +193,7 @@ def test_pictures_are_those_of_a_context_of_ones_own():
             own.free()
 
 
+@pytest.mark.slow
 def test_threads_draw_what_one_thread_draws():
     def pictures(robot):
         environment = arc_suite.load(robot, "walk", {"random": 0})
@@ -211,6 +218,7 @@ def test_a_callback_may_draw():
     assert inner[0].shape == (24, 32, 3)
 
 
+@pytest.mark.slow
 def test_pictures_while_the_interpreter_ends_are_refused():
     code = (
         "import atexit, sys, arc_suite\n"
@@ -250,6 +258,7 @@ for count in map(int, sys.argv[1:]):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="reads memory from Linux's /proc")
 def test_a_further_rendering_environment_costs_little():
     few, many = (float(line.split()[1]) for line in script(MANY, "2", "12"))

@@ -44,7 +44,10 @@ def take(opened, stage, seeds):
 def test_policies_walk_any_body_once_for_each_seed():
     opened = source("zero")
     assert (opened.label, opened.stage) == ("zero", None)
-    for stage in (TICK, Stage(BODY, "steer", {"time_limit": 1.0, "arena": "bumps"})):
+    for stage in (
+        TICK._replace(task_kwargs={"time_limit": 1.0}),
+        Stage(BODY, "steer", {"time_limit": 1.0, "arena": "bumps"}),
+    ):
         tracks = take(opened, stage, (5, 6))
         assert [(track.body, track.seed) for track in tracks] == [(stage.body, 5), (stage.body, 6)]
         assert {(track.task, str(track.task_kwargs)) for track in tracks} == {(stage.task, str(stage.task_kwargs))}

@@ -73,6 +73,7 @@ def test_rows_are_bit_equal_to_single_environments(package, imported, env_id, kw
     assert package("-c", code) == "same\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_commands(package, command):
     name, *arguments = command.split()

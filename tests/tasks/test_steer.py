@@ -7,6 +7,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
 from arc_suite import rotations
+from arc_suite.cpg import Demonstrator
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import generator
 from arc_suite.tasks import steer
 
 
@@ -34,8 +37,8 @@ def test_the_schedule_holds_each_command_and_begins_again():
     assert held.min() >= 60 and held.max() <= 160
     for command, end, length in zip(memory.schedule, memory.ends, held, strict=True):
         for tick in (end - length, end - 1):
-            assert_array_equal(task.wanted(memory._replace(tick=int(tick))), command)
-    assert_array_equal(task.wanted(memory._replace(tick=int(memory.ends[-1]))), memory.schedule[0])
+            assert_array_equal(task.wanted(memory._replace(steps=int(tick))), command)
+    assert_array_equal(task.wanted(memory._replace(steps=int(memory.ends[-1]))), memory.schedule[0])
 
 
 def test_the_command_is_observed_and_changes_on_schedule():
@@ -140,16 +143,74 @@ def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, mess
     rows.close()
 
 
-def test_an_obedient_body_earns_what_a_standing_one_does_not():
-    """With the command straight ahead, a demonstrator that walks straight is far better than none."""
-    from arc_suite.cpg import Demonstrator
-
-    totals = {}
-    for name, policy in (("tuned", Demonstrator("tick", "tuned")), ("none", lambda timestep: np.zeros(18))):
-        environment = arc_suite.load("tick", "steer", {"random": 0})
-        timestep, totals[name] = environment.reset(), 0.0
+def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
+    earned = {}
+    for preset in ("steered", "tuned", None):
+        rows = VectorEnv("tick", "steer", 6)
+        policy = Demonstrator("tick", preset) if preset else None
+        observations, _ = rows.reset(seed=0)
+        total = 0.0
         for _ in range(300):
-            environment.command("command", (1.0, 0.0, 0.0))
+            blocks = rows.task.split(observations)
+            actions = policy.act(blocks) if policy else np.zeros(rows.action_space.shape)
+            observations, rewards, *_ = rows.step(actions)
+            total += rewards.sum()
+        earned[preset] = total
+        rows.close()
+    assert earned[None] < 0.55 * earned["steered"]
+    assert earned["tuned"] < 0.45 * earned["steered"]
+
+
+def test_at_a_stop_all_feet_are_to_stand_and_the_clock_rests():
+    environment = arc_suite.load("queen", "steer", {"random": 0})
+    environment.reset()
+    environment.command("command", (1.0, 0.0, 0.0))
+    for _ in range(10):
+        environment.step(np.zeros(18))
+    tick = environment.task.memory.tick
+    assert tick == 10
+    environment.command("command", (0.0, 0.0, 0.0))
+    for _ in range(40):
+        timestep = environment.step(np.zeros(18))
+    assert environment.task.memory.tick == tick and environment.task.memory.steps == 50
+    assert_array_equal(timestep.observation["gait_clock"], [0.0, 0.0])
+    assert environment.task.terms["gait_cost"] == 0.0, "it stands, as it is to"
+    assert_allclose(environment.task.terms["tracking"], 1.0, atol=0.02)
+
+
+@pytest.mark.parametrize("robot", ["queen", "leaper"])
+def test_nothing_tells_where_the_body_heads(robot):
+    """The same start, turned: observations and rewards differ by rounding alone, however contacts amplify it."""
+    environments = [arc_suite.load(robot, "steer", {"random": 3}) for _ in range(2)]
+    first, other = (environment.reset() for environment in environments)
+    data, turn = environments[1].physics.data.ptr, 1.234
+    with environments[1].physics.reset_context():
+        data.qpos[:] = environments[0].physics.position()
+        data.qvel[:] = environments[0].physics.velocity()
+        data.qpos[3:7] = rotations.turned(data.qpos[3:7], turn)
+        back = rotations.headed(data.qvel[:2].copy(), -turn)
+        data.qvel[:2] = back
+    run = environments[1].task
+    run.memory = run.definition.begin(environments[0].task.memory, run.definition.read(data))
+    for step in range(5):
+        a, b = (environment.step(np.full(len(first.observation["posture"]) - 5, 0.1)) for environment in environments)
+        for name in ("posture", "velocities", "gait_clock", "command"):
+            assert_allclose(a.observation[name], b.observation[name], atol=1e-9, err_msg=f"{name}, step {step}")
+        assert_allclose(a.reward, b.reward, atol=1e-9)
+
+
+def test_the_same_shape_earns_the_same_at_any_size():
+    """Costs, commands and contact forces have no scale."""
+    returns = []
+    for scale in (0.1, 1.0, 10.0):
+        body = generator.scaled(generator.generate(6, 3), scale)
+        environment, policy = (
+            arc_suite.load(body, "steer", {"random": 1, "base_noise": 0.0}),
+            Demonstrator(body, "steered"),
+        )
+        timestep, total = environment.reset(), 0.0
+        for _ in range(200):
             timestep = environment.step(policy(timestep))
-            totals[name] += environment.task.terms["tracking"]
-    assert totals["tuned"] > 150.0 > 10.0 > totals["none"]
+            total += timestep.reward
+        returns.append(total)
+    assert returns == pytest.approx([returns[1]] * 3, rel=0.02)

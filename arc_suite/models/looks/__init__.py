@@ -25,15 +25,15 @@ _POOR, _RICH = np.array((0.9, 0.08, 0.05, 1.0)), np.array((0.1, 0.9, 0.2, 1.0))
 
 
 def reward_colour(share: float) -> np.ndarray:
-    """The colour of a reward: red for none of what can be earned, green for all of it; rgba (4,)."""
+    """Return the colour of a share of the greatest reward, from red for 0 to green for 1: rgba (4,)."""
     share = min(max(share, 0.0), 1.0)
     return (1.0 - share) * _POOR + share * _RICH
 
 
 def decorate(root: mjcf.RootElement, body: Body) -> None:
-    """Shows off a built body on its floor; nothing of its dynamics changes.
+    """Add looks to a body on its ground; nothing of its dynamics changes.
 
-    Adds sky, light and a grid on the floor, materials to all geoms, and geoms without mass or
+    Added are sky, light and a grid on the ground, materials of all geoms, and geoms without mass or
     contacts to torso and joints. All of it is named; the geoms are called `look-...`, which no
     part of a spec can be. The material `glow` is the one that can show a reward.
 
@@ -80,7 +80,7 @@ def _dress(root: mjcf.RootElement, leg: Leg, look: Look) -> None:
 
 
 def _add_plate(part, name: str, link: Link) -> None:
-    """A plate along the link on the side that faces up and outwards."""
+    """Add a plate along the link on the side that faces up and outwards."""
     end = np.array(link.end)
     length = np.linalg.norm(end)
     outwards = np.array((0.0, 0.0, 1.0)) + _unit(end * (1.0, 1.0, 0.0))

@@ -8,7 +8,7 @@ from arc_suite.robots.spec import Body
 
 
 def generic(body: Body) -> Look:
-    """Slate armour, violet joints, and an eye on a snout in front of the first solid of the torso."""
+    """Return a look for a body: slate armour, violet joints, and an eye on a snout in front of the torso."""
     corners = solid_corners(body.torso.solids[0])
     centre, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2.0
     r = 0.4 * min(half)

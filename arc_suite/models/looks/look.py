@@ -1,4 +1,4 @@
-"""The words in which looks are written: colours, ornaments, and a look made of them."""
+"""What looks are made of: colours and ornaments."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -29,13 +29,13 @@ class Ornament(NamedTuple):
     paired: bool = False
 
     def mirrored(self) -> "Ornament":
-        """The twin: a reflection at y -> -y keeps turns about y and reverses those about x and z."""
+        """Return the twin: a reflection at y -> -y keeps turns about y and reverses those about x and z."""
         (x, y, z), (a, b, c) = self.position, self.euler_deg
         return self._replace(name=f"{self.name}_right", position=(x, -y, z), euler_deg=(-a, b, -c), paired=False)
 
 
 class Look(NamedTuple):
-    """What one creature looks like.
+    """The looks of one creature.
 
     Attributes:
         colours: of the materials; "shell", "trim", "frame", "limb" and "glow" are what every body wears.

@@ -70,6 +70,6 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
 
 
 def _round_length(length: float) -> float:
-    """The nearest of ..., 0.1, 0.2, 0.5, 1, 2, ... m."""
+    """Return the nearest of ..., 0.1, 0.2, 0.5, 1, 2, ... m."""
     decade = 10.0 ** math.floor(math.log10(length))
     return min((decade * step for step in (1.0, 2.0, 5.0, 10.0)), key=lambda step: abs(math.log(step / length)))
