@@ -60,7 +60,12 @@ class Build(NamedTuple):
     lead: float = 0.0
 
 
-BUILDS = {"leaper": Build(share=0.06, level=1.0, sweep=0.8, unload=0.0)}
+BUILDS = {
+    "queen": Build(lead=0.12),
+    "bastion": Build(lead=0.08),
+    "tick": Build(lead=0.1),
+    "leaper": Build(share=0.06, level=1.0, sweep=0.8, unload=0.0, lead=0.04),
+}
 
 _ACROSS = 0.1  # how much it matters that a foot does not slip across its way
 _DAMPING = 0.1  # of the leg's largest Jacobian entry, for a joint with room for _ROOM
@@ -153,10 +158,7 @@ class Steered:
         asked = (command + integral + self._manner.gain * (command - motion)) * self._units
         phase = np.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi)
         sweeps, raised, lifts = self._directions(asked, quaternion)
-        targets, ahead = (
-            self._neutral + size * (raised + self._targets(phase + later, sweeps, lifts))
-            for later in (0.0, self._cycles)
-        )
+        targets, ahead = (size * (raised + self._swung(at, sweeps, lifts)) for at in (phase, phase + self._cycles))
         speeds = (ahead - targets) / self._step
         error, slip = self._neutral + targets - angles, velocities - speeds
         return (self._stiffness * error - self._damping * slip).clip(-1.0, 1.0)
@@ -206,7 +208,8 @@ def _sweep(leg: _Leg, way, level: float):
     moved = (weighted @ angles[..., None])[..., 0]
     angles *= moved[:, :1] * length / np.maximum((moved**2).sum(axis=-1, keepdims=True), 1e-12)
     angles *= np.minimum(1.0, (leg.room / np.maximum(abs(angles), 1e-12)).min(axis=-1, keepdims=True))
-    reached = (along * (angles @ leg.jacobian[:2].T)).sum(axis=-1, keepdims=True)
+    # A product of each row by itself: one of all rows would round as their number has it.
+    reached = (along * (leg.jacobian[:2] @ angles[..., None])[..., 0]).sum(axis=-1, keepdims=True)
     return angles, np.where(length > 1e-9, reached / np.maximum(length, 1e-9), 1.0).clip(0.0, 1.0)
 
 

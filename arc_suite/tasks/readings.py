@@ -10,7 +10,6 @@ import numpy as np
 
 from arc_suite.arenas import Arena
 
-UNIT = 1.0  # of contact forces, N and N m, in the published benchmark
 FIELDS = ("qpos", "qvel", "cfrc_ext", "xpos")  # of the simulation, that `read` takes
 
 
@@ -112,14 +111,13 @@ def component(vectors, index: int):
     return vectors[..., index][()]
 
 
-def read(data, layout: Layout, arena: Arena, force_unit=UNIT) -> Readings:
+def read(data, layout: Layout, arena: Arena) -> Readings:
     """Take the readings of a simulation.
 
     Args:
         data: `MjData`, or anything with its fields under any leading axes.
         layout: of the body in the model.
         arena: over whose ground heights are.
-        force_unit: N and N m of a contact force of 1, a number or (6,) of torque and force.
 
     Returns:
         The readings; arrays may be views of `data`.
@@ -130,8 +128,6 @@ def read(data, layout: Layout, arena: Arena, force_unit=UNIT) -> Readings:
         numpy = qpos.__array_namespace__()
         pose = numpy.concatenate([arena.clearance(position)[..., None], pose[..., 1:]], axis=-1)
     forces = data.cfrc_ext[..., layout.parts, :]
-    if force_unit is not UNIT:
-        forces = forces / force_unit
     return Readings(
         posture=pose,
         torso_position=position,

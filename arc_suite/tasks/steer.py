@@ -16,7 +16,6 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
-from arc_suite.tasks import readings as reading
 from arc_suite.tasks import terms, walk
 from arc_suite.tasks.contract import Start
 from arc_suite.tasks.readings import Readings, component
@@ -93,8 +92,16 @@ class Steer(walk.Walk):
         return start._replace(memory=Memory(*start.memory, *own))
 
     def read(self, data) -> Readings:
-        """Take the readings, with contact forces in the body's weight."""
-        return reading.read(data, self.scene.layout, self.scene.arena, self.force_unit)
+        """Take the readings, with contact forces in the body's weight and as the torso heads."""
+        readings = super().read(data)
+        numpy, heading = readings.posture.__array_namespace__(), rotations.yaw(readings.torso_quaternion)[..., None]
+        forces = data.cfrc_ext[..., self.scene.layout.parts, :] / self.force_unit
+        turned = (rotations.headed(forces[..., i : i + 2], heading) for i in (0, 3))
+        torque, force = (
+            numpy.concatenate([part, forces[..., i : i + 1]], axis=-1) for part, i in zip(turned, (2, 5), strict=True)
+        )
+        forces = numpy.concatenate([torque, force], axis=-1)
+        return readings._replace(contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0))
 
     def lift(self, memory: Memory, readings: Readings) -> np.ndarray:
         """Return the positions that bring every foot clear of the ground, level ground too: none is thrown up."""
