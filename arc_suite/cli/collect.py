@@ -35,6 +35,8 @@ flags.DEFINE_integer(
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("id", None, "Id of the dataset. [default: arc_suite/ROBOT/TASK/POLICY-PRESET-v0, or like it]")
 flags.DEFINE_boolean("overwrite", False, "Replace a dataset of that id, once the new one is complete.")
+flags.DEFINE_string("author", None, "Who has made the dataset, for its metadata.")
+flags.DEFINE_string("code_permalink", None, "Where the code lies that made the dataset, for its metadata.")
 flags.DEFINE_string("verify", None, "Replay the dataset of this id instead.")
 flags.DEFINE_integer("rows", 64, "Episodes at a time; the data do not depend on it.", lower_bound=1)
 flags.DEFINE_integer("threads", None, "Threads to simulate on; the data do not depend on it. [default: all]", 1)
@@ -62,7 +64,15 @@ def main() -> None:
         settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
         dataset_id = FLAGS.id or settings.dataset_id()
         missing = data.collect(
-            dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite, progress
+            dataset_id,
+            settings,
+            FLAGS.episodes,
+            FLAGS.rows,
+            FLAGS.threads,
+            FLAGS.overwrite,
+            progress,
+            FLAGS.author,
+            FLAGS.code_permalink,
         )
         dataset = data.open(dataset_id)
         if not missing:

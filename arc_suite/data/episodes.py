@@ -225,6 +225,18 @@ def _attributes(index: int, episode: Episode) -> dict:
     return attributes if episode.preset is None else attributes | {"preset": episode.preset}
 
 
+def index(group: str) -> int:
+    """Return the index of the episode that a group holds.
+
+    Raises:
+        ValueError: the group's name is not that of an episode.
+    """
+    number = group.removeprefix("episode_")
+    if not (number.isascii() and number.isdecimal() and len(number) < 12 and name(int(number)) == group):
+        raise ValueError(f"{group[:80]!r}: expected the name of an episode")
+    return int(number)
+
+
 def name(index: int) -> str:
     """Return the name of an episode's group in the HDF5 file, as Minari has it."""
     return f"episode_{index}"
