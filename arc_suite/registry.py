@@ -2,7 +2,8 @@
 
 import importlib
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 
 from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
@@ -57,7 +58,31 @@ def arena_of(arena: str | Arena, body: Body) -> Arena:
     Raises:
         ValueError: an unknown name; one line.
     """
-    return arena if isinstance(arena, Arena) else _find(arena, ARENAS, "arena")(body)
+    return arena if isinstance(arena, Arena) else arena_maker(arena)(body)
+
+
+def arena_maker(name: str) -> Callable[[Body], Arena]:
+    """Return the function that makes the arena of a name suit a body.
+
+    Raises:
+        ValueError: an unknown name; one line.
+    """
+    return _find(name, ARENAS, "arena")
+
+
+def imported(kind: str, name: str) -> str:
+    """Return a name that a file gives, `name` or `module:name`, if looking it up imports nothing new.
+
+    Files are data: what they name is looked up among what is registered, and only callers choose what
+    to import.
+
+    Raises:
+        ValueError: the name's module has not been imported yet; one line that names it.
+    """
+    module, colon, _ = name.rpartition(":")
+    if colon and module not in sys.modules:
+        raise ValueError(f"{kind} {name[:80]!r}: files import nothing; import {module[:80]!r} first")
+    return name
 
 
 def env_id(domain_name: str, task: type[Task]) -> str:
