@@ -435,10 +435,8 @@ class Body(_Spec):
     @property
     def ranks(self) -> tuple[int, ...]:
         """Return for each leg how many legs of its side stand in front of it: 0 is the front leg."""
-        return tuple(
-            sum(other.side == leg.side and other.foot_position[0] > leg.foot_position[0] for other in self.legs)
-            for leg in self.legs
-        )
+        feet = [(leg.side, leg.foot_position[0]) for leg in self.legs]  # once: both follow the chain of links
+        return tuple(sum(other == side and ahead > x for other, ahead in feet) for side, x in feet)
 
     def mirrored(self) -> Body:
         """Return the body across the x-z plane; every part keeps its name and place in the order."""

@@ -64,11 +64,13 @@ def fitted_gait(body: Body) -> gaits.Gait:
 
     If none is, the one whose worst moment is the most stable.
     """
-    choices = [gaits.metachronal(body, duty_factor) for duty_factor in _DUTY_FACTORS]
-    margins = [least_margin(body, gait) for gait in choices]
-    enough = _STABLE * body.torso.standing_height
-    best = next((i for i, margin in enumerate(margins) if margin >= enough), int(np.argmax(margins)))
-    return choices[best]
+    enough, margins = _STABLE * body.torso.standing_height, {}
+    for duty_factor in _DUTY_FACTORS:
+        gait = gaits.metachronal(body, duty_factor)
+        margins[gait] = least_margin(body, gait)
+        if margins[gait] >= enough:
+            return gait
+    return max(margins, key=margins.get)
 
 
 def least_margin(body: Body, gait: gaits.Gait) -> float:

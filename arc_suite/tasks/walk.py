@@ -1,7 +1,6 @@
 """Walk: forward at the target speed, in the prescribed gait, for 50 seconds (the paper's Section 4)."""
 
 import functools
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
