@@ -36,9 +36,7 @@ def metachronal(body: Body, duty_factor: float) -> Gait:
     """
     places = [(leg.side, rank) for leg, rank in zip(body.legs, body.ranks, strict=True)]
     rearmost = {side: max(rank for other, rank in places if other == side) for side, _ in places}
-    offsets = [
-        (0.5 * (side == "right") - (rearmost[side] - rank) * (1.0 - duty_factor)) % 1.0 for side, rank in places
-    ]
+    offsets = [(0.5 * (side == "right") - (rearmost[side] - rank) * (1.0 - duty_factor)) % 1.0 for side, rank in places]
     return Gait(duty_factor, tuple(offsets))
 
 
