@@ -73,8 +73,8 @@ class Stride(NamedTuple):
         """
         if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
             raise ValueError(f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {froude!r}")
+        pose = standing(body)  # of the body as it came, for which the task has it at hand
         body = sized(body)
-        pose = standing(body)
         cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / pose.height)
         speed = froude * math.sqrt(GRAVITY * pose.height)
         # A foot on the ground covers from +reach to -reach while its stance lasts.

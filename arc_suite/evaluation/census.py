@@ -18,7 +18,6 @@ from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import gaits, generator
 from arc_suite.robots.spec import Body
 
-JOINT_NOISE = 0.05  # rad, of the pose that walks start in
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
 MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
 MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body has fallen
@@ -96,8 +95,8 @@ def follow(trial: Trial) -> tuple[control.Environment, Course]:
         The environment as the walk left it, and the walk.
     """
     body = trial.body
-    start = {"time_limit": trial.seconds, "random": trial.seed, "joint_noise": JOINT_NOISE, "base_noise": 0.0}
-    environment = load(body, trial.task, start | dict(trial.task_kwargs))
+    settings = {"time_limit": trial.seconds, "random": trial.seed} | dict(trial.task_kwargs)
+    environment = load(body, trial.task, settings)
     gait = gaits.Gait(0.6, (0.0,) * len(body.legs)) if trial.in_phase else None
     demonstrator = Demonstrator(body, froude=trial.froude, gait=gait)
     data = environment.physics.data.ptr

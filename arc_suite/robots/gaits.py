@@ -34,10 +34,9 @@ def metachronal(body: Body, duty_factor: float) -> Gait:
     "Insect walking", 1966). Six legs make a tripod gait at 1/2, a tetrapod at 2/3, a ripple at 3/4
     and a wave at 5/6.
     """
-    offsets = []
-    for leg, rank in zip(body.legs, body.ranks, strict=True):
-        from_rear = max(r for other, r in zip(body.legs, body.ranks, strict=True) if other.side == leg.side) - rank
-        offsets.append((0.5 * (leg.side == "right") - from_rear * (1.0 - duty_factor)) % 1.0)
+    places = [(leg.side, rank) for leg, rank in zip(body.legs, body.ranks, strict=True)]
+    rearmost = {side: max(rank for other, rank in places if other == side) for side, _ in places}
+    offsets = [(0.5 * (side == "right") - (rearmost[side] - rank) * (1.0 - duty_factor)) % 1.0 for side, rank in places]
     return Gait(duty_factor, tuple(offsets))
 
 

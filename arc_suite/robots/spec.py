@@ -20,6 +20,13 @@ from typing import Any, NoReturn
 Vector = tuple[float, float, float]
 
 MAX_LENGTH = 100.0  # metres; far above any creature, far below what upsets MuJoCo
+MAX_DISTANCE = 1e4  # metres, of a camera: more than it takes to see any body
+_DENSEST = 1e9  # kg/m^3
+
+# Of a motor and of a joint, in SI units: beyond what sizing asks for of any body that the other bounds admit, so that
+# no error names a number that sizing found.
+_GEARS = (1e-20, 1e30)
+_LARGEST = 1e35
 _LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
 MAX_NAME = 32  # characters
 _NAME = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
@@ -157,7 +164,7 @@ class _Spec:
 class Motor(_Spec):
     """A torque motor: control in [-1, 1], torque = gear (N m) x control."""
 
-    gear: float = _number(1e-9, 1e9)
+    gear: float = _number(*_GEARS)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -176,8 +183,8 @@ class Joint(_Spec):
     name: str = _name()
     axis: Vector = _field(_check_vector, 3, -1e3, 1e3)
     range_deg: tuple[float, float] = _field(_check_vector, 2, -180.0, 180.0)
-    armature: float | None = _number(0.0, 1e9, default=None, optional=True)
-    damping: float | None = _number(0.0, 1e9, default=None, optional=True)
+    armature: float | None = _number(0.0, _LARGEST, default=None, optional=True)
+    damping: float | None = _number(0.0, _LARGEST, default=None, optional=True)
     motor: Motor | None = _field(_check_instance, Motor, default=None, optional=True)
 
     def _check_whole(self):
@@ -328,9 +335,15 @@ class Ballast(Solid):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Torso(_Spec):
-    """The free-floating root: solids around its origin, `standing_height` above the floor."""
+    """The free-floating root: solids around its origin, which stands above the floor.
 
-    standing_height: float = _length()
+    Attributes:
+        standing_height: of the origin above the floor, m; None: a body sets it so that its lowest foot
+            stands on the floor.
+        solids: what it is made of.
+    """
+
+    standing_height: float | None = _length(default=None, optional=True)
     solids: tuple[Solid, ...] = _field(_check_items, Solid, 1, 64)
 
     def _check_whole(self):
@@ -341,8 +354,13 @@ class Torso(_Spec):
 class TrackingCamera(_Spec):
     """A camera that keeps `position` relative to the body's centre of mass, `xyaxes` as in MJCF."""
 
-    position: Vector = _position()
+    position: Vector = _field(_check_vector, 3, -MAX_DISTANCE, MAX_DISTANCE)
     xyaxes: tuple[float, ...] = _field(_check_vector, 6, -1.0, 1.0, default=(1.0, 0.0, 0.0, 0.0, 0.5, 1.0))
+
+    def _check_whole(self):
+        (a, b, c), (d, e, f) = self.xyaxes[:3], self.xyaxes[3:]
+        if math.hypot(b * f - c * e, c * d - a * f, a * e - b * d) < 1e-6:  # their cross product
+            self._fail("xyaxes", f"expected two directions that are not parallel, got {_shown(self.xyaxes)}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -362,8 +380,8 @@ class Simulation(_Spec):
 
     timestep: float = _number(1e-6, 0.1, default=0.002)
     contact_time: float = _number(2e-6, 1.0, default=0.02)
-    contact_width: float = _number(1e-9, 1.0, default=0.001)
-    contact_margin: float = _number(0.0, 1.0, default=0.005)
+    contact_width: float = _number(1e-9, MAX_LENGTH, default=0.001)
+    contact_margin: float = _number(0.0, MAX_LENGTH, default=0.005)
 
     def _check_whole(self):
         if self.contact_time < 2.0 * self.timestep:
@@ -391,7 +409,7 @@ class Body(_Spec):
     torso: Torso = _field(_check_instance, Torso)
     legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, 64)
     camera: TrackingCamera | None = _field(_check_instance, TrackingCamera, default=None, optional=True)
-    density: float = _number(1e-9, 1e9, default=10.0)
+    density: float = _number(1e-9, _DENSEST, default=10.0)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
 
@@ -400,22 +418,33 @@ class Body(_Spec):
         shapes = [part.name for part in (*self.torso.solids, *self.ballast)]
         _check_unique(self, "ballast", shapes)
         self._check_inertia()
+        if self.torso.standing_height is None:
+            object.__setattr__(self, "torso", self.torso.replace(standing_height=self._derived_height()))
         # Names in the model: leg a's part b_c would meet leg a_b's part c.
         _check_unique(self, "legs", [*shapes, *self.part_names[1:]])
         _check_unique(self, "legs", self.joint_names)
 
+    def _derived_height(self) -> float:
+        """Return the height of the torso's origin above its lowest foot's lowest point."""
+        height = max(leg.foot.radius - leg.foot_position[2] for leg in self.legs)
+        if not 1e-6 <= height <= MAX_LENGTH:
+            reason = f"feet end {abs(height):.4g} m {'below' if height > 0.0 else 'above'} the torso's origin"
+            self._fail("torso", f"standing_height cannot be derived: {reason}")
+        return float(f"{height:.12g}")  # sums of decimal lengths are decimal again
+
     def _check_inertia(self):
         """Refuse moving parts whose inertia is too small for MuJoCo; that of a ball is 8/15 pi density radius^5."""
         least = (_LEAST_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2
-        for leg in self.legs:
-            for part in (*leg.links, leg.foot):
-                if part.radius < least:
-                    self._fail(
-                        "legs", f"{leg.full_name(part)}: expected a radius from {least:.2g}, got {part.radius:g}"
-                    )
-        for solid in self.torso.solids:
-            if min(solid.size) < least:
-                self._fail("torso", f"{solid.name}: expected sizes from {least:.2g}, got {min(solid.size):g}")
+        parts = [("torso", solid.name, min(solid.size)) for solid in self.torso.solids]
+        parts += [("legs", leg.full_name(part), part.radius) for leg in self.legs for part in (*leg.links, leg.foot)]
+        field, name, size = min(parts, key=lambda part: part[2])
+        if size < least:
+            denser = float(f"{1.1 * self.density * (least / size) ** 5:.2g}")
+            fits = f" (density {denser:g} fits)" if denser <= _DENSEST else ""
+            what = "a radius" if field == "legs" else "sizes"
+            self._fail(
+                field, f"{name}: expected {what} from {least:.2g} at density {self.density:g}, got {size:g}{fits}"
+            )
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -435,10 +464,8 @@ class Body(_Spec):
     @property
     def ranks(self) -> tuple[int, ...]:
         """Return for each leg how many legs of its side stand in front of it: 0 is the front leg."""
-        return tuple(
-            sum(other.side == leg.side and other.foot_position[0] > leg.foot_position[0] for other in self.legs)
-            for leg in self.legs
-        )
+        feet = [(leg.side, leg.foot_position[0]) for leg in self.legs]  # once: both follow the chain of links
+        return tuple(sum(other == side and ahead > x for other, ahead in feet) for side, x in feet)
 
     def mirrored(self) -> Body:
         """Return the body across the x-z plane; every part keeps its name and place in the order."""

@@ -20,7 +20,14 @@ BAND = 0.75  # of the target velocity; published: 0.6 to 1
 GAIT_FREQUENCY = 0.18  # of sqrt(g / h); published: 0.2 to 0.41, with feet that slip
 STANCE_HEIGHT = 0.04  # of h, by which a foot in stance may be off the ground
 HEALTHY_RANGE = (0.4, 1.8)  # of h; published: 0.3 to 0.44, and 1.6 to 2
-BASE_NOISE = 0.05  # of h; published: 0.03 to 0.2
+
+# Noise of the start.
+POSITION_NOISE = 0.05  # of h; published: 0.03 to 0.2
+ORIENTATION_NOISE = 0.02  # of the quaternion's components, which have no unit; published: 0.02 to 0.1
+LINEAR_VELOCITY_NOISE = 0.01  # of sqrt(g h); published: 0.007 to 0.05
+ANGULAR_VELOCITY_NOISE = 0.004  # of sqrt(g / h); published: 0.003 to 0.02
+JOINT_ANGLE_NOISE = 0.1  # rad, as published
+JOINT_VELOCITY_NOISE = 0.02  # of sqrt(g / h); published: 0.014 to 0.03
 
 # Duty factors to choose from: the smallest is the published one, and the fastest.
 _DUTY_FACTORS = (0.6, 0.65, 0.7, 0.75, 0.8)
@@ -28,19 +35,25 @@ _STABLE = 0.05  # of h: static stability margin that is enough throughout a cycl
 
 
 def fitted_settings(body: Body) -> dict:
-    """Return a row of walk's table for any body: the same keys, units as in `terms.Parameters`."""
+    """Return a row of walk's table for any body: units as in `terms.Parameters`, every noise by itself."""
     height = body.torso.standing_height
-    speed = TARGET_FROUDE * math.sqrt(GRAVITY * height)
+    unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
+    speed = TARGET_FROUDE * unit
     gait = fitted_gait(body)
     return {
         "target_velocity": speed,
         "velocity_band": BAND * speed,
-        "gait_frequency": GAIT_FREQUENCY * math.sqrt(GRAVITY / height),
+        "gait_frequency": GAIT_FREQUENCY * rate,
         "duty_factor": gait.duty_factor,
         "phase_offsets": tuple(2.0 * math.pi * offset for offset in gait.offsets),
         "stance_threshold": max(leg.foot.radius for leg in body.legs) + STANCE_HEIGHT * height,
         "healthy_range": tuple(share * height for share in HEALTHY_RANGE),
-        "base_noise": BASE_NOISE * height,
+        "position_noise": POSITION_NOISE * height,
+        "orientation_noise": ORIENTATION_NOISE,
+        "linear_velocity_noise": LINEAR_VELOCITY_NOISE * unit,
+        "angular_velocity_noise": ANGULAR_VELOCITY_NOISE * rate,
+        "joint_angle_noise": JOINT_ANGLE_NOISE,
+        "joint_velocity_noise": JOINT_VELOCITY_NOISE * rate,
         "weights": {},
     }
 
@@ -51,11 +64,13 @@ def fitted_gait(body: Body) -> gaits.Gait:
 
     If none is, the one whose worst moment is the most stable.
     """
-    choices = [gaits.metachronal(body, duty_factor) for duty_factor in _DUTY_FACTORS]
-    margins = [least_margin(body, gait) for gait in choices]
-    enough = _STABLE * body.torso.standing_height
-    best = next((i for i, margin in enumerate(margins) if margin >= enough), int(np.argmax(margins)))
-    return choices[best]
+    enough, margins = _STABLE * body.torso.standing_height, {}
+    for duty_factor in _DUTY_FACTORS:
+        gait = gaits.metachronal(body, duty_factor)
+        margins[gait] = least_margin(body, gait)
+        if margins[gait] >= enough:
+            return gait
+    return max(margins, key=margins.get)
 
 
 def least_margin(body: Body, gait: gaits.Gait) -> float:

@@ -1,7 +1,6 @@
 """Walk: forward at the target speed, in the prescribed gait, for 50 seconds (the paper's Section 4)."""
 
 import functools
-import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -31,6 +30,13 @@ COSTS = {
 
 # What a robot does not set itself.
 COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1, "weights": {}}
+
+# One number for several kinds of noise, whatever their units, as published: name -> the settings that it sets.
+SHARED_NOISE = {
+    "base_noise": ("position_noise", "orientation_noise", "linear_velocity_noise", "angular_velocity_noise"),
+    "joint_noise": ("joint_angle_noise", "joint_velocity_noise"),
+}
+_LARGEST = 1e6  # that a setting may be, in its unit: far beyond sense, and finite when squared and summed up
 
 _TRIPOD, _TROT = (tuple(TWO_PI * offset for offset in offsets) for offsets in (gaits.TRIPOD, gaits.TROT))
 
@@ -79,21 +85,38 @@ SETTINGS = {
 }
 
 
+class Noise(NamedTuple):
+    """Noise of a walk's start: half-widths where it is uniform, of poses; standard deviations of velocities.
+
+    Attributes:
+        position_noise: of the torso, half-width, m.
+        orientation_noise: of the components of the torso's quaternion, half-width.
+        linear_velocity_noise: of the torso, standard deviation, m/s.
+        angular_velocity_noise: of the torso, standard deviation, rad/s.
+        joint_angle_noise: half-width, rad.
+        joint_velocity_noise: standard deviation, rad/s.
+    """
+
+    position_noise: float
+    orientation_noise: float
+    linear_velocity_noise: float
+    angular_velocity_noise: float
+    joint_angle_noise: float
+    joint_velocity_noise: float
+
+
 class Settings(NamedTuple):
     """What a walk is made of, beside the body.
 
     Attributes:
         parameters: what the reward's terms read.
         weights: signed weight of every term.
-        base_noise: of a reset: half-width of the uniform noise on the torso's position (m) and
-            quaternion, and standard deviation of the torso's velocity (m/s, rad/s).
-        joint_noise: the same for joint angles (rad) and joint velocities (rad/s).
+        noise: of the start.
     """
 
     parameters: Parameters
     weights: dict[str, float]
-    base_noise: float
-    joint_noise: float
+    noise: Noise
 
 
 def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, float] = BONUSES) -> Settings:
@@ -101,9 +124,10 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
 
     Args:
         body: a robot of the table, or any other body, whose numbers are fitted to it.
-        overrides: fields of `Parameters`, "base_noise", "joint_noise", "weights", a
-            mapping of the terms to change, and "gait", a name of `gaits.NAMES`, which sets the
-            duty factor and the phase offsets that are not set themselves.
+        overrides: fields of `Parameters` and of `Noise`; "base_noise", one number for those of the
+            torso, and "joint_noise", one for those of the joints, where they are not set
+            themselves; "weights", a mapping of the terms to change; and "gait", a name of
+            `gaits.NAMES`, which sets the duty factor and the phase offsets likewise.
         bonuses: weights of a task that has other bonuses beside walk's costs.
 
     Returns:
@@ -114,22 +138,23 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
     """
     row = robots.row(SETTINGS, body, "walk")
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
+    known = [*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait"]
     for name in overrides:
-        checks.name(name, [*table, "gait"], "setting of walk")
+        checks.name(name, known, "setting of walk")
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)
         table |= {"duty_factor": gait.duty_factor, "phase_offsets": offsets}
     weights = _changed({**bonuses, **COSTS, **table["weights"]}, overrides.get("weights"))
-    values = table | dict(overrides)
+    values = _spread(table) | _spread(overrides)
     numbers = {
         name: checks.number(name, values[name], low, high)
         for name, low, high in (
-            ("target_velocity", -math.inf, math.inf),
-            ("velocity_band", 1e-9, math.inf),
-            ("gait_frequency", 0.0, math.inf),
+            ("target_velocity", -_LARGEST, _LARGEST),
+            ("velocity_band", 1e-9, _LARGEST),
+            ("gait_frequency", 0.0, _LARGEST),
             ("duty_factor", 0.0, 1.0),
-            ("stance_threshold", -math.inf, math.inf),
+            ("stance_threshold", -_LARGEST, _LARGEST),
         )
     }
     parameters = Parameters(
@@ -138,8 +163,18 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
         healthy_range=_healthy_range(values["healthy_range"]),
         default_angles=checks.array("default_angles", values["default_angles"], len(body.joint_names)),
     )
-    noise = {name: checks.number(name, values[name], 0.0, math.inf) for name in ("base_noise", "joint_noise")}
-    return Settings(parameters, weights, **noise)
+    noise = Noise(*(checks.number(name, values[name], 0.0, _LARGEST) for name in Noise._fields))
+    return Settings(parameters, weights, noise)
+
+
+def _spread(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings with every number of `SHARED_NOISE` written out as those that it sets and that are not given."""
+    spread = dict(values)
+    for shared, names in SHARED_NOISE.items():
+        if shared in spread:
+            number = checks.number(shared, spread.pop(shared), 0.0, _LARGEST)
+            spread = dict.fromkeys(names, number) | spread
+    return spread
 
 
 def _changed(weights: dict[str, float], changed: Any) -> dict[str, float]:
@@ -147,7 +182,7 @@ def _changed(weights: dict[str, float], changed: Any) -> dict[str, float]:
     if not isinstance(changed, Mapping | None):
         raise ValueError(f"weights: expected a mapping of names to numbers, got {changed!r}")
     for name, weight in (changed or {}).items():
-        weights[checks.name(name, weights, "weight")] = checks.number(f"weights[{name!r}]", weight)
+        weights[checks.name(name, weights, "weight")] = checks.number(f"weights[{name!r}]", weight, -_LARGEST, _LARGEST)
     return weights
 
 
@@ -170,12 +205,11 @@ def initial_state(qpos0: np.ndarray, nv: int, settings: Settings, random: np.ran
     Returns:
         qpos (nq,) and qvel (nv,).
     """
-    base, joint = settings.base_noise, settings.joint_noise
-    joints = nv - 6
-    qpos = qpos0 + np.concatenate([random.uniform(-base, base, 7), random.uniform(-joint, joint, joints)])
+    position, orientation, linear, angular, angle, joint_velocity = settings.noise
+    widths = np.repeat((position, orientation, angle), (3, 4, nv - 6))
+    qpos = qpos0 + random.uniform(-widths, widths)
     qpos[3:7] /= np.linalg.norm(qpos[3:7])
-    qvel = np.concatenate([base * random.standard_normal(6), joint * random.standard_normal(joints)])
-    return qpos, qvel
+    return qpos, np.repeat((linear, angular, joint_velocity), (3, 3, nv - 6)) * random.standard_normal(nv)
 
 
 class Memory(NamedTuple):

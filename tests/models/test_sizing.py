@@ -84,6 +84,16 @@ def test_sizing_keeps_dimensionless_ratios_when_a_body_grows():
             assert other.damping / joint.damping == pytest.approx(100.0**4.5, rel=1e-6)
 
 
+@pytest.mark.parametrize(("scale", "density"), [(0.05, 10.0), (0.025, 300.0), (100.0, 10.0), (100.0, 1e9)])
+def test_sizing_finds_no_number_that_a_spec_refuses(scale, density):
+    body = sized(generator.scaled(BODY.replace(density=density), scale))  # 2 cm, 1 cm and 40 m high
+    assert min(joint.motor.gear for leg in body.legs for joint in leg.joints) > 0.0
+    wide = generator.scaled(generator.generate(12, 3, "radial"), 100.0)
+    assert sized(wide).camera.position[1] < -100.0
+    tall = BODY.replace(torso=BODY.torso.replace(standing_height=100.0), density=density)
+    assert sized(tall).simulation.contact_margin > 1.0
+
+
 def test_a_leg_in_which_nothing_carries_gets_motors_too():
     body = sized(generator.generate(6, 1))
     gears = {round(leg.joints[0].motor.gear / standing(body).mass, 6) for leg in body.legs}

@@ -55,6 +55,20 @@ def test_a_few_lines_are_a_body():
     assert body.density == 10.0
 
 
+def test_a_standing_height_that_is_left_out_puts_the_lowest_foot_on_the_floor():
+    torso = {key: value for key, value in SOUND["torso"].items() if key != "standing_height"}
+    for derived in (torso, torso | {"standing_height": None}):
+        assert body_from_json(json.dumps(SOUND | {"torso": derived})) == body_from_json(json.dumps(SOUND))
+    spider = load_body(EXAMPLES[-2])
+    feet = [leg.foot.radius - leg.foot_position[2] for leg in spider.legs]
+    opened = spider.replace(torso=spider.torso.replace(standing_height=None))
+    assert opened.torso.standing_height == pytest.approx(max(feet), rel=1e-12)
+    with pytest.raises(SpecError) as error:
+        body_from_json(changed(("torso",), torso).replace("-0.", "0."))
+    assert str(error.value).startswith("torso: standing_height cannot be derived: feet end 0.")
+    assert str(error.value).endswith(" m above the torso's origin")
+
+
 def changed(path, value):
     """The sound spec with one thing changed, deleted (`...`) or added."""
     spec = json.loads(json.dumps(SOUND))
@@ -90,10 +104,10 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
             "(there are: name, shape, size, position, euler_deg)",
         ),
         ((*HIP, "axis"), [0, math.nan, 1], f"{AT_HIP}.axis: expected a number from -1000 to 1000, got nan"),
-        ((*HIP, "damping"), -1, f"{AT_HIP}.damping: expected a number from 0 to 1e+09, got -1"),
+        ((*HIP, "damping"), -1, f"{AT_HIP}.damping: expected a number from 0 to 1e+35, got -1"),
         ((*HIP, "motor"), 120, f"{AT_HIP}.motor: expected an object with the fields of a Motor, got a number"),
-        ((*HIP, "motor", "gear"), math.inf, f"{AT_HIP}.motor.gear: expected a number from 1e-09 to 1e+09, got inf"),
-        ((*HIP, "motor", "gear"), 1e300, f"{AT_HIP}.motor.gear: expected a number from 1e-09 to 1e+09, got 1e+300"),
+        ((*HIP, "motor", "gear"), math.inf, f"{AT_HIP}.motor.gear: expected a number from 1e-20 to 1e+30, got inf"),
+        ((*HIP, "motor", "gear"), 1e300, f"{AT_HIP}.motor.gear: expected a number from 1e-20 to 1e+30, got 1e+300"),
         (
             (*HIP, "range_deg"),
             [30, -30],
@@ -105,8 +119,23 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
         (("legs", 2, "links"), [], "legs[2].links: expected 1 to 16 Links, got 0"),
         (("legs", 2, "links", 1), None, "legs[2].links[1]: expected an object with the fields of a Link, got null"),
         (("legs", 3, "foot", "radius"), True, "legs[3].foot.radius: expected a number from 1e-06 to 100, got True"),
-        (("legs", 3, "foot", "radius"), 1e-5, "legs: r2_foot: expected a radius from 0.0009, got 1e-05"),
+        (("legs", 3, "foot", "radius"), 1e-5, "legs: r2_foot: expected a radius from 0.0009 at density 10, got 1e-05"),
+        (
+            ("legs", 3, "foot", "radius"),
+            8e-4,
+            "legs: r2_foot: expected a radius from 0.0009 at density 10, got 0.0008 (density 20 fits)",
+        ),
         (("simulation", "timestep"), 0.05, "simulation.contact_time: expected at least two timesteps, got 0.023094"),
+        (
+            ("camera", "xyaxes"),
+            [1, 0, 0.5, -0.5, 0, -0.25],
+            "camera.xyaxes: expected two directions that are not parallel, got (1.0, 0.0, 0.5, -0.5, 0.0, -0.25)",
+        ),
+        (
+            ("camera", "xyaxes"),
+            [0, 0, 0, 0, 1, 0],
+            "camera.xyaxes: expected two directions that are not parallel, got (0.0, 0.0, 0.0, 0.0, 1.0, 0.0)",
+        ),
         (("legs",), [], "legs: expected 1 to 64 Legs, got 0"),
         (("legs",), None, "legs: expected a list of Legs, got null"),
         (("include",), "a.xml", f"unknown field 'include'; did you mean 'name'? (there are: {IN_BODY})"),
@@ -135,7 +164,9 @@ def bad_fields():
     for path in leaves(SOUND):
         for value in BAD:
             # what is left open, or a name that happens to be allowed, is no mistake
-            if (value is None and path[-1] in ("armature", "damping")) or (value == "1" and path[-1] == "name"):
+            if (value is None and path[-1] in ("standing_height", "armature", "damping")) or (
+                value == "1" and path[-1] == "name"
+            ):
                 continue
             yield changed(path, value), next(key for key in reversed(path) if isinstance(key, str))
 

@@ -127,7 +127,13 @@ OVERRIDES = {
     "stance_threshold": 0.3,
     "default_angles": 0.5,
     "base_noise": 0.0,
+    "position_noise": 0.0,
+    "orientation_noise": 0.0,
+    "linear_velocity_noise": 0.0,
+    "angular_velocity_noise": 0.0,
     "joint_noise": 0.0,
+    "joint_angle_noise": 0.0,
+    "joint_velocity_noise": 0.0,
 }
 
 
@@ -139,7 +145,43 @@ def test_every_number_can_be_overridden(name):
     for environment in (usual, changed):
         rewards.append([environment.step(action).reward for action in random_actions(environment, 10)])
     assert rewards[0] != rewards[1]
-    assert np.array_equal(*starts) == (name not in ("base_noise", "joint_noise"))
+    assert np.array_equal(*starts) == ("noise" not in name)
+
+
+def test_one_number_sets_all_noise_of_the_torso_and_one_all_of_the_joints():
+    published = load("leaper").task.settings.noise
+    assert published == (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+    assert load("leaper", base_noise=0.3).task.settings.noise == (0.3, 0.3, 0.3, 0.3, 0.1, 0.1)
+    assert load("leaper", joint_noise=0.3).task.settings.noise == (0.1, 0.1, 0.1, 0.1, 0.3, 0.3)
+    both = load("leaper", orientation_noise=0.0, base_noise=0.3, joint_velocity_noise=0.2)
+    assert both.task.settings.noise == (0.3, 0.0, 0.3, 0.3, 0.1, 0.2)
+
+
+def test_every_kind_of_noise_moves_what_it_is_named_after():
+    parts = {
+        "position_noise": ("position", slice(0, 3)),
+        "orientation_noise": ("position", slice(3, 7)),
+        "linear_velocity_noise": ("velocity", slice(0, 3)),
+        "angular_velocity_noise": ("velocity", slice(3, 6)),
+        "joint_angle_noise": ("position", slice(7, None)),
+        "joint_velocity_noise": ("velocity", slice(6, None)),
+    }
+    silence = {"base_noise": 0.0, "joint_noise": 0.0}
+
+    def start(**noise):
+        environment = load("tick", **silence | noise)
+        environment.reset()
+        physics = environment.physics
+        return {"position": np.array(physics.position()), "velocity": np.array(physics.velocity())}
+
+    still = start()
+    for name, (which, part) in parts.items():
+        noisy = start(**{name: 0.05})
+        for kind in ("position", "velocity"):
+            moved = noisy[kind] != still[kind]
+            expected = np.zeros_like(moved)
+            expected[part] = kind == which
+            assert_array_equal(moved, expected, err_msg=name)
 
 
 def test_overriding_one_weight_keeps_the_others():
@@ -171,7 +213,7 @@ def test_overriding_one_weight_keeps_the_others():
         (("queen", "walk", {"weights": {"foward": 1}}), "unknown weight 'foward'; did you mean 'forward'?"),
         (
             ("queen", "walk", {"weights": {"forward": math.nan}}),
-            "weights['forward']: expected a finite number from -inf to inf, got nan",
+            "weights['forward']: expected a number from -1e+06 to 1e+06, got nan",
         ),
         (("queen", "walk", {"weights": [1.0]}), "weights: expected a mapping of names to numbers, got [1.0]"),
         (
@@ -180,14 +222,20 @@ def test_overriding_one_weight_keeps_the_others():
         ),
         (
             ("queen", "walk", {"velocity_band": 0}),
-            "velocity_band: expected a finite number from 1e-09 to inf, got 0",
+            "velocity_band: expected a number from 1e-09 to 1e+06, got 0",
         ),
+        (
+            ("queen", "walk", {"target_velocity": 1e308}),
+            "target_velocity: expected a number from -1e+06 to 1e+06, got 1e+308",
+        ),
+        (("queen", "walk", {"weights": {"posture": -1e300}}), "weights['posture']: expected a number from -1e+06"),
         (
             ("queen", "walk", {"phase_offsets": [0, 1]}),
             "phase_offsets: expected one finite number or 6 of them, got [0, 1]",
         ),
         (("queen", "walk", {"healthy_range": (1.0, 0.2)}), "healthy_range: expected low < high, got (1.0, 0.2)"),
-        (("queen", "walk", {"base_noise": -1}), "base_noise: expected a finite number from 0 to inf, got -1"),
+        (("queen", "walk", {"base_noise": -1}), "base_noise: expected a number from 0 to 1e+06, got -1"),
+        (("queen", "walk", {"angular_velocity_noise": "big"}), "angular_velocity_noise: expected a number from 0 to 1"),
         (
             ("queen", "walk", {"time_limit": "long"}),
             "time_limit: expected a finite number from 1e-09 to inf, got 'long'",

@@ -54,7 +54,7 @@ class OrdinaryEnv(MujocoEnv):
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
         settings = walk.settings(ROBOTS[robot], {})
         self._weights, self._numbers = settings.weights, settings.parameters
-        self._base_noise, self._joint_noise = settings.base_noise, settings.joint_noise
+        self._base_noise, self._joint_noise = settings.noise.position_noise, settings.noise.joint_angle_noise
         self._torso = self.model.body("torso").id
         self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
         self._terminate_when_unhealthy = terminate_when_unhealthy
