@@ -126,7 +126,7 @@ MUTANTS = (
     Mutant("batch destroyed in a forked child", "physics.py", "        forks.keep(self._simulations)\n", ""),
     Mutant("picture of another moment", "physics.py", "        shared.pose(self)\n", ""),
     Mutant("user's choice of OpenGL overwritten", "rendering.py", '"MUJOCO_GL" not in os.environ and ', ""),
-    Mutant("two threads in one vector environment", "vector.py", "not self._busy.acquire(blocking=False)", "False"),
+    Mutant("two threads in one environment", "envs/lock.py", "not lock.acquire(False)", "False"),
     Mutant("damping has the wrong sign", "cpg/law.py", "- damping * velocities", "+ damping * velocities"),
     Mutant("no crouch", "cpg/demonstrator.py", "steps < self.settle", "steps < 0"),
     Mutant(
