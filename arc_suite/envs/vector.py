@@ -81,6 +81,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ValueError: an unknown name, or a value that does not fit; one line that names it and the
                 nearest valid name.
         """
+        self._lock, self.batch = Lock(), None  # first, as Gymnasium closes also what could not be made
         task_kwargs = dict(task_kwargs or {})
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
@@ -110,7 +111,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
         self._ended = np.zeros(self.num_envs, bool)  # rows whose episode has ended and whose next has not begun
         self._resting = np.zeros(self.num_envs, bool)
-        self._lock = Lock()
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
@@ -284,7 +284,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def close_extras(self, **kwargs) -> None:
         """Free the simulations; `close` calls it."""
-        del self.batch
+        self.batch = None
 
     @property
     def np_random(self) -> tuple[np.random.Generator, ...]:
