@@ -12,6 +12,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
 
+MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
+
 
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
     """Return the names of the tasks by name of the robot, as they are now."""
@@ -93,8 +95,12 @@ def env_id(domain_name: str, task: type[Task]) -> str:
 def _find(name, table: Mapping, kind: str):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
+        if not all(part.isidentifier() for part in module.split(".")):
+            raise ValueError(f"{kind} '{module}:{name}': expected module:name, with a module that can be imported")
         try:
             importlib.import_module(module)
         except ImportError as error:
             raise ValueError(f"{kind} {name!r}: cannot import {module}: {error}") from None
+        if name in table and (kind, name) not in MODULES:
+            raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
     return table[checks.name(name, table, kind)]

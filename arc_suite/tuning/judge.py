@@ -81,8 +81,8 @@ class Judge:
             totals += rewards * upright
             lengths += upright
             uprightness = rotations.upright(felt(split(observations), joints)[0])
-            terms = info.get("reward_terms", dict.fromkeys(TERMS, 0.0))  # not there if all rows start anew
-            costs = {name: terms[name] for name in TERMS} | {"tilt": 1.0 - uprightness**2}
+            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all rows start anew
+            costs["tilt"] = 1.0 - uprightness**2
             for name, cost in costs.items():
                 style[name] += cost * upright
             tipping = np.where(upright, np.maximum(tipping, np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)), tipping)
