@@ -11,6 +11,7 @@ from arc_suite.cpg.law import Pattern, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.stride import Stride
 from arc_suite.models.sizing import control_timestep
+from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import fitted_gait
@@ -41,8 +42,9 @@ class Demonstrator:
             gait: a name of `gaits.NAMES` or a `Gait`; None for that of the robot or body.
 
         Raises:
-            ValueError: an unknown name, or a value out of range; one line that names it and the
-                nearest valid one.
+            ValueError: an unknown name, or a value out of range, or a body that cannot walk whatever
+                it does, as its feet hang far above the floor; one line that names it and the nearest
+                valid one.
         """
         body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
         if isinstance(gait, str):
@@ -51,6 +53,8 @@ class Demonstrator:
             presets = presets_of(body)
             preset = presets[checks.name(preset, presets, "preset")]
         if isinstance(preset, float):
+            if reason := next((flaw.text for flaw in flaws(body) if flaw.hopeless), None):
+                raise ValueError(f"{body.name} cannot walk: {reason}")
             self._control = Stride.fit(body, preset if froude is None else froude, gait or fitted_gait(body))
         elif froude is not None:
             raise ValueError(f"froude: {body.name} has presets alone: {', '.join(presets_of(body))}")
