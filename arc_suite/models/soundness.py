@@ -77,9 +77,9 @@ def _support(body: Body, pose: Standing) -> Iterator[Flaw]:
             text = f"{outside}: legs {_displacement(x, y)} fit"
         yield Flaw(text, pose.margin < -_HOPELESS_OVERHANG * pose.height)
     elif pose.margin < _LEAST_TILT * above:
-        tilt, missing = np.degrees(np.arctan2(pose.margin, above)), _LEAST_TILT * above - pose.margin
-        text = f"a tower that tips over when tilted by {tilt:.2g} degrees: feet {1.05 * missing:.2g} m further out all around fit"
-        yield Flaw(text, False)
+        tilt, missing = np.degrees(np.arctan2(pose.margin, above)), 1.05 * (_LEAST_TILT * above - pose.margin)
+        tower = f"a tower that tips over when tilted by {tilt:.2g} degrees"
+        yield Flaw(f"{tower}: feet {missing:.2g} m further out all around fit", False)
 
 
 def _mass_of_legs(body: Body) -> float:
