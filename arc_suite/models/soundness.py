@@ -110,8 +110,7 @@ def _joints(body: Body, pose: Standing) -> Iterator[Flaw]:
 
 
 def _reach(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
-    """Return how far the joint that moves a foot most along x moves it both ways, and how far any joint lifts it, m."""
+    """Return how far any one joint moves a foot forward as well as back, and how far up, m."""
     low, high = np.radians([joint.range_deg for joint in leg.joints]).clip(-_LARGEST_TURN, _LARGEST_TURN).T
-    along = abs(jacobian[0])
-    hip = along.argmax()
-    return along[hip] * min(-low[hip], high[hip]), np.maximum(jacobian[2] * low, jacobian[2] * high).max()
+    sweep = abs(jacobian[0]) * np.minimum(-low, high)
+    return sweep.max(), np.maximum(jacobian[2] * low, jacobian[2] * high).max()

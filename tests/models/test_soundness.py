@@ -20,9 +20,9 @@ def high(height):
     return BODY.replace(torso=BODY.torso.replace(standing_height=height))
 
 
-def with_hips(**fields):
+def with_joints(**fields):
     def changed(link):
-        return link.replace(joint=link.joint.replace(**fields)) if link.joint.name == "hip" else link
+        return link.replace(joint=link.joint.replace(**fields))
 
     return BODY.replace(legs=tuple(leg.replace(links=tuple(map(changed, leg.links))) for leg in BODY.legs))
 
@@ -89,7 +89,7 @@ HOPELESS = [
         "the centre of mass lies 0.233 m outside of the feet: legs 1 m backward fit",
     ),
     (
-        with_hips(range_deg=(0.0, 40.0)),
+        with_joints(range_deg=(0.0, 40.0)),
         "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits",
     ),
     (deep(0.5), "the torso reaches 0.1 m lower than the feet: legs longer by more than that fit"),
