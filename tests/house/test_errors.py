@@ -191,11 +191,11 @@ CASES = [
     # Keyword arguments.
     (walk(time_limit=0), f"time_limit: {FINITE} 1e-09 to inf, got 0"),
     (walk(time_limit=float("nan")), f"time_limit: {FINITE} 1e-09 to inf, got nan"),
-    (walk(target_velocity=True), f"target_velocity: expected a number from -1e+06 to 1e+06, got True"),
+    (walk(target_velocity=True), "target_velocity: expected a number from -1e+06 to 1e+06, got True"),
     (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),
     (walk(phase_offsets=None), "phase_offsets: expected one finite number or 6 of them, got None"),
-    (walk(joint_noise=float("inf")), f"joint_noise: expected a number from 0 to 1e+06, got inf"),
-    (walk(weights={"forward": None}), f"weights['forward']: expected a number from -1e+06 to 1e+06, got None"),
+    (walk(joint_noise=float("inf")), "joint_noise: expected a number from 0 to 1e+06, got inf"),
+    (walk(weights={"forward": None}), "weights['forward']: expected a number from -1e+06 to 1e+06, got None"),
     (
         walk(on_divergence="ignore"),
         "unknown on_divergence 'ignore'; did you mean 'raise'? (there are: raise, terminate)",
