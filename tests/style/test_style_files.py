@@ -118,7 +118,7 @@ def one_array():
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "not a file of tracks, or a damaged one: No data left in file"),
+        (b"", "not a file of tracks, or a damaged one: File is not a zip file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
         (one_array(), "not a file of tracks, or a damaged one: "),
         (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 2', got 'no tracks'; record them anew"),
