@@ -12,7 +12,6 @@ import pytest
 import arc_suite
 from arc_suite import policies
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 

@@ -100,8 +100,7 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
         (
             ("torso", "solids", 0, "file"),
             "a.stl",
-            "torso.solids[0]: unknown field 'file' "
-            "(there are: name, shape, size, position, euler_deg)",
+            "torso.solids[0]: unknown field 'file' (there are: name, shape, size, position, euler_deg)",
         ),
         ((*HIP, "axis"), [0, math.nan, 1], f"{AT_HIP}.axis: expected a number from -1000 to 1000, got nan"),
         ((*HIP, "damping"), -1, f"{AT_HIP}.damping: expected a number from 0 to 1e+35, got -1"),
