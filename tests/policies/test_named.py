@@ -11,6 +11,9 @@ from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
 
+ALL = "slow, medium, fast, tuned, steered, surefooted"
+
+
 @pytest.mark.parametrize("name", POLICIES)
 def test_policies_act_on_time_steps(name):
     environment = arc_suite.load("leaper", "walk", {"random": 0})
@@ -45,7 +48,7 @@ def test_noise_is_added_to_what_the_policy_does():
         ),
         (
             ("cpg", "queen", "midium"),
-            "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast, tuned, steered, surefooted)",
+            f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})",
         ),
         (
             ("cpg", generate(4, 2), "tuned"),
@@ -53,7 +56,7 @@ def test_noise_is_added_to_what_the_policy_does():
         ),
         (
             ("cpg", "queen", ()),
-            "preset: expected one or more of slow, medium, fast, tuned, steered, surefooted, got none",
+            f"preset: expected one or more of {ALL}, got none",
         ),
         (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number from 0 to inf, got -0.1"),
         (
