@@ -1,6 +1,7 @@
 # make demo    Queen walks: installs everything, prints an episode's return, leaves out/queen.png and out/queen.mp4
 # make check   lint and the fast tests: after every edit
 # make test    installs everything, runs all tests, on all cores
+# make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
 # make check-sb3  stable-baselines3's checker and a short SAC run, in an environment of their own
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
@@ -13,7 +14,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-sb3 check-jax bench census soak mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-jax bench census soak mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -42,6 +43,14 @@ $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)
 	$(PYTHON) -m pip install -q -e '.[test]'
 	touch $@
+
+check-lowest: VENV := .venv-lowest
+check-lowest: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	tools/ensure_egl.sh $(VENV)/bin/python
+	$(VENV)/bin/python -m pip install -q -e '.[test]' 'gymnasium==1.2.0'
+	$(VENV)/bin/python -m pytest tests/envs tests/data tests/tasks/test_conformance.py tests/simulation/test_divergence.py \
+		tests/house/test_threads.py tests/house/test_errors.py tests/house/test_surroundings.py
 
 # torch comes first, so that stable-baselines3 keeps it. Where the default build is one for GPUs, a CPU
 # build is had with PIP_EXTRA_INDEX_URL set to PyTorch's CPU index and TORCH=torch==2.13.0+cpu.
@@ -75,4 +84,4 @@ golden: $(INSTALLED)
 	$(PYTHON) tests/golden.py
 
 clean:
-	rm -rf .venv .venv-sb3 .venv-jax out build *.egg-info
+	rm -rf .venv .venv-* out build *.egg-info

@@ -16,12 +16,12 @@ def name(value, valid: Iterable[str], kind: str) -> str:
     """Return the value if it is a valid name.
 
     Raises:
-        ValueError: it is not; the message names it and the nearest valid name.
+        ValueError: it is not; the message names it, a valid name that is near, and all there are.
     """
     valid = list(valid)
     if value in valid:
         return value
-    close = difflib.get_close_matches(str(value), valid, n=1, cutoff=0.0)
+    close = difflib.get_close_matches(str(value), valid, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     raise ValueError(f"unknown {kind} {value!r}{hint} (there are: {', '.join(valid)})")
 

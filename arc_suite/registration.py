@@ -11,12 +11,11 @@ from arc_suite.cpg.demonstrator import pattern
 from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
 from arc_suite.models.looks import LOOKS
 from arc_suite.models.looks.look import Look
+from arc_suite.registry import MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task, walk
 from arc_suite.tasks.contract import STEPS
-
-_modules = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
 
 def register(
@@ -54,7 +53,7 @@ def register(
     tasks, arenas = {_task_name(task): task for task in tasks}, dict(arenas or {})
     for kind, table, new in (("task", TASKS, tasks), ("arena", ARENAS, arenas)):
         for name, value in new.items():
-            if name in table and (module is None or _modules.get((kind, name)) != module) and table[name] is not value:
+            if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
                 raise ValueError(f"{kind} {name!r} is already registered")
     if body is None:
         if (walk, tuning, look) != (None, None, None):
@@ -63,10 +62,10 @@ def register(
             raise ValueError("nothing to register: give a body, tasks or arenas")
     else:
         _register_body(body, walk, tuning, look)
-        _modules["domain", body.name] = module
+        MODULES["domain", body.name] = module
     TASKS.update(tasks)
     ARENAS.update(arenas)
-    _modules.update({("task", name): module for name in tasks} | {("arena", name): module for name in arenas})
+    MODULES.update({("task", name): module for name in tasks} | {("arena", name): module for name in arenas})
     register_ids()
 
 
@@ -130,5 +129,5 @@ def register_ids() -> None:
 
 def importable(kind: str, name: str) -> str:
     """Return a name as another process can look it up: with the module that registers it, if there is one."""
-    module = _modules.get((kind, name))
+    module = MODULES.get((kind, name))
     return name if module is None else f"{module}:{name}"

@@ -2,7 +2,8 @@
 
 import importlib
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 
 from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
@@ -10,6 +11,8 @@ from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
+
+MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
 
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
@@ -57,7 +60,31 @@ def arena_of(arena: str | Arena, body: Body) -> Arena:
     Raises:
         ValueError: an unknown name; one line.
     """
-    return arena if isinstance(arena, Arena) else _find(arena, ARENAS, "arena")(body)
+    return arena if isinstance(arena, Arena) else arena_maker(arena)(body)
+
+
+def arena_maker(name: str) -> Callable[[Body], Arena]:
+    """Return the function that makes the arena of a name suit a body.
+
+    Raises:
+        ValueError: an unknown name; one line.
+    """
+    return _find(name, ARENAS, "arena")
+
+
+def imported(kind: str, name: str) -> str:
+    """Return a name that a file gives, `name` or `module:name`, if looking it up imports nothing new.
+
+    Files are data: what they name is looked up among what is registered, and only callers choose what
+    to import.
+
+    Raises:
+        ValueError: the name's module has not been imported yet; one line that names it.
+    """
+    module, colon, _ = name.rpartition(":")
+    if colon and module not in sys.modules:
+        raise ValueError(f"{kind} {name[:80]!r}: files import nothing; import {module[:80]!r} first")
+    return name
 
 
 def env_id(domain_name: str, task: type[Task]) -> str:
@@ -68,8 +95,12 @@ def env_id(domain_name: str, task: type[Task]) -> str:
 def _find(name, table: Mapping, kind: str):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
+        if not all(part.isidentifier() for part in module.split(".")):
+            raise ValueError(f"{kind} '{module}:{name}': expected module:name, with a module that can be imported")
         try:
             importlib.import_module(module)
         except ImportError as error:
             raise ValueError(f"{kind} {name!r}: cannot import {module}: {error}") from None
+        if name in table and (kind, name) not in MODULES:
+            raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
     return table[checks.name(name, table, kind)]

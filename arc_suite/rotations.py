@@ -40,3 +40,10 @@ def matrix(quaternion):
     )
     numpy = quaternion.__array_namespace__()
     return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def headed(vectors, heading):
+    """Return world vectors (..., 2) in the frame of a heading (...), rad: forward and left."""
+    numpy = vectors.__array_namespace__()
+    cosine, sine, x, y = numpy.cos(heading), numpy.sin(heading), vectors[..., 0], vectors[..., 1]
+    return numpy.stack([cosine * x + sine * y, cosine * y - sine * x], axis=-1)

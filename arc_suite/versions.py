@@ -6,7 +6,7 @@ import importlib.metadata
 from packaging.specifiers import SpecifierSet
 
 # As in setup.cfg. MuJoCo and dm_control move together.
-NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.4,<1.5", "shimmy": "==2.0.1"}
+NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
 
 
 def installed(package: str) -> str | None:

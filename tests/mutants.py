@@ -138,7 +138,7 @@ MUTANTS = (
     ),
     Mutant("a command for all rows", "np.where(mask[:, None], value, present)", "value"),
     Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
-    Mutant("two threads in one vector environment", "not self._busy.acquire(blocking=False)", "False"),
+    Mutant("two threads in one environment", "not lock.acquire(False)", "False"),
     # Demonstrators and policies.
     Mutant("sign of the sweep", "= -1.0 if leg.side", "= 1.0 if leg.side"),
     Mutant("steered the wrong way", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),

@@ -7,6 +7,8 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1
   arc-suite collect --spec examples/spider.json --policy my_package.policies:make
   arc-suite collect --verify arc_suite/queen/walk/cpg-medium-v0
+
+--verify imports no module that the dataset names: --task and --set name those that it needs, as in collecting.
 """
 
 import numpy as np
@@ -33,6 +35,8 @@ flags.DEFINE_integer(
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("id", None, "Id of the dataset. [default: arc_suite/ROBOT/TASK/POLICY-PRESET-v0, or like it]")
 flags.DEFINE_boolean("overwrite", False, "Replace a dataset of that id, once the new one is complete.")
+flags.DEFINE_string("author", None, "Who has made the dataset, for its metadata.")
+flags.DEFINE_string("code_permalink", None, "Where the code lies that made the dataset, for its metadata.")
 flags.DEFINE_string("verify", None, "Replay the dataset of this id instead.")
 flags.DEFINE_integer("rows", 64, "Episodes at a time; the data do not depend on it.", lower_bound=1)
 flags.DEFINE_integer("threads", None, "Threads to simulate on; the data do not depend on it. [default: all]", 1)
@@ -45,9 +49,11 @@ def main() -> None:
     except ImportError as error:
         raise ValueError(str(error)) from None
     walkers = bodies(_ROBOT)
+    asked, task_kwargs = task()
     if FLAGS.verify is not None:
         body = next(iter(walkers.values())) if _ROBOT.present or made_body() else None
-        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress)
+        name = asked if FLAGS["task"].present else None
+        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress, name)
         print(f"{FLAGS.verify}: {count} episodes replayed, equal to the bit")
         return
     if FLAGS.id is not None and len(walkers) > 1:
@@ -55,10 +61,18 @@ def main() -> None:
     presets = tuple(checks.name(preset, PRESETS, "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
     for body in walkers.values():
-        settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, *task())
+        settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
         dataset_id = FLAGS.id or settings.dataset_id()
         missing = data.collect(
-            dataset_id, settings, FLAGS.episodes, FLAGS.rows, FLAGS.threads, FLAGS.overwrite, progress
+            dataset_id,
+            settings,
+            FLAGS.episodes,
+            FLAGS.rows,
+            FLAGS.threads,
+            FLAGS.overwrite,
+            progress,
+            FLAGS.author,
+            FLAGS.code_permalink,
         )
         dataset = data.open(dataset_id)
         if not missing:

@@ -5,7 +5,7 @@ from typing import Any
 
 from absl import flags
 
-from arc_suite import checks
+from arc_suite import checks, registry
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
@@ -68,14 +68,16 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
 def task() -> tuple[str, dict[str, Any]]:
     """Return the name of the task that --task asks for and its settings, `task_kwargs` of `arc_suite.load`.
 
-    What settings a task has is checked where an environment is opened.
+    The modules that the flags name are imported. What settings a task has is checked where an environment is opened.
 
     Raises:
         ValueError: an unknown task, a setting without a value, or `random`; one line.
     """
-    if ":" not in FLAGS.task:
-        checks.name(FLAGS.task, TASKS, "task")
-    return FLAGS.task, dict(_setting(text) for text in FLAGS["set"].value)
+    registry.task_of(FLAGS.task)
+    settings = dict(_setting(text) for text in FLAGS["set"].value)
+    if "arena" in settings:
+        registry.arena_maker(settings["arena"])
+    return FLAGS.task, settings
 
 
 def _setting(text: str) -> tuple[str, Any]:

@@ -156,6 +156,7 @@ def saving(robots: list[str]):
 
 def main() -> None:
     """Record, measure, print and write."""
+    task()  # imports the modules that flags name, which datasets and tracks may need and cannot import
     chosen = chosen_sources()
     stages = chosen_stages([source.stage for source in chosen.values() if source.stage is not None])
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)

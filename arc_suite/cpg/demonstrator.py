@@ -1,4 +1,4 @@
-"""Demonstrators: policies that walk from nothing but their clock and the torso and joints they feel."""
+"""Demonstrators: policies that walk by a law, each a preset by name for any body."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,8 +7,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite import checks, robots
-from arc_suite.cpg.law import Pattern, joint_targets, torques
+from arc_suite.cpg.law import Pattern, felt, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
+from arc_suite.cpg.steering import MANNERS, Manner, Steered
 from arc_suite.cpg.stride import Stride
 from arc_suite.models.sizing import control_timestep
 from arc_suite.models.soundness import flaws
@@ -21,12 +22,13 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
 
 class Demonstrator:
-    """A policy that walks one body at one speed, in one environment or in the rows of a batch.
+    """A policy that walks one body by a preset, in one environment or in the rows of a batch.
 
-    It keeps a clock of its own for each row, and takes joint angles and velocities and the torso's
-    orientation alone from the observation. It acts in the rows of a batch by `begin` and `act`, as
-    every policy does, and in one environment as a function of a `TimeStep` with named blocks, whose
-    first of an episode restarts the clock.
+    The presets slow, medium, fast and tuned walk straight by a clock of their own, and take joint
+    angles and velocities and the torso's orientation alone from the observation. Those of
+    `steering.MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
+    of a batch by `begin` and `act`, as every policy does, and in one environment as a function of a
+    `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
     """
 
     def __init__(self, robot: str | Body, preset: str | Preset = "medium", froude: float | None = None, gait=None):
@@ -35,11 +37,13 @@ class Demonstrator:
         Args:
             robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast; for the four robots also tuned, which earns most of what
-                the law can earn, or numbers of your own.
+                the law can earn in walk, or numbers of your own; steered or surefooted, which follow
+                the command of a task.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, which have presets
                 alone.
-            gait: a name of `gaits.NAMES` or a `Gait`; None for that of the robot or body.
+            gait: a name of `gaits.NAMES` or a `Gait`; None for that of the robot or body, and for
+                presets that go by the task's.
 
         Raises:
             ValueError: an unknown name, or a value out of range, or a body that cannot walk whatever
@@ -52,23 +56,25 @@ class Demonstrator:
         if not isinstance(preset, Preset):
             presets = presets_of(body)
             preset = presets[checks.name(preset, presets, "preset")]
+        # The numbers of a preset of its own were found for a body, whatever it looks like.
+        hopeless = [] if isinstance(preset, Preset) else [flaw.text for flaw in flaws(body) if flaw.hopeless]
+        if hopeless:
+            raise ValueError(f"{body.name} cannot walk: {hopeless[0]}")
         if isinstance(preset, float):
-            if reason := next((flaw.text for flaw in flaws(body) if flaw.hopeless), None):
-                raise ValueError(f"{body.name} cannot walk: {reason}")
-            self._control = Stride.fit(body, preset if froude is None else froude, gait or fitted_gait(body))
+            speed = preset if froude is None else froude
+            self._law = OnClock(body, Stride.fit(body, speed, gait or fitted_gait(body)))
         elif froude is not None:
             raise ValueError(f"froude: {body.name} has presets alone: {', '.join(presets_of(body))}")
+        elif isinstance(preset, Preset):
+            self._law = OnClock(body, Prescribed.fit(body, preset, gait))
+        elif gait is not None:
+            raise ValueError("gait: expected none, as the preset walks in the gait of the task")
         else:
-            self._control = Prescribed.fit(body, preset, gait)
-        self._joints = len(body.joint_names)
-        self._clock = np.array(0)
+            self._law = Steered(body, preset)
 
     def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
-        """Restart the clock of some rows, given by their indices; seeds make no difference."""
-        if self._clock.ndim == 0:
-            self._clock = np.array(0)
-        else:
-            self._clock[rows] = 0
+        """Start episodes in some rows, given by their indices; seeds make no difference."""
+        self._law.begin(rows)
 
     def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
         """Return the actions of a control step.
@@ -81,47 +87,51 @@ class Demonstrator:
             (..., joints) in [-1, 1].
 
         Raises:
-            ValueError: not named blocks, or those of another body; one line.
+            ValueError: not named blocks, those of another body, or none that the preset needs; one line.
         """
-        quaternion, angles, velocities = felt(observation)
-        if (angles.shape[-1], velocities.shape[-1]) != (self._joints, self._joints):
-            felt_joints = f"{angles.shape[-1]} angles and {velocities.shape[-1]} velocities"
-            raise ValueError(f"observation: expected those of {self._joints} joints, got {felt_joints}")
+        return self._law.act(observation)
+
+    def __call__(self, timestep) -> np.ndarray:
+        """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
+        if timestep.first():
+            self._law.begin([0])
+        return self._law.act({name: np.asarray(block)[None] for name, block in timestep.observation.items()})[0]
+
+
+class OnClock:
+    """Control by a clock alone, one for each row."""
+
+    def __init__(self, body: Body, control: "Stride | Prescribed"):
+        """Take the control of a body."""
+        self._control, self._joints = control, len(body.joint_names)
+        self._clock = np.array(0)
+
+    def begin(self, rows: Sequence[int]) -> None:
+        """Restart the clock of some rows."""
+        if self._clock.ndim == 0:
+            self._clock = np.array(0)
+        else:
+            self._clock[rows] = 0
+
+    def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the actions; see `Demonstrator.act`."""
+        quaternion, angles, velocities = felt(observation, self._joints)
         if self._clock.shape != angles.shape[:-1]:
             self._clock = np.broadcast_to(self._clock, angles.shape[:-1]).copy()
         action = self._control(self._clock, quaternion, angles, velocities)
         self._clock = self._clock + 1
         return action
 
-    def __call__(self, timestep) -> np.ndarray:
-        """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
-        if timestep.first():
-            self._clock = np.array(0)
-        return self.act(timestep.observation)
 
-
-def felt(observation: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities.
-
-    Raises:
-        ValueError: not named blocks; one line.
-    """
-    if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
-        raise ValueError(
-            "observation: expected blocks posture and velocities by name, as `split` of a task gives them, "
-            f"got {type(observation).__name__}"
-        )
-    posture, velocities = (np.asarray(observation[name], dtype=float) for name in ("posture", "velocities"))
-    return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
-
-
-def presets_of(body: Body) -> Mapping[str, Preset | float]:
+def presets_of(body: Body) -> Mapping[str, Preset | float | Manner]:
     """Return a body's presets by name: of a robot its numbers, of any other its speed as a share of sqrt(g h).
+
+    Those that follow a command are the same for all.
 
     Raises:
         ValueError: a body of a robot's name that has other joints; one line.
     """
-    return robots.row(TUNINGS, body, "presets") or FROUDES
+    return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **MANNERS}
 
 
 class Prescribed(NamedTuple):

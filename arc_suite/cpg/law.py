@@ -4,6 +4,7 @@ A leg's hip sweeps linearly, back in stance and forth in swing; its other joints
 bell to their centre. A PD loop turns the distance to these targets into torques.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -45,3 +46,22 @@ def joint_targets(pattern: Pattern, time) -> np.ndarray:
 def torques(targets, angles, velocities, stiffness, damping) -> np.ndarray:
     """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s)."""
     return (stiffness * (targets - angles) - damping * velocities).clip(-1.0, 1.0)
+
+
+def felt(observation: Mapping[str, np.ndarray], joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities.
+
+    Raises:
+        ValueError: not named blocks, or those of a body with another number of joints; one line.
+    """
+    if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
+        raise ValueError(
+            "observation: expected blocks posture and velocities by name, as `split` of a task gives them, "
+            f"got {type(observation).__name__}"
+        )
+    posture, velocities = (np.asarray(observation[name], dtype=float) for name in ("posture", "velocities"))
+    quaternion, angles, speeds = posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
+    if (angles.shape[-1], speeds.shape[-1]) != (joints, joints):
+        found = f"{angles.shape[-1]} angles and {speeds.shape[-1]} velocities"
+        raise ValueError(f"observation: expected those of {joints} joints, got {found}")
+    return quaternion, angles, speeds

@@ -33,6 +33,8 @@ def collect(
     threads: int | None = None,
     overwrite: bool = False,
     progress: Callable = tqdm,
+    author: str | None = None,
+    code_permalink: str | None = None,
 ) -> int:
     """Collect the episodes that a dataset does not have yet.
 
@@ -44,6 +46,8 @@ def collect(
         threads: on which to simulate; None for all cores. Nor does it depend on these.
         overwrite: replace a dataset that is there, when the new one is complete.
         progress: makes progress bars as `tqdm` does.
+        author: for Minari's metadata; None for none, or for the one that the dataset has already.
+        code_permalink: where the code lies that made the dataset, likewise.
 
     Returns:
         The number of episodes that were missing.
@@ -55,6 +59,8 @@ def collect(
         KeyboardInterrupt: likewise.
     """
     _check(settings, episodes)
+    said = {} if author is None else {"author": [author]}  # Minari makes a set of it
+    said |= {} if code_permalink is None else {"code_permalink": code_permalink}
     provenance, specification = settings.provenance(), settings.environment_spec().to_json()
     with Storage.opened(dataset_id, overwrite) as storage:
         if storage.metadata is not None:
@@ -68,6 +74,7 @@ def collect(
             if missing:
                 if storage.metadata is None:
                     storage.metadata = _metadata(dataset_id, settings, provenance, specification, threads)
+                storage.metadata |= said
                 _play(storage, settings, missing, rows, threads, progress)
             storage.finish(lambda indices: progress(indices, desc="merging", unit="episode", leave=False))
         except (ValueError, OSError, KeyboardInterrupt) as error:
@@ -116,7 +123,8 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
     def write():
         nonlocal pending, size, spent
         spent -= time.monotonic()
-        storage.add(pending)
+        if waiting := {index: episode for index, episode in pending.items() if index not in storage.kept}:
+            storage.add(waiting)
         spent += time.monotonic()
         pending, size = {}, 0
         bar.set_postfix_str(f"{len(storage.kept)} of {total} episodes kept", refresh=False)

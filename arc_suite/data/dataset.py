@@ -2,30 +2,50 @@
 
 import contextlib
 import json
-import operator
 from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 
-from arc_suite import registry
+from arc_suite import checks, registry
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import Settings
 from arc_suite.envs.dm import load
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import Body
+from arc_suite.robots.spec_files import body_from_json
 
 METADATA = "metadata.json"
+MAX_BYTES = 1 << 24  # of the metadata, which hold a body of at most 1 << 18
+
+# What damage makes h5py, json and our own checks raise.
+_DAMAGES = (
+    ArithmeticError,
+    AttributeError,
+    LookupError,
+    MemoryError,
+    OSError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
+_REASON = 300  # characters of a reason, which may quote a file
 MAIN = "main_data.hdf5"
 
 
 def open(dataset_id: str) -> "Dataset":
     """Open a dataset that `collect` has written.
 
+    Files are data: nothing that they name is imported. A dataset with a robot, task or arena of
+    another package opens where the caller has imported that package.
+
     Args:
         dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari says where datasets lie.
 
     Raises:
-        ValueError: no such dataset, or one that is damaged or not of this suite; one line.
+        ValueError: no such dataset, one that is damaged or not of this suite, or one that needs a module
+            which has not been imported; one line.
     """
     return Dataset(dataset_id, ids.find(dataset_id))
 
@@ -46,11 +66,29 @@ class Dataset:
         self.metadata = read_metadata(dataset_id, path)
         with damages(dataset_id, path / "data" / METADATA):
             known = self.metadata["arc_suite"]["settings"]
-            fields = {name: known[name] for name in Settings._fields} | {"presets": tuple(known["presets"])}
             names = json.loads(self.metadata["env_spec"])["kwargs"]  # with the modules that register them
-            domain, task = names["domain_name"], names["task_name"]
-            self._length = operator.index(self.metadata["total_episodes"])
-        self.settings = Settings(**fields | {"body": registry.body_of(domain), "task": task})
+            domain, task = (_typed(name, names[name], str) for name in ("domain_name", "task_name"))
+            task_kwargs = _typed("task_kwargs", known["task_kwargs"], dict)
+            presets = _typed("presets", known["presets"], list)
+            fields = {
+                "policy": _typed("policy", known["policy"], str),
+                "presets": tuple(_typed("presets", preset, str) for preset in presets),
+                "noise": checks.number("noise", known["noise"], 0.0),
+                "seed": checks.seed(known["seed"]),
+                "steps": checks.integer("steps", known["steps"], 1),
+                "task": task,
+                "task_kwargs": task_kwargs,
+            }
+            self._length = checks.integer("total_episodes", self.metadata["total_episodes"], 0, 1 << 32)
+            checks.integer("total_steps", self.metadata["total_steps"], 0)
+        try:
+            for kind, name in (("domain", domain), ("task", task), ("arena", str(task_kwargs.get("arena", "flat")))):
+                if not _is_body(name):
+                    registry.imported(kind, name)
+        except ValueError as error:
+            raise ValueError(f"dataset {dataset_id!r}: {error}") from None
+        with damages(dataset_id, path / "data" / METADATA):
+            self.settings = Settings(_body(domain), **fields)
 
     def environment(self):
         """Return the dm_env in which the episodes play."""
@@ -67,8 +105,13 @@ class Dataset:
             ValueError: it is damaged; one line.
         """
         index = range(len(self))[index]
+        joints = len(self.settings.body.joint_names)
         with self.reading() as file:
-            return episodes.read(file, index)
+            episode = episodes.read(file, index)
+            if episode.actions.shape[1] != joints:
+                found = episode.actions.shape[1]
+                raise ValueError(f"{episodes.name(index)}: expected actions of {joints} joints, found {found}")
+        return episode
 
     def __iter__(self) -> Iterator[Episode]:
         return (self[index] for index in range(len(self)))
@@ -80,13 +123,13 @@ class Dataset:
             ValueError: the file is damaged; one line.
         """
         with self.reading() as file:
-            return [dict(file[episodes.name(index)].attrs) for index in range(len(self))]
+            return [episodes.summary(file, index) for index in range(len(self))]
 
     @contextlib.contextmanager
     def reading(self):
         """Yield the open HDF5 file; what goes wrong in reading it becomes a ValueError of one line."""
         path = self.path / "data" / MAIN
-        with damages(self.id, path), h5py.File(path, "r") as file:
+        with damages(self.id, path), h5py.File(plain(path), "r") as file:
             yield file
 
 
@@ -95,8 +138,37 @@ def damages(dataset_id: str, file: Path):
     """Turn what h5py raises at a damaged file into a ValueError of one line that names dataset and file."""
     try:
         yield
-    except (LookupError, OSError, RuntimeError, TypeError, ValueError) as error:
-        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {error}") from None
+    except _DAMAGES as error:
+        reason = " ".join(str(error).split())[:_REASON]
+        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {reason}") from None
+
+
+def plain(path: Path) -> Path:
+    """Return the path of a file; whatever else it may be, such as a pipe, is not waited for.
+
+    Raises:
+        OSError: there is no file.
+    """
+    if path.exists() and not path.is_file():
+        raise OSError("expected a file")
+    return path
+
+
+def _is_body(domain: str) -> bool:
+    """Return whether a domain is the text of a body, and not a name."""
+    return domain.startswith("{")
+
+
+def _body(domain: str) -> Body:
+    if _is_body(domain):
+        return body_from_json(domain)
+    return ROBOTS[checks.name(domain.rpartition(":")[2], ROBOTS, "domain")]
+
+
+def _typed(name: str, value, kind: type):
+    if not isinstance(value, kind):
+        raise TypeError(f"expected {name} to be a {kind.__name__}")
+    return value
 
 
 def read_metadata(dataset_id: str, path: Path) -> dict:
@@ -107,13 +179,15 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
     """
     path = path / "data" / METADATA
     with damages(dataset_id, path):
+        if plain(path).stat().st_size > MAX_BYTES:
+            raise ValueError(f"expected at most {MAX_BYTES} bytes")
         metadata = json.loads(path.read_text())
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
     with damages(dataset_id, path):
         for name, kind in (("settings", dict), ("versions", dict), ("model_sha256", str)):
-            if not isinstance(metadata["arc_suite"][name], kind):
-                raise TypeError(f"expected {name} of arc_suite to be a {kind.__name__}")
+            _typed(f"{name} of arc_suite", metadata["arc_suite"][name], kind)
+        _typed("env_spec", metadata["env_spec"], str)
     if "task" not in metadata["arc_suite"]["settings"]:
         raise ValueError(
             f"dataset {dataset_id!r} is of an earlier form, which does not tell its task: collect it anew, "

@@ -1,7 +1,11 @@
 """Episodes as arrays, and as groups of an HDF5 file in Minari's layout."""
 
+import contextlib
 import hashlib
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 import h5py
@@ -11,6 +15,9 @@ from arc_suite.policies import Script
 
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
 TERMS = "infos/reward_terms"  # as in the info of a step
+
+_PART = re.compile(rb"parts/\d+\.hdf5")  # what an episode's link may lead to while a dataset is collected
+_ATTRIBUTES = {"id": int, "seed": int, "total_steps": int, "length": int, "return": float, "sha256": str}
 
 
 class Episode(NamedTuple):
@@ -92,23 +99,118 @@ def write(file, index: int, episode: Episode) -> None:
 def read(file, index: int) -> Episode:
     """Read an episode from an open HDF5 file.
 
+    Sizes are compared with the file's before anything is read, and no link leads out of the dataset's folder.
+
     Raises:
-        ValueError: its attributes, the digest among them, are not those of what is in it.
+        ValueError: its attributes, the digest among them, are not those of what is in it, or it is
+            stored otherwise than `write` does.
         KeyError: there is no such episode, or something in it is missing.
         OSError: it cannot be read.
     """
-    group = file[name(index)]
-    attributes = dict(group.attrs)
-    episode = Episode(
-        int(attributes["seed"]),
-        attributes.get("preset"),
-        **{array: group[array][()] for array in ARRAYS},
-        terms={term: dataset[()] for term, dataset in group[TERMS].items()},
-    )
+    with _group(file, index) as group:
+        found, arrays = _found(group), _stored(group)
+        size, there = sum(map(_nbytes, arrays.values())), group.file.id.get_filesize()
+        if size > there:
+            raise ValueError(f"{group.name}: its arrays claim {size} bytes, and the file has {there}")
+        values = {path: array[()] for path, array in arrays.items()}
+    terms = {path.removeprefix(f"{TERMS}/"): values.pop(path) for path in list(values) if path.startswith(TERMS)}
+    episode = Episode(found["seed"], found.get("preset"), **values, terms=terms)
     for key, value in _attributes(index, episode).items():
-        if attributes.get(key) != value:
-            raise ValueError(f"{group.name[1:]}: expected {key} {value}, found {attributes.get(key)}")
+        if found[key] != value:
+            raise ValueError(f"{name(index)}: expected {key} {value}, found {found[key]}")
     return episode
+
+
+def summary(file, index: int) -> dict:
+    """Read the attributes of an episode from an open HDF5 file, without its arrays, whose number of rows is compared.
+
+    Raises:
+        ValueError: an attribute is missing or of another kind, or its length is not that of the arrays.
+        KeyError: there is no such episode.
+        OSError: it cannot be read.
+    """
+    with _group(file, index) as group:
+        found, steps = _found(group), _array(group, "rewards", (None,), float).shape[0]
+    if found["length"] != steps:
+        raise ValueError(f"{name(index)}: expected length {steps}, found {found['length']}")
+    return found
+
+
+@contextlib.contextmanager
+def _group(file, index: int) -> Iterator[h5py.Group]:
+    """Yield the group of an episode; while a dataset is collected it lies in another file of its folder."""
+    link = file.id.links.get_info(name(index).encode())
+    if link.type != h5py.h5l.TYPE_EXTERNAL:
+        yield _item(file, name(index), h5py.Group)
+        return
+    part, path = file.id.links.get_val(name(index).encode())
+    if not _PART.fullmatch(part) or path != name(index).encode():
+        raise ValueError(f"{name(index)}: a link to elsewhere")
+    with h5py.File(Path(file.filename).parent / part.decode(), "r") as opened:
+        yield _item(opened, name(index), h5py.Group)
+
+
+def _item(group, key: str, kind: type):
+    """Return what a group holds itself."""
+    if "/" in key or group.id.links.get_info(key.encode()).type != h5py.h5l.TYPE_HARD:
+        raise ValueError(f"{group.name.rstrip('/')}/{key}: a link to elsewhere")
+    item = group[key]
+    if not isinstance(item, kind):
+        raise ValueError(f"{item.name}: expected a {kind.__name__.lower()}")
+    return item
+
+
+def _found(group) -> dict:
+    """Return the attributes that an episode has."""
+    kinds = _ATTRIBUTES | ({"preset": str} if "preset" in group.attrs else {})
+    return {key: _attribute(group, key, kind) for key, kind in kinds.items()}
+
+
+def _attribute(group, key: str, kind: type):
+    attribute = group.attrs.get_id(key)
+    text = h5py.check_string_dtype(attribute.dtype)
+    fits = text is not None and text.length is None if kind is str else attribute.dtype.kind == np.dtype(kind).kind
+    if attribute.shape != () or not fits:
+        raise ValueError(f"{group.name}: expected the attribute {key} to be one {kind.__name__}")
+    return kind(group.attrs[key])
+
+
+def _stored(group) -> dict[str, h5py.Dataset]:
+    """Return the arrays of an episode by their paths, unread."""
+    (steps,) = _array(group, "rewards", (None,), float).shape
+    if not steps:
+        raise ValueError(f"{group.name}: has no steps")
+    arrays = {
+        "observations": _array(group, "observations", (steps + 1, None), np.float32),
+        "actions": _array(group, "actions", (steps, None), np.float32),
+        "rewards": _array(group, "rewards", (steps,), float),
+        "terminations": _array(group, "terminations", (steps,), bool),
+        "truncations": _array(group, "truncations", (steps,), bool),
+    }
+    terms = group
+    for key in TERMS.split("/"):
+        terms = _item(terms, key, h5py.Group)
+    return arrays | {f"{TERMS}/{term}": _array(terms, term, (steps,), float) for term in terms}
+
+
+def _array(group, key: str, shape: tuple[int | None, ...], dtype) -> h5py.Dataset:
+    """Return an array as `write` stores it, unread: of a shape, where None is any length, and all in this file."""
+    array = _item(group, key, h5py.Dataset)
+    found, layout = array.shape or (), array.id.get_create_plist()
+    same = len(found) == len(shape) and all(None in (n, m) or n == m for n, m in zip(found, shape, strict=True))
+    if not same or array.dtype != dtype:
+        wanted = " x ".join("n" if length is None else str(length) for length in shape)
+        raise ValueError(f"{array.name}: expected {wanted} of {np.dtype(dtype)}, found {found} of {array.dtype}")
+    if layout.get_layout() != h5py.h5d.CONTIGUOUS or layout.get_external_count():
+        raise ValueError(f"{array.name}: expected values in one piece in this file")
+    start, size, there = array.id.get_offset(), _nbytes(array), group.file.id.get_filesize()
+    if size and (start is None or start + size > there):
+        raise ValueError(f"{array.name}: claims {size} bytes, and the file has {there}")
+    return array
+
+
+def _nbytes(array: h5py.Dataset) -> int:
+    return math.prod(array.shape) * array.dtype.itemsize
 
 
 def _attributes(index: int, episode: Episode) -> dict:
@@ -121,6 +223,18 @@ def _attributes(index: int, episode: Episode) -> dict:
         "sha256": episode.digest(),
     }
     return attributes if episode.preset is None else attributes | {"preset": episode.preset}
+
+
+def index(group: str) -> int:
+    """Return the index of the episode that a group holds.
+
+    Raises:
+        ValueError: the group's name is not that of an episode.
+    """
+    number = group.removeprefix("episode_")
+    if not (number.isascii() and number.isdecimal() and len(number) < 12 and name(int(number)) == group):
+        raise ValueError(f"{group[:80]!r}: expected the name of an episode")
+    return int(number)
 
 
 def name(index: int) -> str:

@@ -50,7 +50,8 @@ def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: in
     while playing.any():
         actions = policy.act(environment.task.split(observations), rewards).clip(-1.0, 1.0).astype(np.float32)
         observations, rewards, terminated, truncated, info = environment.step(actions)
-        recording.add(actions, observations, rewards, info["reward_terms"])
+        terms = {name: info[f"reward_{name}"] for name in environment.task.settings.weights}
+        recording.add(actions, observations, rewards, terms)
         ended = np.flatnonzero((terminated | truncated) & playing)
         finished = [recording.episode(row, seated[row], terminated[row], truncated[row]) for row in ended]
         count = int(playing.sum())
@@ -90,14 +91,13 @@ class _Recording:
 
     def add(self, actions, observations, rewards, terms) -> None:
         """Take down a step of all rows; rows that are done write over their last one."""
-        names = [name for name in terms if not name.startswith("_")]
         if self._terms is None:
-            self._terms = {name: np.empty_like(self._rewards) for name in names}
+            self._terms = {name: np.empty_like(self._rewards) for name in terms}
         at = self._rows, np.minimum(self._clock, self._last)
         self._actions[at] = actions
         self._rewards[at] = rewards
-        for name in names:
-            self._terms[name][at] = terms[name]
+        for name, term in terms.items():
+            self._terms[name][at] = term
         self._clock += 1
         self._observations[self._rows, np.minimum(self._clock, self._last + 1)] = observations
 

@@ -8,10 +8,11 @@ end the parts are merged into one plain `main_data.hdf5`, whose episodes, but no
 not depend on how they got there.
 
 A new dataset starts in a hidden folder beside its place, and moves there with its first episodes;
-one that replaces another moves when it is complete.
+one that replaces another changes places with it when it is complete.
 """
 
 import contextlib
+import ctypes
 import fcntl
 import itertools
 import json
@@ -27,10 +28,12 @@ from minari.namespace import create_namespace, list_local_namespaces
 
 from arc_suite import files
 from arc_suite.data import episodes, ids
-from arc_suite.data.dataset import MAIN, METADATA, damages, read_metadata
+from arc_suite.data.dataset import MAIN, METADATA, damages, plain, read_metadata
 from arc_suite.data.episodes import Episode
 
 PARTS = "parts"
+
+_HERE, _EXCHANGE = -100, 2  # AT_FDCWD and RENAME_EXCHANGE of Linux
 
 
 class Storage:
@@ -49,10 +52,14 @@ class Storage:
         self._early = early
         self._where: dict[int, tuple[str, int]] = {}  # by index of an episode its part and its steps
         data = folder / "data"
+        with damages(dataset_id, folder):
+            for inside in (data, data / PARTS):
+                if inside.is_symlink():  # what is written and deleted lies in the dataset's own folder
+                    raise ValueError(f"expected a folder, and {inside} is a link")
         if (data / METADATA).exists() or any(data.rglob("*.hdf5")):
             self.metadata = read_metadata(dataset_id, folder)
-        for leftover in data.rglob(".*"):  # of a kill in mid-writing
-            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink()
+        for leftover in [*data.glob(".*"), *data.glob(f"{PARTS}/.*")]:  # of a kill in mid-writing
+            shutil.rmtree(leftover) if leftover.is_dir() and not leftover.is_symlink() else leftover.unlink()
         self.merged = (data / MAIN).exists() and not any(data.glob(f"{PARTS}/*.hdf5"))
         self._scan(MAIN if self.merged else f"{PARTS}/*.hdf5")
 
@@ -109,16 +116,28 @@ class Storage:
         """Put finished episodes on disk, by index, and let Minari see them up to the first that is missing.
 
         Raises:
-            OSError: a file cannot be written; one line that names it. What was there before is still.
+            OSError: a file cannot be written; one line that names it. What was there before is still,
+                and so is every one of these that fits.
         """
+        try:
+            self._add(finished)
+        except OSError:
+            if len(finished) > 1:
+                for index in sorted(finished.keys() - self.kept):
+                    with contextlib.suppress(OSError):
+                        self._add({index: finished[index]})
+            raise
+
+    def _add(self, finished: Mapping[int, Episode]) -> None:
         if not (self._folder / "data" / METADATA).exists():
             self._write_metadata()  # first: episodes of unknown settings must not be continued
         parts = self._folder / "data" / PARTS
         parts.mkdir(exist_ok=True)
         if self.merged:
-            os.link(self._folder / "data" / MAIN, parts / f"{0:05}.hdf5")
+            whole = f"{PARTS}/{0:05}.hdf5"
+            os.link(self._folder / "data" / MAIN, self._folder / "data" / whole)
             self.merged = False
-            self._scan(f"{PARTS}/*.hdf5")
+            self._where = {index: (whole, steps) for index, (_, steps) in self._where.items()}
         number = 1 + max((int(part.stem) for part in parts.glob("*.hdf5")), default=-1)
         part = f"{PARTS}/{number:05}.hdf5"
         with _image() as file:
@@ -158,12 +177,13 @@ class Storage:
         self._move()
 
     def _scan(self, pattern: str) -> None:
+        """Find out what episodes there are; what is kept is read, and its digests compared."""
         data = self._folder / "data"
         for path in sorted(data.glob(pattern)):
             part = path.relative_to(data).as_posix()
-            with damages(self.id, path), h5py.File(path, "r") as file:
-                for name, group in file.items():
-                    self._where[int(name.removeprefix("episode_"))] = part, int(group.attrs["total_steps"])
+            with damages(self.id, path), h5py.File(plain(path), "r") as file:
+                for index in map(episodes.index, file):
+                    self._where[index] = part, episodes.read(file, index).length
 
     def _count(self) -> int:
         """Return the number of episodes before the first that is missing."""
@@ -210,9 +230,13 @@ class Storage:
         if self._folder == self._place:
             return
         old = self._place.with_name(f".{self._place.name}.old")
-        if self._place.exists():
+        if not self._place.exists():
+            self._folder.rename(self._place)
+        elif _exchange(self._folder, self._place):
+            self._folder.rename(old)
+        else:
             self._place.rename(old)
-        self._folder.rename(self._place)
+            self._folder.rename(self._place)
         self._folder = self._place
         shutil.rmtree(old, ignore_errors=True)
 
@@ -221,6 +245,12 @@ def _make_namespace(dataset_id: str) -> None:
     namespace = parse_dataset_id(dataset_id)[0]
     if namespace is not None and namespace not in list_local_namespaces():
         create_namespace(namespace)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Let two folders change their names at once, so that neither is ever missing; False where that cannot be done."""
+    renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)  # Linux alone has it, and not on every file system
+    return renameat2 is not None and renameat2(_HERE, bytes(one), _HERE, bytes(other), _EXCHANGE) == 0
 
 
 @contextlib.contextmanager

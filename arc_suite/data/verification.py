@@ -21,6 +21,7 @@ def verify(
     rows: int = ROWS,
     threads: int | None = None,
     progress: Callable = tqdm,
+    task: str | None = None,
 ) -> int:
     """Replay every episode of a dataset from its seed and compare everything to the bit.
 
@@ -30,18 +31,21 @@ def verify(
         rows: how many are replayed at a time.
         threads: on which to simulate; None for all cores.
         progress: makes a progress bar as `tqdm` does.
+        task: name of what should have been done; None for any.
 
     Returns:
         The number of episodes.
 
     Raises:
-        ValueError: the dataset is missing, damaged, of another body, model or version, or its replay
-            differs; one line.
+        ValueError: the dataset is missing, damaged, of another body, task, model or version, or needs
+            a module that has not been imported, or its replay differs; one line.
     """
     dataset = open(dataset_id)
     settings, was = dataset.settings, dataset.metadata["arc_suite"]
     if body not in (None, settings.body):
         raise ValueError(f"dataset {dataset_id!r} holds episodes of {settings.body.name}, and not of {body.name}")
+    if task is not None and registry.task_of(task) is not registry.task_of(settings.task):
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {settings.task}, and not of {task}")
     for package, version in versions.recorded().items():
         if was["versions"].get(package) != version:
             there = f"{package} {was['versions'].get(package)}"
@@ -56,6 +60,8 @@ def verify(
     if not count:
         return 0
     rows = min(rows, count)
+    # One step more than any episode has: a replay that goes on shows, and the file alone says how much is allocated.
+    steps = min(settings.steps, 1 + max(summary["length"] for summary in dataset.summaries()))
     recorded = {}
 
     def script(seed):
@@ -65,11 +71,11 @@ def verify(
         recorded[seed] = episode
         return episode.actions
 
-    environment = settings.environment(rows, threads)
+    environment = settings._replace(steps=steps).environment(rows, threads)
     replayer = Script(script, *environment.action_space.shape)
     bar = progress(desc="replaying", leave=False, total=dataset.metadata["total_steps"], unit="step", unit_scale=True)
     with contextlib.closing(environment), bar:
-        for step in rollouts.play(environment, replayer, range(first, first + count), settings.steps):
+        for step in rollouts.play(environment, replayer, range(first, first + count), steps):
             bar.update(step.playing)
             for episode in step.finished:
                 there = recorded.pop(episode.seed)
@@ -83,6 +89,8 @@ def _difference(recorded: Episode, replayed: Episode) -> str:
     """Return in words where episodes differ first: the array and the row."""
     if recorded.length != replayed.length:
         return f"{recorded.length} steps were recorded, {replayed.length} replayed"
+    if recorded.terms.keys() != replayed.terms.keys():
+        return f"terms {', '.join(recorded.terms)} were recorded, {', '.join(replayed.terms)} replayed"
     for (name, there), here in zip(recorded.arrays().items(), replayed.arrays().values(), strict=True):
         for row, (was, now) in enumerate(zip(there, here, strict=True)):
             if was.tobytes() != now.tobytes():

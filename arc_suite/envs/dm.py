@@ -12,12 +12,21 @@ from dm_control.rl import control
 from dm_env import specs
 
 from arc_suite import checks
+from arc_suite.envs.lock import Lock, one_thread_at_a_time
 from arc_suite.envs.scene import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
 
 _FLAT = "observations"  # dm_control's name of a flat observation
+
+# What `dm_control.suite.load` hands on to an environment and this suite fixes, and why.
+_FIXED = {
+    "control_timestep": "reward and observation are made for control steps of 25 substeps",
+    "n_sub_steps": "reward and observation are made for control steps of 25 substeps",
+    "legacy_step": "observed contact forces and foot heights stand one substep behind the state",
+    "time_limit": "it is a setting of the task: task_kwargs={'time_limit': seconds}",
+}
 
 
 def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
@@ -31,7 +40,9 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
             reward 0); for walk `gait`, `weights`, and every target and threshold, see
             `arc_suite.tasks.walk.settings`.
-        environment_kwargs: `flat_observation=True` gives one vector in place of named blocks.
+        environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
+            else dm_control's environments take, steps and substeps are part of the benchmark and are
+            refused, and `time_limit` is a setting of the task.
         visualize_reward: let rendered pictures show the reward as a colour.
 
     Returns:
@@ -47,6 +58,8 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
     random, on_divergence = settings.pop("random", None), settings.pop("on_divergence", "raise")
     task, model = prepared(domain_name, task_name, settings)
     for name in options:
+        if name in _FIXED:
+            raise ValueError(f"environment setting {name!r}: {_FIXED[name]}")
         checks.name(name, ["flat_observation"], "environment setting")
     run = TaskRun(task, random, on_divergence, options.get("flat_observation", False))
     run.visualize_reward = visualize_reward
@@ -56,6 +69,8 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
 class Environment(control.Environment):
     """A task in a simulation; steps, resets and specs are those of dm_control.
 
+    While one thread is in a step, reset or command, another's is refused with a RuntimeError.
+
     Attributes:
         task_kwargs: the settings with which `load` opened the task.
     """
@@ -63,6 +78,7 @@ class Environment(control.Environment):
     def __init__(self, physics: Physics, run: "TaskRun", task_kwargs: Mapping[str, Any]):
         """Put a task's run and its simulation together; `load` makes both."""
         self.task_kwargs = task_kwargs
+        self._lock = Lock()
         limit = run.definition.step_limit
         step = SUBSTEPS * physics.timestep()
         super().__init__(
@@ -74,6 +90,9 @@ class Environment(control.Environment):
             legacy_step=False,  # which would move the contact forces and foot heights one substep on
         )
 
+    step = one_thread_at_a_time(control.Environment.step)
+
+    @one_thread_at_a_time
     def reset(self, seed: int | None = None) -> dm_env.TimeStep:
         """Start an episode.
 
@@ -83,11 +102,13 @@ class Environment(control.Environment):
 
         Raises:
             ValueError: not a seed.
+            RuntimeError: another thread is at work in the environment.
         """
         if seed is not None:
             self.task.random = np.random.RandomState(checks.seed(seed))
         return super().reset()
 
+    @one_thread_at_a_time
     def command(self, name: str, value) -> None:
         """Set a command of the task from now on, as a player's stick does, until the next episode.
 

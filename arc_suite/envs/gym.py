@@ -12,6 +12,7 @@ from shimmy.utils.dm_env import dm_env_step2gym_step
 
 from arc_suite import checks
 from arc_suite.envs.dm import load
+from arc_suite.envs.lock import one_thread_at_a_time
 from arc_suite.simulation import opengl, pictures
 from arc_suite.tasks import Task
 
@@ -22,9 +23,9 @@ class Env(DmControlCompatibilityV0):
     """One task of the suite, made by `gymnasium.make("arc_suite/<robot>-<task>-v0", ...)`.
 
     Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
-    [-1, 1]. A step's info holds `reward_terms`, the task's unweighted terms by name as plain
-    floats, and `progress`, its figures of how well the episode has gone so far; a reset's info is
-    empty, since nothing has been rewarded yet.
+    [-1, 1]. A step's info holds plain floats: the task's unweighted terms, `reward_forward` and so
+    on, and figures of how well the episode has gone so far, such as `progress_speed`; a
+    reset's info is empty, since nothing has been rewarded yet.
 
     An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` says
     otherwise, and terminated when the dm_env's discount is 0, which never happens at the time
@@ -39,7 +40,7 @@ class Env(DmControlCompatibilityV0):
     # What `gymnasium.make` may ask for; an instance's own metadata has what works here.
     metadata = {"render_modes": [*_HEADLESS_MODES, "human"], "render_fps": 20}
 
-    _np_random_seed = -1  # Gymnasium's sign for a stream of unknown seed, here until a reset is given one
+    _np_random_seed = -1  # Gymnasium's sign for a stream of unknown seed, here until a seed is given
 
     def __init__(
         self,
@@ -73,6 +74,7 @@ class Env(DmControlCompatibilityV0):
             raise ValueError(f"render_mode 'human' needs a display, and there is none; use {' or '.join(modes)}")
         if render_mode is not None:
             checks.name(render_mode, modes, "render_mode")
+        pictures.check_size(height, width)
         environment = load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
         pictures.check_camera(environment.physics.model.ptr, camera_id)
         self.metadata = {"render_modes": modes}  # before shimmy writes a rate into the class's
@@ -82,9 +84,13 @@ class Env(DmControlCompatibilityV0):
         size = self.observation_space["observations"].shape
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self.action_space.shape, np.float32)
+        self._lock = environment._lock
         self._window = None
         self._stepping = False  # between a reset and the end of its episode
         self._closed = False
+        random = (task_kwargs or {}).get("random")
+        if random is not None and not isinstance(random, np.random.RandomState):
+            self._np_random_seed = checks.seed(random)
 
     @property
     def task(self) -> Task:
@@ -113,13 +119,12 @@ class Env(DmControlCompatibilityV0):
 
         Raises:
             ValueError: not a seed.
+            RuntimeError: another thread is at work in the environment.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
-        if seed is not None:
-            seed = checks.seed(seed)
-        gymnasium.Env.reset(self, seed=seed)
         observation = self._env.reset(seed).observation
+        gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
         self._stepping = True
         self._show()
         return _flat(observation), {}
@@ -131,11 +136,13 @@ class Env(DmControlCompatibilityV0):
             action: (motors,), clipped to [-1, 1].
 
         Returns:
-            Observation, reward, terminated, truncated, and an info with `reward_terms` and `progress`.
+            Observation, reward, terminated, truncated, and an info with floats `reward_<term>` and
+            `progress_<figure>`.
 
         Raises:
             ValueError: an action of another shape or with NaN; nothing has changed then.
             ResetNeeded: before a reset, or after the episode's end.
+            RuntimeError: another thread is at work in the environment.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("step")
@@ -146,7 +153,7 @@ class Env(DmControlCompatibilityV0):
         self._stepping = not timestep.last()
         self._show()
         run = self._env.task
-        info = {"reward_terms": _floats(run.terms), "progress": _floats(run.progress)}
+        info = _floats("reward", run.terms) | _floats("progress", run.progress)
         return _flat(observation), float(reward), terminated, truncated, info
 
     def command(self, name: str, value) -> None:
@@ -172,12 +179,17 @@ class Env(DmControlCompatibilityV0):
         self._check_open("render")
         return super().render()
 
+    @one_thread_at_a_time
     def close(self):
-        """Free the simulation and what it was rendered with; once more does nothing."""
+        """Free the simulation and what it was rendered with; once more does nothing.
+
+        Raises:
+            RuntimeError: another thread is at work in the environment.
+        """
+        self._closed = True
         if self._window is not None:
             self._window.close()
             self._window = None
-        self._closed = True
         super().close()
 
     def _check_open(self, call: str) -> None:
@@ -203,8 +215,8 @@ class Env(DmControlCompatibilityV0):
         self.__dict__.update(state)
 
 
-def _floats(figures: Mapping[str, Any]) -> dict[str, float]:
-    return {name: float(figure) for name, figure in figures.items()}
+def _floats(kind: str, figures: Mapping[str, Any]) -> dict[str, float]:
+    return {f"{kind}_{name}": float(figure) for name, figure in figures.items()}
 
 
 def _flat(observation) -> np.ndarray:

@@ -13,6 +13,8 @@ from arc_suite.simulation.model import compiled
 from arc_suite.tasks.contract import STEPS, Scene, Task
 from arc_suite.tasks.readings import layout
 
+_NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
+
 
 def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> tuple[Task, mujoco.MjModel]:
     """Return a task, and the model of its simulation.
@@ -63,11 +65,11 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
     Raises:
         ValueError: another shape, not numbers, or NaN; one line that names the index.
     """
-    try:
-        array = np.asarray(action, dtype=float)
-    except (TypeError, ValueError):
-        numbers = " x ".join(map(str, shape))
-        raise ValueError(f"action: expected {numbers} numbers, got {type(action).__name__}") from None
+    array = _real(action)
+    if array is None:
+        numbers, kind = " x ".join(map(str, shape)), type(action).__name__
+        kind += f" of {action.dtype}" if isinstance(action, np.ndarray) else ""
+        raise ValueError(f"action: expected {numbers} numbers, got {kind}")
     if array.shape != shape:
         raise ValueError(f"action: expected shape {shape}, got {array.shape}")
     invalid = np.isnan(array)
@@ -86,10 +88,18 @@ def checked_command(task: Task, name: str, value, rows: tuple[int, ...] = ()) ->
     if not task.commands:
         raise ValueError(f"command {name!r}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
-    try:
-        numbers = np.full(size, np.nan) if value is None else np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.array(np.inf)
-    if numbers.shape not in ((size,), (*rows, size)) or np.isinf(numbers).any():
+    numbers = np.full(size, np.nan) if value is None else _real(value)
+    if numbers is None or numbers.shape not in ((size,), (*rows, size)) or np.isinf(numbers).any():
         raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
     return np.broadcast_to(numbers, (*rows, size)).copy()
+
+
+def _real(value) -> np.ndarray | None:
+    """The value as floats; None where it holds anything but real numbers, or hides some of them."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in _NOT_REAL or isinstance(value, np.ma.MaskedArray):
+            return None
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        return None

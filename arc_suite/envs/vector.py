@@ -1,8 +1,6 @@
 """Many environments of one task as one Gymnasium vector environment, on `mujoco.batch`."""
 
-import functools
 import os
-import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -13,48 +11,36 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
+from arc_suite.envs.lock import Lock, one_thread_at_a_time
 from arc_suite.envs.scene import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
 from arc_suite.tasks import terms
 
-_AUTORESET_MODES = (AutoresetMode.NEXT_STEP.value, AutoresetMode.SAME_STEP.value)
 _RENDER_MODES = ("rgb_array", "depth_array")
-
-
-def _one_at_a_time(method):
-    """Refuse a call once the environment is closed, and while another thread's call is at work."""
-
-    @functools.wraps(method)
-    def guarded(self, *args, **kwargs):
-        call = method.__name__
-        if self.closed:
-            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
-        if not self._busy.acquire(blocking=False):
-            raise RuntimeError(f"cannot {call}: another thread is using this environment; make one for each thread")
-        try:
-            return method(self, *args, **kwargs)
-        finally:
-            self._busy.release()
-
-    return guarded
+_OF_EACH_ROW = ("np_random", "np_random_seed", "render")  # attributes that have a value for each row already
+_OF_ONE_ROW = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
 
 
 class VectorEnv(gymnasium.vector.VectorEnv):
     """Rows of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
 
     A row seeded s is bit-equal to `arc_suite.envs.gym.Env` seeded s, from step to step and from episode
-    to episode, whatever the number of threads. Spaces, observations and `reward_terms` are that
-    environment's, batched as `SyncVectorEnv` does. Arrays handed out are the caller's own.
+    to episode, whatever the number of threads. Spaces, observations and infos are that environment's,
+    batched as `SyncVectorEnv` does. Arrays handed out are the caller's own.
 
-    A step's info holds `reward_terms` and `progress`, the task's figures of how well the episode has
-    gone so far.
+    A step's info holds the task's unweighted terms, `reward_forward` and so on, and figures of how
+    well the episodes have gone so far, such as `progress_speed`: (num_envs,) floats, with
+    the mask of the rows that have them under the same name after an underscore.
+
+    Pickles and copies carry on bit for bit. While one thread is in a call, another's is refused.
 
     Where a row's physics diverges, the row's episode is terminated with reward 0 and `info` has
     `diverged`; the other rows notice nothing.
 
     Attributes:
+        autoreset_mode: what happens to a row whose episode has ended.
         batch: the simulations. Writing their state is for experiments.
         task: what the rows do; its `split` gives an observation's blocks by name.
     """
@@ -80,8 +66,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             task_name: as in `arc_suite.load`.
             num_envs: number of rows.
             num_threads: on which to simulate; None for as many as this process has cores.
-            autoreset_mode: NextStep or SameStep: whether a row whose episode has ended starts the
-                next one in the step after or at once.
+            autoreset_mode: NextStep or SameStep: a row whose episode has ended starts the next one in
+                the step after or at once; Disabled: it rests, with reward 0, until a reset whose
+                `reset_mask` has it.
             max_episode_steps: truncates episodes, as `gymnasium.make` does, beside the task's time limit.
             task_kwargs: as in `arc_suite.load`; `random=s` seeds row i with s + i, and
                 `on_divergence` can only be "terminate".
@@ -94,14 +81,17 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ValueError: an unknown name, or a value that does not fit; one line that names it and the
                 nearest valid name.
         """
+        self._lock, self.batch = Lock(), None  # first, as Gymnasium closes also what could not be made
         task_kwargs = dict(task_kwargs or {})
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of rows")
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
-        self._same_step = checks.name(mode, _AUTORESET_MODES, "autoreset_mode") == AutoresetMode.SAME_STEP.value
+        modes = [mode.value for mode in AutoresetMode]
+        self.autoreset_mode = AutoresetMode(checks.name(mode, modes, "autoreset_mode"))
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = checks.integer("num_envs", num_envs, 1)
+        pictures.check_size(height, width)
         threads = usable_cores() if num_threads is None else checks.integer("num_threads", num_threads, 1)
 
         self.task, model = prepared(domain_name, task_name, task_kwargs)
@@ -114,18 +104,18 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._memory = None  # of all rows, with a leading axis
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
         self._carries = [self.task.first() for _ in range(self.num_envs)]
+        self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # rows whose next episode is the first of its stream
         if seed is not None:
             self._seed(self._seeds(seed), np.ones(self.num_envs, bool))
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
-        self._ended = np.zeros(self.num_envs, bool)  # rows that start an episode in the next step
+        self._ended = np.zeros(self.num_envs, bool)  # rows whose episode has ended and whose next has not begun
         self._resting = np.zeros(self.num_envs, bool)
-        self._busy = threading.Lock()
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
             "render_fps": round(1.0 / self.task.scene.control_timestep),
-            "autoreset_mode": AutoresetMode(mode),
+            "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
         self._picture = {
@@ -140,7 +130,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    @_one_at_a_time
+    @one_thread_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
         """Start an episode in every row, or in some.
 
@@ -157,6 +147,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ResetNeeded: a mask before every row has been reset once.
             ClosedEnvironmentError: after `close`.
         """
+        self._check_open("reset")
         rows = self._rows((options or {}).get("reset_mask"))
         if self._memory is None and not rows.all():
             raise ResetNeeded("cannot reset some rows: reset all of them first")
@@ -165,7 +156,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._begin(rows, self._observation)
         return self._observation.copy(), {}
 
-    @_one_at_a_time
+    @one_thread_at_a_time
     def step(self, actions):
         """Advance every row by one control step, but for rows that start an episode instead.
 
@@ -174,19 +165,21 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         Returns:
             Observations (num_envs, size) float32; rewards (num_envs,); terminated and truncated,
-            (num_envs,) booleans; and an info as Gymnasium defines it: `reward_terms`, of rows that
-            diverged also `diverged`, and in the mode SameStep `final_obs` and `final_info` of rows
-            whose episode ended.
+            (num_envs,) booleans; and an info as Gymnasium defines it: `reward_<term>` and
+            `progress_<figure>`, of rows that diverged also `diverged`, and in the mode SameStep
+            `final_obs` and `final_info` of rows whose episode ended.
 
         Raises:
             ValueError: actions of another shape, or NaN in one; nothing has moved then.
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
+        self._check_open("step")
         if self._memory is None:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
         task, before, data = self.task, self._memory, self.batch.data
-        stepping, restarting = ~(self._ended | self._resting), self._ended & ~self._resting
+        waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
+        stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
         memory, inputs = task.before(before, checked_action(actions, self.action_space.shape))
         np.copyto(data.ctrl, inputs.ctrl, where=stepping[:, None])
         if inputs.kick is not None:
@@ -205,10 +198,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         time_is_up = self._steps >= task.step_limit
         terminated = stepping & (diverged | failed) & ~time_is_up
         truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self._step_limit))
-        self._ended = terminated | truncated
+        self._ended = waiting | terminated | truncated
 
         info = {}
-        if self._same_step and self._ended.any():
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             restarting, stepping = self._ended, stepping & ~self._ended
             final = {"final_obs": _by_row(observation, restarting), "final_info": self._info(restarting, diverged)}
             info |= _marked(final, restarting)
@@ -218,7 +211,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
-    @_one_at_a_time
+    @one_thread_at_a_time
     def command(self, name: str, value, rows=None) -> None:
         """Set a command of the task in some rows from now on, until their next episodes.
 
@@ -233,13 +226,14 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
+        self._check_open("command")
         mask, value = self._rows(rows, "rows"), checked_command(self.task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
         present = getattr(self._memory, name)
         self._memory = self._memory._replace(**{name: np.where(mask[:, None], value, present)})
 
-    @_one_at_a_time
+    @one_thread_at_a_time
     def rest(self, mask) -> None:
         """Let rows, and no others, stand still until they are reset; meanwhile they cost next to nothing.
 
@@ -250,9 +244,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ValueError: a mask that does not fit.
             ClosedEnvironmentError: after `close`.
         """
+        self._check_open("rest")
         self._resting = self._rows(mask, "mask")
 
-    @_one_at_a_time
+    @one_thread_at_a_time
     def render(self, rows: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
         """Return pictures of the rows' present states, in the mode and size chosen at the start.
 
@@ -268,6 +263,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             RenderingUnavailable: no OpenGL here.
             ClosedEnvironmentError: after `close`.
         """
+        self._check_open("render")
         if self.render_mode is None:
             return None
         every = range(self.num_envs)
@@ -277,9 +273,73 @@ class VectorEnv(gymnasium.vector.VectorEnv):
                 raise ValueError(f"rows: expected integers from 0 to {self.num_envs - 1}, got {row!r}")
         return tuple(self._render_row(row) for row in rows)
 
-    def close_extras(self) -> None:
-        """Free the simulations."""
-        del self.batch
+    @one_thread_at_a_time
+    def close(self, **kwargs) -> None:
+        """Free the simulations; once more does nothing.
+
+        Raises:
+            RuntimeError: another thread is at work in the environment.
+        """
+        super().close(**kwargs)
+
+    def close_extras(self, **kwargs) -> None:
+        """Free the simulations; `close` calls it."""
+        self.batch = None
+
+    @property
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """Draw, for each row, from the stream that its resets draw from."""
+        return tuple(np.random.Generator(random._bit_generator) for random in self._randoms)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:
+        """The seed of each row's stream of random numbers; -1 where none was given."""
+        return tuple(self._stream_seeds.tolist())
+
+    def call(self, name: str, *args, **kwargs) -> tuple:
+        """Call a method, or read an attribute, of every row, as Gymnasium's own vector environments do.
+
+        Args:
+            name: of an attribute of this environment; what rows share is the value of each of them.
+            *args: of the method.
+            **kwargs: of the method.
+
+        Returns:
+            A value for each row.
+
+        Raises:
+            ValueError: `reset`, `step` or `close`, which are of all rows at once; one line.
+            AttributeError: no such attribute.
+        """
+        if name in ("reset", "step", "close"):
+            raise ValueError(f"call {name!r}: rows do it together; call {name} of the environment itself")
+        value = getattr(self, _OF_ONE_ROW.get(name, name))
+        if callable(value):
+            value = value(*args, **kwargs)
+        return value if name in _OF_EACH_ROW and value is not None else (value,) * self.num_envs
+
+    def get_attr(self, name: str) -> tuple:
+        """Return an attribute of every row; see `call`."""
+        return self.call(name)
+
+    def set_attr(self, name: str, values) -> None:
+        """Set an attribute that the rows share.
+
+        Args:
+            name: of the attribute.
+            values: one for all, or a list or tuple of as many equal ones as there are rows.
+
+        Raises:
+            ValueError: another number of values, or different ones; one line.
+        """
+        values = list(values) if isinstance(values, list | tuple) else [values]
+        if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
+            raise ValueError(f"set_attr {name!r}: rows share it; expected one value for all, got {values!r}")
+        setattr(self, name, values[0])
+
+    def _check_open(self, call: str) -> None:
+        if self.closed:
+            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
 
     def _render_row(self, row: int) -> np.ndarray:
         scene = self.task.scene
@@ -311,10 +371,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """What the latest step tells of some rows."""
         info = {}
         if rows.any():
-            groups = {"reward_terms": self._terms, "progress": self.task.progress(self._memory)}
-            for name, figures in groups.items():
-                masked = {figure: np.where(rows, values, 0.0) for figure, values in figures.items()}
-                info |= _marked({name: _marked(masked, rows)}, rows)
+            figures = {f"reward_{name}": term for name, term in self._terms.items()}
+            figures |= {f"progress_{name}": figure for name, figure in self.task.progress(self._memory).items()}
+            info |= _marked({name: np.where(rows, figure, 0.0) for name, figure in figures.items()}, rows)
         diverged = diverged & rows
         if diverged.any():
             info |= _marked({"diverged": diverged}, diverged)
@@ -334,7 +393,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         for row in np.flatnonzero(rows):
             if seeds[row] is not None:
                 self._randoms[row], self._carries[row] = np.random.RandomState(seeds[row]), self.task.first()
-                self._streams_begin[row] = True
+                self._stream_seeds[row], self._streams_begin[row] = seeds[row], True
 
     def _rows(self, mask, name: str = "reset_mask") -> np.ndarray:
         """The rows of a mask; all of them for None."""

@@ -36,10 +36,17 @@ class Standing(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def standing(body: Body) -> Standing:
-    """Return the mechanics of a body's standing pose; armature, damping, motors and constants play no part."""
-    model = mujoco.MjModel.from_xml_string(builder.build(_unpowered(body)).to_xml_string())
+def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
+    """Return the mechanics of a body's standing pose; armature, damping, motors and constants play no part.
+
+    Args:
+        body: the spec.
+        angles: of the joints, rad, in place of zero for all of them; the torso stays where it is.
+    """
+    model = _model(body)
     data = mujoco.MjData(model)
+    if angles is not None:
+        data.qpos[7:] = angles
     mujoco.mj_forward(model, data)
     origin = data.xpos[1]
     soles, jacobians = [], []
@@ -67,6 +74,11 @@ def standing(body: Body) -> Standing:
         loads=abs(data.qfrc_bias[6:] - held),
         margin=stability_margin(centre, soles),
     )
+
+
+@functools.lru_cache(maxsize=256)
+def _model(body: Body) -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_string(builder.build(_unpowered(body)).to_xml_string())
 
 
 def _unpowered(body: Body) -> Body:

@@ -16,6 +16,8 @@ _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 class Batch:
     """Many simulations of one model, bit-equal to as many `Physics`, on a thread pool.
 
+    Pickles and copies go on to the bit.
+
     Attributes:
         data: live arrays under the names of `MjData`, with a leading axis for the rows. Writing
             qpos, qvel or ctrl writes the simulations' state.
@@ -110,6 +112,26 @@ class Batch:
         self.data.qpos[rows] = qpos
         self._simulations.forward(rows)
 
+    def __getstate__(self):
+        simulations = self._simulations
+        fields = {name: array.copy() for name, array in vars(self.data).items()}
+        return simulations.model, simulations.nsim, simulations.nthread, fields, simulations.state.copy()
+
+    def __setstate__(self, state):
+        model, rows, threads, fields, stored = state
+        self.__init__(model, rows, threads, fields)
+        self._simulations.state[...] = stored
+        for name, array in fields.items():
+            _fill(getattr(self.data, name), array)
+
     def _check_process(self) -> None:
         if self._forks != forks.count:
             forks.refuse("vector environment")
+
+
+def _fill(array: np.ndarray, values: np.ndarray) -> None:
+    """Write into a bound array, be it an output, which MuJoCo hands out for reading alone."""
+    writeable = array.flags.writeable
+    array.flags.writeable = True
+    array[...] = values
+    array.flags.writeable = writeable

@@ -90,8 +90,7 @@ def picture(
         ValueError: no such camera, or an impossible size; one line.
         RenderingUnavailable: no OpenGL here.
     """
-    for name, size, limit in (("height", height, MAX_HEIGHT), ("width", width, MAX_WIDTH)):
-        checks.integer(name, size, 1, limit)
+    check_size(height, width)
 
     def draw():
         decorated = _shared(body, arena)
@@ -100,6 +99,16 @@ def picture(
         return decorated.render(height, width, camera_id, **kwargs)
 
     return opengl.call(draw)
+
+
+def check_size(height: int, width: int) -> None:
+    """Check the size of pictures, pixels.
+
+    Raises:
+        ValueError: no integers, or too large; one line.
+    """
+    checks.integer("height", height, 1, MAX_HEIGHT)
+    checks.integer("width", width, 1, MAX_WIDTH)
 
 
 def check_camera(model: mujoco.MjModel, camera_id: int | str) -> None:

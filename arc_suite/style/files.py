@@ -4,18 +4,44 @@ Track i's field positions is the array `i/positions`; what is a mapping or a tup
 the reward's terms, has an array for each, `i/terms/forward`. Numbers are arrays without axes.
 """
 
+import io
 import json
+import math
 import os
+import zipfile
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from arc_suite import checks, versions
+from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.style.tracks import Track
 from arc_suite.tasks import terms
 
 FORMAT = "arc_suite tracks 2"  # another number for every change of what a file holds
+
+_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_REASON = 300  # characters of a reason, which may quote a file
+
+# Types of single values, and shapes of arrays.
+_FIELDS = {
+    "task": str,
+    "task_kwargs": str,
+    "seed": int,
+    **dict.fromkeys(("time_step", "target_velocity", "mass", "gravity"), float),
+    **dict.fromkeys(("positions", "linear_velocities", "angular_velocities"), ("steps", 3)),
+    "quaternions": ("steps", 4),
+    **dict.fromkeys(("joint_angles", "joint_velocities", "actions", "torques"), ("steps", "joints")),
+    **dict.fromkeys(("torso_heights", "phases"), ("steps",)),
+    **dict.fromkeys(("foot_positions", "foot_velocities"), ("steps", "feet", 3)),
+    **dict.fromkeys(("foot_heights", "contacts"), ("steps", "feet")),
+    **dict.fromkeys(("legs", "mirrors", "foot_radii"), ("feet",)),
+    "joint_legs": ("joints",),
+}
+_PARAMETERS = dict.fromkeys(terms.Parameters._fields, float) | {"phase_offsets": ("feet",), "healthy_range": (2,)}
+_KINDS = {"contacts": "b", "legs": "U", "mirrors": "i", "joint_legs": "i"}  # of dtype; others are numbers
 
 
 def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
@@ -61,18 +87,38 @@ def load(path: str | os.PathLike) -> list[Track]:
         raise OSError(f"cannot read {path}: {error.strerror.lower()}") from None
     with file:
         try:
-            with np.load(file, allow_pickle=False) as archive:
-                arrays = dict(archive)
-            if (found := str(arrays.get("format", "no tracks"))) == FORMAT:
-                body = body_from_json(arrays["body"].item())
+            arrays = _arrays(file)
+            if (found := str(arrays.get("format", "no tracks"))[:80]) == FORMAT:
+                body = body_from_json(_value("body", arrays["body"], str))
                 count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
                 return [_track(body, arrays, index) for index in range(count)]
         except Exception as error:  # a damaged archive raises whatever its damage leads to
-            raise ValueError(f"{path}: not a file of tracks, or a damaged one: {error}") from None
+            reason = " ".join(str(error).split())[:_REASON]
+            raise ValueError(f"{path}: not a file of tracks, or a damaged one: {reason}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
 
 
-def _track(body, arrays, index) -> Track:
+def _arrays(file) -> dict[str, np.ndarray]:
+    """Return the arrays of an archive as `np.savez` writes it, once none claims more than the file holds."""
+    size, arrays = os.fstat(file.fileno()).st_size, {}
+    with zipfile.ZipFile(file) as archive:
+        members = archive.infolist()
+        if any(member.compress_type != zipfile.ZIP_STORED for member in members):
+            raise ValueError("expected arrays that are not compressed")
+        if (claimed := sum(member.file_size for member in members)) > size:
+            raise ValueError(f"its arrays claim {claimed} bytes, and the file has {size}")
+        for member in members:
+            name, content = member.filename.removesuffix(".npy"), io.BytesIO(archive.read(member))
+            shape, _, dtype = _HEADERS[np.lib.format.read_magic(content)](content)
+            claimed, there = math.prod(shape) * dtype.itemsize, member.file_size - content.tell()
+            if dtype.hasobject or claimed != there:
+                raise ValueError(f"{name}: {shape} of {dtype} are {claimed} bytes, and there are {there}")
+            content.seek(0)
+            arrays[name] = np.lib.format.read_array(content, allow_pickle=False)
+    return arrays
+
+
+def _track(body: Body, arrays: Mapping[str, np.ndarray], index: int) -> Track:
     """Return the track of an index; arrays without axes become numbers, and those of `Track`'s tuples tuples."""
     fields = {}
     for name, array in arrays.items():
@@ -82,9 +128,58 @@ def _track(body, arrays, index) -> Track:
             for key in path[:-1]:
                 mapping = mapping.setdefault(key, {})
             mapping[path[-1]] = array if array.ndim else array.item()
+    _check(fields, body)
     if "parameters" in fields:
         low, high = fields["parameters"]["healthy_range"].tolist()
         fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
     absent = {"phases": None, "parameters": None, "progress": {}}
-    values = {"legs": tuple(fields["legs"].tolist()), "task_kwargs": json.loads(fields["task_kwargs"])}
+    task_kwargs = checks.mapping("task_kwargs", json.loads(fields["task_kwargs"]))
+    values = {"legs": tuple(fields["legs"].tolist()), "task_kwargs": task_kwargs}
     return Track(body=body, **absent | fields | values)
+
+
+def _check(fields: Mapping[str, Any], body: Body) -> None:
+    """Raise a ValueError of one line, unless values are of the kinds and shapes that a track of the body has."""
+    lengths = {"steps": len(fields["positions"]), "joints": len(body.joint_names), "feet": len(body.legs)}
+    if not lengths["steps"]:
+        raise ValueError("positions: expected at least one row")
+    given = {name: value for name, value in fields.items() if name not in ("terms", "weights", "progress")}
+    parameters = given.pop("parameters", None)
+    for name, value in given.items():
+        _value(name, value, _FIELDS[name], lengths)
+    for name, value in fields["terms"].items():
+        _value(f"terms/{name}", value, ("steps",), lengths)
+    for name, value in (fields["weights"] | fields.get("progress", {})).items():
+        _value(name, value, float)
+    if missing := sorted(fields["weights"].keys() - fields["terms"].keys()):
+        raise ValueError(f"weights: expected those of terms, got {missing}")
+    if parameters is not None:
+        for name, value in parameters.items():
+            joints = name == "default_angles" and np.ndim(value) == 1
+            _value(f"parameters/{name}", value, ("joints",) if joints else _PARAMETERS[name], lengths)
+        if "phases" not in fields:
+            raise ValueError("phases: missing, and there are parameters of a gait")
+    legs = [leg for leg, spec in enumerate(body.legs) for _ in spec.joints]
+    if fields["legs"].tolist() != [leg.name for leg in body.legs] or fields["joint_legs"].tolist() != legs:
+        raise ValueError(f"legs: expected those of {body.name}")
+    if not ((fields["mirrors"] >= -1) & (fields["mirrors"] < lengths["feet"])).all():
+        raise ValueError(f"mirrors: expected indices of legs, got {fields['mirrors'].tolist()}")
+    for name in ("time_step", "mass", "gravity"):
+        checks.number(name, fields[name], 1e-12)
+    checks.seed(fields["seed"])
+
+
+def _value(name: str, value, wanted, lengths: Mapping[str, int] | None = None):
+    """Return a value if it is as wanted: a type of Python's, or the shape of an array, by name or number."""
+    if isinstance(wanted, type):
+        value = value.item() if isinstance(value, np.ndarray) and not value.ndim else value
+        if isinstance(value, bool) or not isinstance(value, (int, float) if wanted is float else wanted):
+            raise ValueError(f"{name}: expected one {wanted.__name__}")
+        return value
+    shape = tuple(lengths.get(length, length) for length in wanted)
+    array = np.asarray(value)
+    if array.shape != shape or array.dtype.kind not in _KINDS.get(name, "bif"):
+        raise ValueError(f"{name}: expected {shape} numbers, got {array.shape} of {array.dtype}")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise ValueError(f"{name}: expected finite numbers")
+    return value

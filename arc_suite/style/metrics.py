@@ -186,7 +186,7 @@ def asymmetry(track: Track) -> np.ndarray:
     torso = track.positions[:, None]
     paths = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), track.foot_positions - torso)
     cycles = (track.phases[:, None] + track.parameters.phase_offsets) / TWO_PI % 1.0
-    bins = (cycles * _BINS).astype(int)
+    bins = (cycles * _BINS).astype(int) % _BINS  # a cycle that is rounded to 1 is 0
     means = np.full((len(track.legs), _BINS, 3), np.nan)
     for leg in range(len(track.legs)):
         for occupied in np.unique(bins[:, leg]):

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, policies
+from arc_suite import checks, policies, registry
 from arc_suite.cpg import PRESETS
 from arc_suite.envs.dm import load as load_environment
 from arc_suite.robots.spec import Body
@@ -86,6 +86,11 @@ def _played(name: str, preset: str) -> Source:
 def _saved(path: str) -> Source:
     tracks = load(path)
     stage = Stage(tracks[0].body, tracks[0].task, tracks[0].task_kwargs)
+    try:
+        for kind, name in (("task", stage.task), ("arena", str(stage.task_kwargs.get("arena", "flat")))):
+            registry.imported(kind, name)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
     def takes(wanted, seeds):
         _check_stage(path, stage, wanted)

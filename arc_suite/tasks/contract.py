@@ -174,8 +174,10 @@ class Task(ABC):
 
         None on level ground, which pushes out what starts in it; any other ground holds it fast.
         """
-        if self.scene.arena.is_level:
-            return None
+        return None if self.scene.arena.is_level else self.lifted(readings)
+
+    def lifted(self, readings: Readings) -> np.ndarray:
+        """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
         radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
         clear = radii + _CLEAR * self.scene.body.torso.standing_height
         numpy = readings.foot_heights.__array_namespace__()

@@ -1,4 +1,10 @@
-"""Steer: follow a target velocity forward, sideways and in turning, which changes on a schedule, in the given gait."""
+"""Steer: follow a target velocity forward, sideways and in turning, stops included, in the prescribed gait.
+
+Nothing in it has a scale: lengths are told in standing heights h, speeds in the body's own target
+velocity or sqrt(g h), rates in sqrt(g / h), contact forces in the body's weight. Directions are the
+body's own, as the torso heads, so that an episode may start in any. What standing still would earn
+is gated by how well the command is followed.
+"""
 
 import functools
 import math
@@ -8,23 +14,29 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
 from arc_suite.tasks import terms, walk
 from arc_suite.tasks.contract import Start
-from arc_suite.tasks.readings import Readings
+from arc_suite.tasks.readings import Readings, component
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
 COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
-_OWN = [(field, np.ndarray) for field in ("place", "motion", "ends", "schedule", "command", "tracking")]
+LOWEST = 0.3  # healthy height of the torso over the ground, in standing heights
+LEAST_UPRIGHT = 0.4  # healthy cosine of the torso's tilt
+# Walk's weights of rates in SI units, as Queen has them in units of her own.
+RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
+_OWN = [(field, np.ndarray) for field in ("steps", "place", "motion", "ends", "schedule", "command", "tracking")]
 
 
 class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *_OWN])):
     """What is remembered beside the walk's; velocities are (forward, left, turning) in units of `Steer.units`.
 
     Attributes:
+        steps: (...) control steps since the start; the clock's tick rests while the command says stop.
         place: (..., 3) of the torso's frame at the latest reading: x and y, m, and yaw, rad.
         motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
-        ends: (..., COMMANDS) ticks at which the commands of the schedule end.
+        ends: (..., COMMANDS) steps at which the commands of the schedule end.
         schedule: (..., COMMANDS, 3) commands.
         command: (..., 3) set from outside, in place of the schedule where it is not NaN.
         tracking: (...) sum over the steps.
@@ -47,6 +59,12 @@ class Steer(walk.Walk):
     commands = {"command": 3}
     bonuses = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
 
+    @classmethod
+    def fitted(cls, body, overrides: Mapping[str, Any]) -> walk.Settings:
+        """Return walk's settings, with this task's weights."""
+        weights = RATES | dict(overrides.get("weights") or {})
+        return super().fitted(body, {**overrides, "weights": weights})
+
     @functools.cached_property
     def blocks(self) -> Mapping[str, int]:
         """Walk's, and the command beside the motion that is to follow it."""
@@ -58,14 +76,36 @@ class Steer(walk.Walk):
         pose, speed = standing(self.scene.body), abs(self.parameters.target_velocity)
         return np.array((speed, speed, speed / np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean()))
 
+    @functools.cached_property
+    def force_unit(self) -> np.ndarray:
+        """(6,) the body's weight, N: three times that on a lever of its height, N m, then thrice as it is."""
+        pose = standing(self.scene.body)
+        return pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3)
+
     def start(self, random: np.random.RandomState, carry: Any) -> Start:
         """Draw walk's start, then the yaw, then how long each command is held, then what they are."""
         start = super().start(random, carry)
         start.qpos[3:7] = rotations.turned(start.qpos[3:7], random.uniform(-math.pi, math.pi))
         ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
         schedule = np.array([draw_command(random) for _ in range(COMMANDS)])
-        own = (np.zeros(3), np.zeros(3), ends, schedule, np.full(3, np.nan), np.float64(0.0))
+        own = (0, np.zeros(3), np.zeros(3), ends, schedule, np.full(3, np.nan), np.float64(0.0))
         return start._replace(memory=Memory(*start.memory, *own))
+
+    def read(self, data) -> Readings:
+        """Take the readings, with contact forces in the body's weight and as the torso heads."""
+        readings = super().read(data)
+        numpy, heading = readings.posture.__array_namespace__(), rotations.yaw(readings.torso_quaternion)[..., None]
+        forces = data.cfrc_ext[..., self.scene.layout.parts, :] / self.force_unit
+        turned = (rotations.headed(forces[..., i : i + 2], heading) for i in (0, 3))
+        torque, force = (
+            numpy.concatenate([part, forces[..., i : i + 1]], axis=-1) for part, i in zip(turned, (2, 5), strict=True)
+        )
+        forces = numpy.concatenate([torque, force], axis=-1)
+        return readings._replace(contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0))
+
+    def lift(self, memory: Memory, readings: Readings) -> np.ndarray:
+        """Return the positions that bring every foot clear of the ground, level ground too: none is thrown up."""
+        return self.lifted(readings)
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
         """Take down where the torso is."""
@@ -75,18 +115,22 @@ class Steer(walk.Walk):
         """Advance the walk, and the mean velocity in the frame of the heading at the start of the step."""
         place, heading, step = _place(readings), memory.place[..., 2], self.scene.control_timestep
         numpy = place.__array_namespace__()
-        sine, cosine = numpy.sin(heading), numpy.cos(heading)
-        x, y, turn = ((place - memory.place)[..., i] for i in range(3))
-        way = numpy.stack([cosine * x + sine * y, cosine * y - sine * x, rotations.wrapped(turn)], axis=-1)
+        way = place - memory.place
+        turn = rotations.wrapped(way[..., 2])
+        way = numpy.concatenate([rotations.headed(way[..., :2], heading), turn[..., None]], axis=-1)
         leak = min(self.parameters.gait_frequency * step, 1.0)
         motion = (1.0 - leak) * memory.motion + leak * way / (step * self.units)
-        memory = super().after(memory, readings)._replace(place=place, motion=motion)
+        going = self.wanted(memory).any(axis=-1)
+        tick = memory.tick + going
+        stance = self.clock.at(self.clock.stance, tick) | ~going[..., None]  # all feet, while the command says stop
+        memory = self.measured(memory, readings, tick, stance)
+        memory = memory._replace(steps=memory.steps + 1, place=place, motion=motion)
         return memory._replace(tracking=memory.tracking + self.tracked(memory))
 
     def wanted(self, memory: Memory):
         """Return the command (..., 3) that holds; a schedule that has run out begins again."""
-        tick, numpy = memory.tick % memory.ends[..., -1], memory.ends.__array_namespace__()
-        current = (tick[..., None] >= memory.ends).sum(axis=-1)[..., None, None]
+        step, numpy = memory.steps % memory.ends[..., -1], memory.ends.__array_namespace__()
+        current = (step[..., None] >= memory.ends).sum(axis=-1)[..., None, None]
         scheduled = numpy.take_along_axis(memory.schedule, current, axis=-2)[..., 0, :]
         return numpy.where(numpy.isnan(memory.command), scheduled, memory.command)
 
@@ -99,22 +143,48 @@ class Steer(walk.Walk):
         return course * terms.tent(error[..., 2], BAND * numpy.maximum(abs(wanted[..., 2]), 0.5))
 
     def terms(self, memory: Memory, readings: Readings) -> dict:
-        """Return walk's costs, and bonuses for following the command, in the prescribed gait."""
+        """Return walk's costs without scale, and bonuses for following the command in the prescribed gait."""
         walked, tracking = super().terms(memory, readings), self.tracked(memory)
-        earned = {"tracking": tracking, "obedient_gait": tracking * walked["gait_bonus"]}
-        return earned | {name: term for name, term in walked.items() if name in self.settings.weights}
+        height = self.scene.body.torso.standing_height
+        own = {
+            "tracking": tracking,
+            "healthy": self.healthy(readings).astype(float),
+            "obedient_gait": tracking * walked["gait_bonus"],
+            "angular_velocity": walked["angular_velocity"] * (height / GRAVITY),
+            "vertical_velocity": walked["vertical_velocity"] / (GRAVITY * height),
+        }
+        return {name: own.get(name, walked.get(name)) for name in self.settings.weights}
+
+    def healthy(self, readings: Readings):
+        """Return whether the torso is off the ground and upright: (...) booleans."""
+        high = readings.torso_height >= LOWEST * self.scene.body.torso.standing_height
+        return high & (rotations.upright(readings.torso_quaternion) >= LEAST_UPRIGHT)
 
     def observe(self, memory: Memory, readings: Readings) -> dict:
-        """Return walk's blocks, and the command and the motion side by side."""
-        command = memory.motion.__array_namespace__().concatenate([self.wanted(memory), memory.motion], axis=-1)
-        return super().observe(memory, readings) | {"command": command}
+        """Return walk's blocks as the torso heads, without a clock at a stop; and the command beside the motion."""
+        numpy, walked = memory.motion.__array_namespace__(), super().observe(memory, readings)
+        heading, wanted = rotations.yaw(readings.torso_quaternion), self.wanted(memory)
+        quaternion = rotations.turned(readings.torso_quaternion, -heading)
+        posture, velocities = readings.posture, readings.velocities
+        velocity = rotations.headed(velocities[..., :2], heading)
+        return walked | {
+            "posture": numpy.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
+            "velocities": numpy.concatenate([velocity, velocities[..., 2:]], axis=-1),
+            "gait_clock": walked["gait_clock"] * wanted.any(axis=-1)[..., None],
+            "command": numpy.concatenate([wanted, memory.motion], axis=-1),
+        }
+
+    def ended(self, memory: Memory, readings: Readings) -> tuple:
+        """Return as terminated who is not healthy; nobody is truncated."""
+        return ~self.healthy(readings), False
 
     def progress(self, memory: Memory) -> dict:
         """Return the mean `tracking`, and `gait_compliance`."""
-        steps = memory.tick + (memory.tick == 0)
-        return {"tracking": memory.tracking / steps, "gait_compliance": super().progress(memory)["gait_compliance"]}
+        steps = memory.steps + (memory.steps == 0)
+        right = 1.0 - memory.wrong_in_all / (steps * len(self.parameters.phase_offsets))
+        return {"tracking": memory.tracking / steps, "gait_compliance": right}
 
 
 def _place(readings: Readings):
-    x, y, yaw = *(readings.frame_position[..., i] for i in (0, 1)), rotations.yaw(readings.torso_quaternion)
-    return yaw.__array_namespace__().stack([x, y, yaw], axis=-1)
+    numpy, yaw = readings.posture.__array_namespace__(), rotations.yaw(readings.torso_quaternion)
+    return numpy.stack([*(component(readings.frame_position, i) for i in (0, 1)), yaw], axis=-1)

@@ -289,10 +289,15 @@ class Walk(Task):
 
     def after(self, memory: Memory, readings: Readings) -> Memory:
         """Advance the clock, and measure the step's progress and which feet were wrong."""
-        tick, x = memory.tick + 1, component(readings.frame_position, 0) + 0.0
+        tick = memory.tick + 1
+        return self.measured(memory, readings, tick, self.clock.at(self.clock.stance, tick))
+
+    def measured(self, memory: Memory, readings: Readings, tick, stance) -> Memory:
+        """Return the memory after a step, given the clock's tick (...) and the feet that are to stand (..., feet)."""
+        x = component(readings.frame_position, 0) + 0.0
         way = x - memory.x
         on_ground = readings.foot_heights < self.parameters.stance_threshold
-        wrong_feet = (on_ground != self.clock.at(self.clock.stance, tick)).sum(axis=-1, dtype=float)
+        wrong_feet = (on_ground != stance).sum(axis=-1, dtype=float)
         return memory._replace(
             tick=tick,
             x=x,

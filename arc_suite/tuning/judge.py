@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.cpg.demonstrator import Prescribed, felt
+from arc_suite.cpg.demonstrator import Prescribed
+from arc_suite.cpg.law import felt
 from arc_suite.cpg.presets import Preset
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots.spec import Body
@@ -67,7 +68,7 @@ class Judge:
     def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> Score:
         """Play the episodes of these seeds, which are the same for all presets."""
         count, episodes = self._shape
-        split = self._environment.task.split
+        split, joints = self._environment.task.split, len(self._body.joint_names)
         controls = [Prescribed.fit(self._body, preset) for preset in presets]
         control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
         observations, _ = self._environment.reset(seed=[*seeds] * count)
@@ -75,13 +76,13 @@ class Judge:
         totals, lengths, tipping = np.zeros((3, upright.size))
         style = dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
-            actions = control(np.full(upright.size, step), *felt(split(observations)))
+            actions = control(np.full(upright.size, step), *felt(split(observations), joints))
             observations, rewards, fallen, _, info = self._environment.step(actions)
             totals += rewards * upright
             lengths += upright
-            uprightness = rotations.upright(felt(split(observations))[0])
-            terms = info.get("reward_terms", dict.fromkeys(TERMS, 0.0))  # not there if all rows start anew
-            costs = {name: terms[name] for name in TERMS} | {"tilt": 1.0 - uprightness**2}
+            uprightness = rotations.upright(felt(split(observations), joints)[0])
+            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all rows start anew
+            costs["tilt"] = 1.0 - uprightness**2
             for name, cost in costs.items():
                 style[name] += cost * upright
             tipping = np.where(upright, np.maximum(tipping, np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)), tipping)

@@ -26,6 +26,7 @@ def test_table_of_all_robots():
         assert rows[robot].split()[7] == f"{returns.paper:.0f}"
 
 
+@pytest.mark.slow
 def test_figures_of_a_demonstrator():
     result = evaluate("--robot", "queen", "--policy", "cpg", "--preset", "medium", "--episodes", "2")
     assert result.returncode == 0, result.stderr

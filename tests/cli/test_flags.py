@@ -22,6 +22,7 @@ def run(tool, *arguments, cwd=None):
     return programs.run(ROOT / "tools" / tool, *arguments, cwd=cwd)
 
 
+@pytest.mark.slow
 def test_evaluate_takes_a_spec_and_a_body_made_to_order():
     done = run("evaluate.py", "--spec", SPIDER, "--episodes=1")
     fields = done.stdout.splitlines()[-1].split()

@@ -53,6 +53,7 @@ def test_png_of_the_demonstrator_is_a_gait_cycle(tmp_path):
     assert os.listdir(tmp_path) == ["queen.png"]
 
 
+@pytest.mark.slow
 def test_png_of_any_other_policy_is_one_view(tmp_path):
     done = render(tmp_path, "--robot=tick", "--policy=zero", "--steps=0", "--output=tick.PNG")
     assert (done.returncode, done.stdout) == (0, "tick: return 0.0 in 0 steps\nwrote tick.PNG\n")

@@ -109,11 +109,12 @@ def test_types_of_a_reset_and_a_step(env_id):
     observation, reward, terminated, truncated, info = env.step(actions(env, 1)[0])
     assert observation.dtype == np.float32 and observation in env.observation_space
     assert [type(value) for value in (reward, terminated, truncated)] == [float, bool, bool]
-    assert list(info) == ["reward_terms", "progress"] and list(info["reward_terms"]) == list(WEIGHTS)
-    assert {type(term) for term in info["reward_terms"].values()} == {float}
+    figures = ["progress_speed", "progress_gait_compliance"]
+    assert list(info) == [f"reward_{name}" for name in WEIGHTS] + figures
+    assert {type(figure) for figure in info.values()} == {float}
     assert json.loads(json.dumps(info)) == info
     weights = env.unwrapped.task.settings.weights
-    assert reward == pytest.approx(sum(weights[name] * term for name, term in info["reward_terms"].items()), abs=1e-12)
+    assert reward == pytest.approx(sum(weights[name] * info[f"reward_{name}"] for name in weights), abs=1e-12)
 
 
 @EVERY_ID
@@ -139,7 +140,7 @@ def test_bit_equal_to_the_dm_env(env_id):
                 observation, reward, terminated, _, info = env.step(action)
                 timestep = environment.step(action)
                 assert reward == timestep.reward and terminated == (timestep.discount == 0.0)
-                assert info["reward_terms"] == environment.task.terms
+                assert {name: info[f"reward_{name}"] for name in WEIGHTS} == environment.task.terms
             assert_same(observation, np.concatenate(list(timestep.observation.values())).astype(np.float32))
             if timestep.last():
                 break
@@ -172,6 +173,10 @@ def test_bad_seeds_are_one_line_and_change_nothing(seed):
     with pytest.raises(ValueError) as caught:
         arc_suite.load("leaper", "walk", {"random": seed})
     assert str(caught.value) == f"seed: expected an integer from 0 to 4294967295, got {seed!r}"
+
+
+def test_np_random_seed_is_that_of_the_task_too():
+    assert gymnasium.make(IDS[3], task_kwargs={"random": 7}).unwrapped.np_random_seed == 7
 
 
 def test_np_random_is_the_stream_of_resets():
@@ -281,7 +286,7 @@ def test_fall_terminates(env_id):
     env.reset(seed=0)
     fell(env)
     _, _, terminated, truncated, info = env.step(actions(env, 1)[0])
-    assert (terminated, truncated, info["reward_terms"]["healthy"]) == (True, False, 0.0)
+    assert (terminated, truncated, info["reward_healthy"]) == (True, False, 0.0)
 
 
 NEEDS_RESET = "cannot step: the episode has ended or has not begun; call reset first"
@@ -341,6 +346,38 @@ def test_bad_actions_change_nothing(action, message):
         env.step(action)
     assert str(caught.value) == message
     assert_same(env.step(actions(env, 1)[0]), same.step(actions(env, 1)[0]))
+
+
+@pytest.mark.parametrize(
+    ("action", "kind"),
+    [
+        ([10**400] * 12, "list"),
+        ([0.5] * 11 + [10**400], "list"),
+        ([1j] * 12, "list"),
+        (np.zeros(12, complex), "ndarray of complex128"),
+        (["1"] * 12, "list"),
+        (np.zeros(12, "M8[s]"), "ndarray of datetime64[s]"),
+        (np.zeros(12, "m8[s]"), "ndarray of timedelta64[s]"),
+        (np.zeros(12, object), "ndarray of object"),
+        (np.ma.masked_array(np.zeros(12), mask=[True] + [False] * 11), "MaskedArray of float64"),
+        (None, "NoneType"),
+    ],
+)
+def test_actions_that_are_no_real_numbers_are_refused(action, kind, recwarn):
+    env = gymnasium.make(IDS[1]).unwrapped
+    env.reset(seed=0)
+    with pytest.raises(ValueError) as caught:
+        env.step(action)
+    assert str(caught.value) == f"action: expected 12 numbers, got {kind}"
+    assert not recwarn
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.longdouble, int, np.uint8, bool, list])
+def test_real_numbers_of_all_kinds_are_actions(dtype):
+    env, same = gymnasium.make(IDS[1]).unwrapped, gymnasium.make(IDS[1]).unwrapped
+    env.reset(seed=0), same.reset(seed=0)
+    given = [1.0] * 12 if dtype is list else np.ones(12, dtype)
+    assert_same(env.step(given), same.step(np.ones(12)))
 
 
 def test_actions_out_of_range_are_clipped():
@@ -423,12 +460,18 @@ def test_pictures(env_id):
 
 
 @pytest.mark.parametrize("size", [{"width": 0}, {"height": -3}, {"width": 100_000}, {"height": 2.5}])
-def test_impossible_sizes_are_one_line(size):
-    env = gymnasium.make(IDS[0], render_mode="rgb_array", **size)
-    env.reset()
+@pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])
+def test_impossible_sizes_are_one_line_when_the_environment_is_made(make, size):
     ((name, value),) = size.items()
     with pytest.raises(ValueError, match=rf"^{name}: expected an integer from 1 to \d+, got {value}$"):
-        env.render()
+        make(IDS[0], render_mode="rgb_array", **size)
+
+
+def test_pictures_of_1920_x_1080():
+    env = gymnasium.make(IDS[0], render_mode="rgb_array", width=1920, height=1080)
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture.shape == (1080, 1920, 3) and picture.std() > 5
 
 
 def test_render_collection():
@@ -465,7 +508,7 @@ def rollout(envs, seed, steps=25):
     collected = [envs.reset(seed=seed)[0]]
     for action in np.random.default_rng(0).uniform(-1, 1, (steps, *envs.action_space.shape)).astype(np.float32):
         observations, rewards, _, _, infos = envs.step(action)
-        collected += [observations.copy(), rewards, infos["reward_terms"]["forward"].copy()]
+        collected += [observations.copy(), rewards, infos["reward_forward"].copy()]
     envs.close()
     return collected
 
@@ -484,7 +527,7 @@ def test_vector_env_is_its_rows(env_id):
             observation, reward, terminated, _, info = env.step(action)
             assert_same(collected[3 * step + 1][row], observation)
             assert collected[3 * step + 2][row] == reward
-            assert collected[3 * step + 3][row] == info["reward_terms"]["forward"]
+            assert collected[3 * step + 3][row] == info["reward_forward"]
             if terminated:
                 break
 

@@ -39,6 +39,7 @@ def package(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_guide(package):
     checks = (
         "assert picture.shape == (480, 640, 3) and picture.std() > 5 and environments.num_envs == 8\n"

@@ -95,7 +95,11 @@ CASES = [
     (lambda w: w.rows.step(np.zeros((2, 12))), "action: expected shape (3, 12), got (2, 12)"),
     (lambda w: w.rows.step([ZEROS, ZEROS, NAN]), "action[2, 7]: expected a number from -1 to 1, got nan"),
     (lambda w: w.rows.step("walk"), "action: expected 3 x 12 numbers, got str"),
-    (lambda w: w.rows.step(None), "action: expected shape (3, 12), got ()"),
+    (lambda w: w.rows.step(None), "action: expected 3 x 12 numbers, got NoneType"),
+    (lambda w: w.dm.step([10**400] * 12), "action: expected 12 numbers, got list"),
+    (lambda w: w.env.step(np.zeros(12, complex)), "action: expected 12 numbers, got ndarray of complex128"),
+    (lambda w: w.rows.step(np.ma.zeros((3, 12))), "action: expected 3 x 12 numbers, got MaskedArray of float64"),
+    (lambda w: w.rows.step([["0"] * 12] * 3), "action: expected 3 x 12 numbers, got list"),
     (lambda w: w.dm.physics.step(0), "nstep: expected an integer from 1, got 0"),
     # Commands.
     (lambda w: w.dm.command("command", [0.5, 0, 0]), "command 'command': task walk has no commands"),
@@ -107,6 +111,10 @@ CASES = [
     (
         lambda w: w.steer.command("command", [0, 0, np.inf]),
         "command 'command': expected 3 finite numbers, got [0, 0, inf]",
+    ),
+    (
+        lambda w: w.steer.command("command", ["1", "0", "0"]),
+        "command 'command': expected 3 finite numbers, got ['1', '0', '0']",
     ),
     # Seeds.
     (lambda w: w.env.reset(seed=[1]), f"{SEED} [1]"),
@@ -128,12 +136,28 @@ CASES = [
     (lambda w: policies.alone(policies.policy("random", "queen"), seed=-1), f"{SEED} -1"),
     # Ids.
     (lambda w: arc_suite.load("Queen", "walk"), f"unknown domain 'Queen'; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: arc_suite.load(7, "walk"), f"unknown domain 7; did you mean 'tick'? {DOMAINS}"),
+    (lambda w: arc_suite.load(7, "walk"), f"unknown domain 7 {DOMAINS}"),
     (lambda w: arc_suite.load(["queen"], "walk"), f"unknown domain ['queen']; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: arc_suite.load("queen", None), f"unknown task None; did you mean 'steer'? {TASK_NAMES}"),
+    (lambda w: arc_suite.load("queen", None), f"unknown task None {TASK_NAMES}"),
     (
         lambda w: arc_suite.load("creature:hopper", "walk"),
         "domain 'hopper': cannot import creature: No module named 'creature'",
+    ),
+    (
+        lambda w: arc_suite.load("..:queen", "walk"),
+        "domain '..:queen': expected module:name, with a module that can be imported",
+    ),
+    (
+        lambda w: arc_suite.load(":queen", "walk"),
+        "domain ':queen': expected module:name, with a module that can be imported",
+    ),
+    (
+        lambda w: arc_suite.load("os:queen", "walk"),
+        "domain 'os:queen': queen is the suite's own, expected without a module",
+    ),
+    (
+        lambda w: arc_suite.load("queen", "json:walk"),
+        "task 'json:walk': walk is the suite's own, expected without a module",
     ),
     (make(domain_name="bastoin"), f"unknown domain 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (rows(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
@@ -145,9 +169,11 @@ CASES = [
         "unknown camera 'prtrait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
     ),
     (rows(camera_id=9), f"no camera 9: expected -1 (free) to 2, or one of {CAMERAS}"),
-    (lambda w: w.dm.physics.render(0, 32), "height: expected an integer from 1 to 960, got 0"),
-    (lambda w: w.dm.physics.render(24, 99999), "width: expected an integer from 1 to 1280, got 99999"),
-    (lambda w: w.dm.physics.render(24, "32"), "width: expected an integer from 1 to 1280, got '32'"),
+    (lambda w: w.dm.physics.render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
+    (lambda w: w.dm.physics.render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),
+    (lambda w: w.dm.physics.render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),
+    (make(width=-1), "width: expected an integer from 1 to 3840, got -1"),
+    (rows(height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
     (lambda w: w.rows.render([5]), "rows: expected integers from 0 to 2, got 5"),
     (lambda w: w.rows.render(["a"]), "rows: expected integers from 0 to 2, got 'a'"),
     # Presets and policies.
@@ -171,7 +197,7 @@ CASES = [
     ),
     (
         lambda w: policies.policy(None, "queen"),
-        "unknown policy None; did you mean 'zero'? (there are: cpg, zero, random)",
+        "unknown policy None (there are: cpg, zero, random)",
     ),
     (lambda w: policies.policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
     (lambda w: policies.policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),
@@ -198,29 +224,42 @@ CASES = [
     (walk(weights={"forward": None}), "weights['forward']: expected a number from -1e+06 to 1e+06, got None"),
     (
         walk(on_divergence="ignore"),
-        "unknown on_divergence 'ignore'; did you mean 'raise'? (there are: raise, terminate)",
+        "unknown on_divergence 'ignore' (there are: raise, terminate)",
     ),
-    (walk(gait=7), f"unknown gait 7; did you mean 'wave'? {GAITS}"),
+    (walk(gait=7), f"unknown gait 7 {GAITS}"),
     (lambda w: arc_suite.load("queen", "walk", [1]), "task_kwargs: expected a mapping of names to values, got [1]"),
     (
         lambda w: arc_suite.load("queen", "walk", None, "flat"),
         "environment_kwargs: expected a mapping of names to values, got 'flat'",
+    ),
+    (
+        lambda w: arc_suite.load("queen", "walk", None, {"control_timestep": 0.02}),
+        "environment setting 'control_timestep': reward and observation are made for control steps of 25 substeps",
+    ),
+    (
+        lambda w: arc_suite.load("queen", "walk", None, {"time_limit": 5}),
+        "environment setting 'time_limit': it is a setting of the task: task_kwargs={'time_limit': seconds}",
+    ),
+    (
+        lambda w: arc_suite.load("queen", "walk", None, {"flat_observations": True}),
+        "unknown environment setting 'flat_observations'; did you mean 'flat_observation'? "
+        "(there are: flat_observation)",
     ),
     (walk(arena="bumpy"), "unknown arena 'bumpy'; did you mean 'bumps'? (there are: flat, bumps)"),
     (rows(num_envs=2.5), "num_envs: expected an integer from 1, got 2.5"),
     (rows(num_threads="all"), "num_threads: expected an integer from 1, got 'all'"),
     (rows(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
     (
-        rows(autoreset_mode="Disabled"),
-        "unknown autoreset_mode 'Disabled'; did you mean 'SameStep'? (there are: NextStep, SameStep)",
+        rows(autoreset_mode="SomeStep"),
+        "unknown autoreset_mode 'SomeStep'; did you mean 'SameStep'? (there are: NextStep, SameStep, Disabled)",
     ),
     (
         rows(task_kwargs={"on_divergence": "raise"}),
-        "unknown on_divergence of rows 'raise'; did you mean 'terminate'? (there are: terminate)",
+        "unknown on_divergence of rows 'raise' (there are: terminate)",
     ),
     (
         make(render_mode="ansi"),
-        "unknown render_mode 'ansi'; did you mean 'rgb_array'? (there are: rgb_array, depth_array)",
+        "unknown render_mode 'ansi' (there are: rgb_array, depth_array)",
     ),
 ]
 

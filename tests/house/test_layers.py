@@ -51,6 +51,7 @@ THIRD_PARTY = {
     "tasks": {"numpy"},
     "registry": set(),
     "envs": {"numpy", "mujoco", "dm_control", "dm_env", "gymnasium", "shimmy", "glfw"},
+    "envs.sb3": {"numpy", "gymnasium", "stable_baselines3"},
     "cpg": {"numpy"},
     "cpg.presets": set(),
     "registration": {"gymnasium"},
@@ -169,7 +170,8 @@ def test_only_tasks_and_registration_know_one_task_from_another():
 
 
 def test_import_is_light():
-    code = "import sys, arc_suite; print([m for m in ('torch', 'shimmy', 'matplotlib', 'imageio') if m in sys.modules])"
+    heavy = ("torch", "stable_baselines3", "shimmy", "matplotlib", "imageio")
+    code = f"import sys, arc_suite; print([m for m in {heavy} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
     assert result.stderr == ""

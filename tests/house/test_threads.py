@@ -6,6 +6,7 @@ import threading
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.utils.env_checker import data_equivalence
 
 import arc_suite
 
@@ -27,28 +28,38 @@ def test_an_environment_for_each_thread():
         np.testing.assert_array_equal(state, own_state)
 
 
-@pytest.mark.parametrize("call", ["step", "reset", "render"])
-def test_two_threads_cannot_use_one_vector_environment(call, monkeypatch):
-    envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2, render_mode="rgb_array")
-    twin = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2)
-    actions = np.zeros((2, 18))
-    envs.reset(seed=0), twin.reset(seed=0)
+ID = "arc_suite/tick-walk-v0"
+FACES = {
+    "dm": lambda: arc_suite.load("tick", "walk", {"random": 0}),
+    "env": lambda: gymnasium.make(ID, task_kwargs={"random": 0}).unwrapped,
+    "rows": lambda: gymnasium.make_vec(ID, num_envs=2, render_mode="rgb_array", task_kwargs={"random": 0}),
+}
+CALLS = {"dm": ("step", "reset"), "env": ("step", "reset", "close"), "rows": ("step", "reset", "render", "close")}
+
+
+@pytest.mark.parametrize(("face", "call"), [(face, call) for face, calls in CALLS.items() for call in calls])
+def test_two_threads_cannot_use_one_environment(face, call, monkeypatch):
+    shared, twin = FACES[face](), FACES[face]()
+    actions = np.zeros((2, 18) if face == "rows" else 18)
+    shared.reset(), twin.reset()
     inside, leave = threading.Event(), threading.Event()
-    step = envs.batch.step
+    simulation = shared.batch if face == "rows" else shared.physics
+    step = simulation.step
 
     def slow_step(*args):
         inside.set()
         assert leave.wait(20)
         return step(*args)
 
-    monkeypatch.setattr(envs.batch, "step", slow_step)
+    monkeypatch.setattr(simulation, "step", slow_step)
     with concurrent.futures.ThreadPoolExecutor(1) as pool:
-        stepping = pool.submit(envs.step, actions)
+        stepping = pool.submit(shared.step, actions)
         assert inside.wait(20)
         with pytest.raises(RuntimeError) as error:
-            getattr(envs, call)(*([actions] if call == "step" else []))
+            getattr(shared, call)(*([actions] if call == "step" else []))
         leave.set()
-        observations = stepping.result()[0]
+        result = stepping.result()
     assert str(error.value) == f"cannot {call}: another thread is using this environment; make one for each thread"
-    np.testing.assert_array_equal(observations, twin.step(actions)[0])
-    np.testing.assert_array_equal(envs.step(actions)[0], twin.step(actions)[0])
+    assert data_equivalence(result, twin.step(actions), exact=True)
+    assert data_equivalence(shared.step(actions), twin.step(actions), exact=True)
+    shared.close()

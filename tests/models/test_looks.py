@@ -130,6 +130,7 @@ def test_pictures_follow_the_simulation_and_leave_it_alone():
     environment.close()
 
 
+@pytest.mark.slow
 def test_the_largest_picture_is_at_least_1280_by_960():
     environment = arc_suite.load("leaper", "walk")
     environment.reset()

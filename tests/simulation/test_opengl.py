@@ -138,6 +138,7 @@ def script(code, *arguments):
     return done.stdout.splitlines()
 
 
+@pytest.mark.slow
 def test_import_opens_nothing():
     code = (
         "import sys, threading, arc_suite, dm_control.suite\n"

@@ -9,8 +9,8 @@ from synthetic import DT, synthetic
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.demonstrator import felt, pattern
-from arc_suite.cpg.law import joint_targets, torques
+from arc_suite.cpg.demonstrator import pattern
+from arc_suite.cpg.law import felt, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
@@ -30,7 +30,7 @@ class Scripted:
         self.clock = 0
 
     def act(self, observation, rewards):
-        _, angles, velocities = felt(observation)
+        _, angles, velocities = felt(observation, len(self.pattern.offset))
         targets = joint_targets(self.pattern, np.full(1, DT * self.clock))
         self.clock += 1
         if self.cheat == "stand":

@@ -1,5 +1,7 @@
 """Steer: commands that are drawn, held, set from outside and obeyed."""
 
+import types
+
 import gymnasium
 import numpy as np
 import pytest
@@ -7,6 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
 from arc_suite import rotations
+from arc_suite.cpg import Demonstrator
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import steer
 
 
@@ -34,8 +39,8 @@ def test_the_schedule_holds_each_command_and_begins_again():
     assert held.min() >= 60 and held.max() <= 160
     for command, end, length in zip(memory.schedule, memory.ends, held, strict=True):
         for tick in (end - length, end - 1):
-            assert_array_equal(task.wanted(memory._replace(tick=int(tick))), command)
-    assert_array_equal(task.wanted(memory._replace(tick=int(memory.ends[-1]))), memory.schedule[0])
+            assert_array_equal(task.wanted(memory._replace(steps=int(tick))), command)
+    assert_array_equal(task.wanted(memory._replace(steps=int(memory.ends[-1]))), memory.schedule[0])
 
 
 def test_the_command_is_observed_and_changes_on_schedule():
@@ -140,16 +145,75 @@ def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, mess
     rows.close()
 
 
-def test_an_obedient_body_earns_what_a_standing_one_does_not():
-    """With the command straight ahead, a demonstrator that walks straight is far better than none."""
-    from arc_suite.cpg import Demonstrator
-
-    totals = {}
-    for name, policy in (("tuned", Demonstrator("tick", "tuned")), ("none", lambda timestep: np.zeros(18))):
-        environment = arc_suite.load("tick", "steer", {"random": 0})
-        timestep, totals[name] = environment.reset(), 0.0
+def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
+    earned = {}
+    for preset in ("steered", "tuned", None):
+        rows = VectorEnv("tick", "steer", 6)
+        policy = Demonstrator("tick", preset) if preset else None
+        observations, _ = rows.reset(seed=0)
+        total = 0.0
         for _ in range(300):
-            environment.command("command", (1.0, 0.0, 0.0))
+            blocks = rows.task.split(observations)
+            actions = policy.act(blocks) if policy else np.zeros(rows.action_space.shape)
+            observations, rewards, *_ = rows.step(actions)
+            total += rewards.sum()
+        earned[preset] = total
+        rows.close()
+    assert earned[None] < 0.55 * earned["steered"]
+    assert earned["tuned"] < 0.45 * earned["steered"]
+
+
+def test_at_a_stop_all_feet_are_to_stand_and_the_clock_rests():
+    environment, policy = arc_suite.load("queen", "steer", {"random": 0}), Demonstrator("queen", "steered")
+    timestep = environment.reset()
+    for steps, command in ((40, (1.0, 0.0, 0.0)), (80, (0.0, 0.0, 0.0))):
+        environment.command("command", command)
+        for _ in range(steps):
             timestep = environment.step(policy(timestep))
-            totals[name] += environment.task.terms["tracking"]
-    assert totals["tuned"] > 150.0 > 10.0 > totals["none"]
+    memory = environment.task.memory
+    assert (memory.tick, memory.steps) == (40, 120)
+    assert_array_equal(timestep.observation["gait_clock"], [0.0, 0.0])
+    assert environment.task.terms["gait_cost"] == 0.0, "it stands, as it is to"
+    assert environment.task.terms["tracking"] > 0.95
+    assert environment.task.terms["obedient_gait"] == environment.task.terms["tracking"]
+
+
+@pytest.mark.parametrize("robot", ["queen", "leaper"])
+def test_nothing_tells_where_the_body_heads(robot):
+    """The same state, turned about the vertical: the same observation."""
+    environment = arc_suite.load(robot, "steer", {"random": 3})
+    environment.reset()
+    for _ in range(10):
+        environment.step(np.full(len(ROBOTS[robot].joint_names), 0.1))
+    task, memory, turn = environment.task.definition, environment.task.memory, 1.234
+    data = types.SimpleNamespace(**{name: getattr(environment.physics.data.ptr, name).copy() for name in task.reads})
+    before = task.observe(memory, task.read(data))
+    data.qpos[3:7] = rotations.turned(data.qpos[3:7], turn)
+    for array in (
+        data.qpos[None, :2],
+        data.qvel[None, :2],
+        data.xpos[:, :2],
+        data.cfrc_ext[:, :2],
+        data.cfrc_ext[:, 3:5],
+    ):
+        array[:] = rotations.headed(array.copy(), -turn)
+    assert np.abs(before["contact_forces"]).max() > 0.01
+    for name, block in task.observe(memory, task.read(data)).items():
+        assert_allclose(block, before[name], atol=1e-12, err_msg=name)
+
+
+def test_the_same_shape_earns_the_same_at_any_size():
+    """Costs, commands and contact forces have no scale."""
+    returns = []
+    for scale in (0.1, 1.0, 10.0):
+        body = generator.scaled(generator.generate(6, 3), scale)
+        environment, policy = (
+            arc_suite.load(body, "steer", {"random": 1, "base_noise": 0.0}),
+            Demonstrator(body, "steered"),
+        )
+        timestep, total = environment.reset(), 0.0
+        for _ in range(200):
+            timestep = environment.step(policy(timestep))
+            total += timestep.reward
+        returns.append(total)
+    assert returns == pytest.approx([returns[1]] * 3, rel=0.02)

@@ -26,7 +26,7 @@ def test_judge_plays_the_episodes_of_ordinary_environments():
                 action = policy.act(environment.unwrapped.task.split(observation))
                 observation, reward, _, _, info = environment.step(action)
                 total += reward
-                smoothness += info["reward_terms"]["smoothness"]
+                smoothness += info["reward_smoothness"]
                 mujoco.mju_rotVecQuat(axis, (0.0, 0.0, 1.0), observation[1:5].astype(float))
                 tilt += axis[0] ** 2 + axis[1] ** 2
             assert_allclose(score.rewards[row, episode], total / 30, rtol=1e-12)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from dm_control import mjcf
 
-MAX_WIDTH, MAX_HEIGHT = 1280, 960  # pixels of the largest picture
+MAX_WIDTH, MAX_HEIGHT = 3840, 2160  # pixels of the largest picture
 
 _SKY = {"rgb1": (0.20, 0.28, 0.40), "rgb2": (0.62, 0.68, 0.74)}
 _HORIZON = tuple((top + bottom) / 2.0 for top, bottom in zip(_SKY["rgb1"], _SKY["rgb2"], strict=True))

@@ -1,0 +1,88 @@
+"""Demonstrators that follow a command: how well, on robots and on any body."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import arc_suite
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.steering import MANNERS
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS, generator
+
+# Forward, left and turning, in the body's own units.
+COMMANDS = np.array(
+    [
+        (1.0, 0.0, 0.0),
+        (0.4, 0.0, 0.0),
+        (-0.7, 0.0, 0.0),
+        (0.0, 0.5, 0.0),
+        (0.0, -0.5, 0.0),
+        (0.0, 0.0, 1.0),
+        (0.0, 0.0, -1.0),
+        (0.7, 0.0, 0.5),
+        (0.6, 0.4, 0.0),
+        (0.0, 0.0, 0.0),
+    ]
+)
+
+
+def obeyed(body, preset="steered", steps=300):
+    """Mean motion (commands, 3) over the steps after the first hundred, and who fell."""
+    rows = VectorEnv(body, "steer", len(COMMANDS))
+    policy = Demonstrator(body, preset)
+    rows.reset(seed=0)
+    rows.command("command", COMMANDS)
+    observations, fell, motions = rows.step(np.zeros(rows.action_space.shape))[0], np.zeros(len(COMMANDS), bool), []
+    for step in range(steps):
+        observations, _, terminated, *_ = rows.step(policy.act(rows.task.split(observations)))
+        fell |= terminated
+        if step >= 100:
+            motions.append(rows.task.split(observations)["command"][:, 3:])
+    rows.close()
+    return np.mean(motions, axis=0), fell
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_robots_obey(robot):
+    motion, fell = obeyed(ROBOTS[robot])
+    assert not fell.any()
+    assert (abs(motion - COMMANDS).mean(axis=0) <= (0.035, 0.03, 0.03)).all(), abs(motion - COMMANDS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 4, 5, 6])
+def test_random_bodies_obey(seed):
+    motion, fell = obeyed(generator.random_body(seed))
+    assert not fell.any()
+    assert abs(motion - COMMANDS).mean() <= 0.05
+
+
+def test_an_open_loop_does_not():
+    motion, _ = obeyed(ROBOTS["queen"], "tuned", 150)
+    assert abs(motion - COMMANDS).mean() > 0.2
+
+
+def test_rows_are_single_demonstrators():
+    rows, policy = VectorEnv("tick", "steer", 3), Demonstrator("tick", "steered")
+    single = arc_suite.load("tick", "steer")
+    alone = Demonstrator("tick", "steered")
+    observations, timestep = rows.reset(seed=4)[0], single.reset(5)
+    for step in range(30):
+        actions = policy.act({name: block.astype(float) for name, block in rows.task.split(observations).items()})
+        blocks = {name: block.astype(np.float32) for name, block in timestep.observation.items()}
+        assert_array_equal(actions[1], alone(timestep._replace(observation=blocks)), err_msg=f"step {step}")
+        observations, *_ = rows.step(actions)
+        timestep = single.step(actions[1])
+
+
+def test_what_it_needs_and_what_it_cannot_take_is_one_line():
+    environment = arc_suite.load("queen", "walk")
+    for preset in MANNERS:
+        with pytest.raises(ValueError, match="^observation: expected a block command, as the task steer has$"):
+            Demonstrator("queen", preset)(environment.reset())
+        with pytest.raises(ValueError, match="^gait: expected none, as the preset walks in the gait of the task$"):
+            Demonstrator("queen", preset, gait="ripple")
+        with pytest.raises(ValueError, match="^froude: queen has presets alone: "):
+            Demonstrator("queen", preset, froude=0.2)

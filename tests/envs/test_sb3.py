@@ -1,0 +1,86 @@
+"""Rows for stable-baselines3: what its own vector environment makes of single environments."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import data_equivalence
+
+import arc_suite  # noqa: F401 (registers)
+
+vec_env = pytest.importorskip("stable_baselines3.common.vec_env", reason="of the extra `sb3`: make check-clients")
+
+from arc_suite.envs import sb3  # noqa: E402
+
+ID = "arc_suite/tick-walk-v0"
+SETTINGS = {
+    "task_kwargs": {"time_limit": 1.0, "on_divergence": "terminate"},
+    "render_mode": "rgb_array",
+    "width": 32,
+    "height": 24,
+}
+
+
+@pytest.fixture
+def both():
+    rows = sb3.VecEnv(gymnasium.make_vec(ID, num_envs=3, autoreset_mode="SameStep", **SETTINGS))
+    dummy = vec_env.DummyVecEnv([lambda: gymnasium.make(ID, **SETTINGS)] * 3)
+    yield rows, dummy
+    rows.close(), dummy.close()
+
+
+def test_rows_are_stable_baselines_own(both):
+    rows, dummy = both
+    assert (rows.num_envs, rows.render_mode) == (dummy.num_envs, dummy.render_mode)
+    assert (rows.observation_space, rows.action_space) == (dummy.observation_space, dummy.action_space)
+    rows.seed(5), dummy.seed(5)
+    assert data_equivalence(rows.reset(), dummy.reset(), exact=True)
+    assert rows.reset_infos == dummy.reset_infos
+    random, ends, falls = np.random.RandomState(0), 0, 0
+    for _ in range(70):
+        actions = random.uniform(-1, 1, (3, 18)).astype(np.float32)
+        result, expected = rows.step(actions), dummy.step(actions)
+        assert data_equivalence(result[:3], expected[:3], exact=True)
+        for info, wanted in zip(result[3], expected[3], strict=True):
+            assert info.keys() == wanted.keys()
+            for name in info:
+                np.testing.assert_array_equal(info[name], wanted[name])
+                assert type(info[name]) is type(wanted[name])
+        ends += result[2].sum()
+        falls += sum(done and not info["TimeLimit.truncated"] for done, info in zip(result[2], result[3], strict=True))
+    assert ends > falls > 0
+    assert data_equivalence(rows.reset(), dummy.reset(), exact=True)
+    for image, wanted in zip(rows.get_images(), dummy.get_images(), strict=True):
+        np.testing.assert_array_equal(image, wanted)
+    for name in ("render_mode", "np_random_seed", "action_space"):
+        assert rows.get_attr(name) == dummy.get_attr(name)
+        assert rows.get_attr(name, [2, 0]) == dummy.get_attr(name, [2, 0])
+    assert rows.env_is_wrapped(gymnasium.Wrapper) == [False] * 3
+    assert rows.has_attr("task") and not rows.has_attr("nothing")
+
+
+def test_calls_of_rows(both):
+    rows, _ = both
+    rows.set_attr("note", 7)
+    assert rows.get_attr("note") == [7] * 3
+    assert len(rows.env_method("render", indices=[0, 1, 2])) == 3
+    for use in (lambda: rows.set_attr("note", 8, indices=0), lambda: rows.env_method("note", indices=[0])):
+        with pytest.raises(ValueError, match=r"^note: rows share it; expected all 3 rows, got "):
+            use()
+
+
+def test_stable_baselines_wrappers_take_them(both):
+    for wrap in (vec_env.VecMonitor, vec_env.VecNormalize):
+        one, other = (wrap(envs) for envs in both)
+        one.seed(1), other.seed(1)
+        assert data_equivalence(one.reset(), other.reset(), exact=True)
+        for _ in range(25):
+            actions = np.zeros((3, 18), np.float32)
+            assert data_equivalence(one.step(actions)[:3], other.step(actions)[:3], exact=True)
+
+
+def test_other_modes_are_one_line():
+    message = "^stable-baselines3 resets at once: expected rows of this suite made with autoreset_mode='SameStep', got "
+    for rows in (gymnasium.make_vec(ID, num_envs=2), gymnasium.make(ID)):
+        with pytest.raises(ValueError, match=message) as error:
+            sb3.VecEnv(rows)
+        assert "\n" not in str(error.value)
