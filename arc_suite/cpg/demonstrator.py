@@ -95,7 +95,10 @@ class Demonstrator:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
         if timestep.first():
             self._law.begin([0])
-        return self._law.act({name: np.asarray(block)[None] for name, block in timestep.observation.items()})[0]
+        observation = timestep.observation
+        if isinstance(observation, Mapping):
+            observation = {name: np.asarray(block)[None] for name, block in observation.items()}
+        return self._law.act(observation)[0]
 
 
 class OnClock:

@@ -12,7 +12,6 @@ import pytest
 import arc_suite
 from arc_suite import policies
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
@@ -22,7 +21,7 @@ NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = "(there are: walk, steer)"
 DOMAINS = "(there are: queen, bastion, tick, leaper)"
-PRESETS = ", ".join(TUNINGS["bastion"])
+PRESETS = "slow, medium, fast, tuned, steered, surefooted"
 CAMERAS = "['tracking', 'portrait', 'profile']"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
@@ -50,7 +49,7 @@ class World:
         streams = [stream.get_state() for stream in rows._randoms]
         episodes = rows._memory, rows._carries, rows._steps, rows._ended, rows._resting, rows._streams_begin
         return (
-            pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._clock)),
+            pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._law._clock)),
             rows.batch._simulations.state.tobytes(),
             pickle.dumps(np.random.get_state()),
             (dict(ROBOTS), dict(TASKS), set(gymnasium.registry), dict(os.environ), os.getcwd()),

@@ -45,13 +45,16 @@ def test_noise_is_added_to_what_the_policy_does():
         ),
         (
             ("cpg", "queen", "midium"),
-            "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast, tuned)",
+            "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast, tuned, steered, surefooted)",
         ),
         (
             ("cpg", generate(4, 2), "tuned"),
-            "unknown preset 'tuned'; did you mean 'medium'? (there are: slow, medium, fast)",
+            "unknown preset 'tuned' (there are: slow, medium, fast, steered, surefooted)",
         ),
-        (("cpg", "queen", ()), "preset: expected one or more of slow, medium, fast, tuned, got none"),
+        (
+            ("cpg", "queen", ()),
+            "preset: expected one or more of slow, medium, fast, tuned, steered, surefooted, got none",
+        ),
         (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number from 0 to inf, got -0.1"),
         (
             ("cpg", ROBOTS["bastion"].replace(name="queen")),
