@@ -56,9 +56,11 @@ class Demonstrator:
         if not isinstance(preset, Preset):
             presets = presets_of(body)
             preset = presets[checks.name(preset, presets, "preset")]
+        # The numbers of a preset of its own were found for a body, whatever it looks like.
+        hopeless = [] if isinstance(preset, Preset) else [flaw.text for flaw in flaws(body) if flaw.hopeless]
+        if hopeless:
+            raise ValueError(f"{body.name} cannot walk: {hopeless[0]}")
         if isinstance(preset, float):
-            if reason := next((flaw.text for flaw in flaws(body) if flaw.hopeless), None):
-                raise ValueError(f"{body.name} cannot walk: {reason}")
             speed = preset if froude is None else froude
             self._law = OnClock(body, Stride.fit(body, speed, gait or fitted_gait(body)))
         elif froude is not None:

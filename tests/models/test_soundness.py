@@ -123,9 +123,10 @@ def test_a_flaw_is_told_with_what_fits(body, text, hopeless):
 
 @pytest.mark.parametrize(("body", "text"), HOPELESS)
 def test_a_demonstrator_refuses_a_body_that_cannot_walk(body, text):
-    with pytest.raises(ValueError) as error:
-        Demonstrator(body)
-    assert str(error.value) == f"walker_6x3 cannot walk: {text}"
+    for preset in ("medium", "steered"):
+        with pytest.raises(ValueError) as error:
+            Demonstrator(body, preset)
+        assert str(error.value) == f"walker_6x3 cannot walk: {text}"
 
 
 @pytest.mark.parametrize("body", [case[0] for case in DOUBTFUL])

@@ -180,8 +180,8 @@ def test_settings_are_fitted_by_the_documented_formulas():
     assert changed.parameters.target_velocity == 1.0
     assert changed.parameters.healthy_range == (0.1, 2.0)
     assert changed.weights["control"] == -1.0
-    with pytest.raises(ValueError, match="^unknown setting of walk 'target_speed'; did you mean 'target_velocity'"):
-        settings(body, {"target_speed": 1.0})
+    with pytest.raises(ValueError, match="^unknown setting of walk 'target_velocty'; did you mean 'target_velocity'"):
+        settings(body, {"target_velocty": 1.0})
 
 
 def test_numbers_go_by_the_name_of_a_body_that_has_the_joints():
