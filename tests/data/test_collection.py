@@ -49,7 +49,8 @@ def replay(environment, seed, actions):
     for action in actions:
         observation, reward, terminated, truncated, info = environment.step(action)
         observations.append(observation)
-        steps.append((reward, info["reward_terms"], terminated, truncated))
+        terms = {name: info[f"reward_{name}"] for name in environment.unwrapped.task.settings.weights}
+        steps.append((reward, terms, terminated, truncated))
     rewards, terms, terminations, truncations = zip(*steps, strict=True)
     terms = {name: np.array([term[name] for term in terms]) for name in terms[0]}
     return np.array(observations), np.array(rewards), terms, np.array(terminations), np.array(truncations)
