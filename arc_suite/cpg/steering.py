@@ -64,7 +64,7 @@ BUILDS = {
     "queen": Build(lead=0.12),
     "bastion": Build(lead=0.08),
     "tick": Build(lead=0.1),
-    "leaper": Build(share=0.06, level=1.0, sweep=0.8, unload=0.0, lead=0.04),
+    "leaper": Build(share=0.03, level=1.0, sweep=0.8, unload=0.0, lead=0.04),
 }
 
 _ACROSS = 0.1  # how much it matters that a foot does not slip across its way

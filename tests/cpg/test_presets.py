@@ -39,7 +39,7 @@ def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
     environment = arc_suite.load(robot, "walk")
-    episodes = {preset: evaluation.run(environment, Demonstrator(robot, preset), seed=1) for preset in PRESETS}
+    episodes = {preset: evaluation.run(environment, Demonstrator(robot, preset), seed=1) for preset in TUNINGS[robot]}
     assert {episode.length for episode in episodes.values()} == {1000}
     speeds = {preset: episode.progress["speed"] for preset, episode in episodes.items()}
     assert 0.0 < speeds["slow"] < speeds["medium"]
