@@ -52,7 +52,7 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
     Args:
         client: of the page.
         surroundings: variables of the code's environment.
-        folder: for its scripts.
+        folder: for its scripts, and for what they write where they run.
 
     Returns:
         What is wrong, in one line.
@@ -61,11 +61,11 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
     python = venv / "bin" / "python"
     packages = [part for package in client.packages for part in _of_this_repository(package)]
     commands = [[_ROOT / "tools" / "ensure_venv.sh", venv], [python, "-m", "pip", "install", "-q", *packages]]
-    wrong = next(filter(None, (_run(command, os.environ) for command in commands)), "")
+    wrong = next(filter(None, (_run(command, os.environ, _ROOT) for command in commands)), "")
     for block in client.blocks if not wrong else ():
         script = folder / "block.py"
         script.write_text(block)
-        wrong = wrong or _run([python, script], surroundings)
+        wrong = wrong or _run([python, script], surroundings, folder)
     return wrong
 
 
@@ -74,9 +74,9 @@ def _of_this_repository(package: str) -> list[str]:
     return ["-e", f"{_ROOT}{extras}"] if package.startswith("arc_suite") else [package]
 
 
-def _run(command: list, surroundings: Mapping[str, str]) -> str:
+def _run(command: list, surroundings: Mapping[str, str], folder: pathlib.Path) -> str:
     """What is wrong with a command, in one line."""
-    done = subprocess.run(command, env=dict(surroundings), capture_output=True, text=True)
+    done = subprocess.run(command, cwd=folder, env=dict(surroundings), capture_output=True, text=True)
     lines = done.stderr.strip().splitlines() or ["no message"]
     return f"{' '.join(map(str, command))}: status {done.returncode}: {lines[-1]}" if done.returncode else ""
 

@@ -98,7 +98,7 @@ def _real(value) -> np.ndarray | None:
     """The value as floats; None where it holds anything but real numbers, or hides some of them."""
     try:
         array = np.asarray(value)
-        if array.dtype.kind in _NOT_REAL or isinstance(value, np.ma.MaskedArray):
+        if array.dtype.kind in _NOT_REAL or (array is not value and isinstance(value, np.ma.MaskedArray)):
             return None
         return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):
