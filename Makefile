@@ -2,7 +2,8 @@
 # make check   lint and the fast tests: after every edit
 # make test    installs everything, runs all tests, on all cores
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
-# make check-sb3  stable-baselines3's checker and a short SAC run, in an environment of their own
+# make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
+# make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make census  walks 500 random bodies and tells which do
@@ -14,7 +15,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-jax bench census soak mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients check-jax bench census soak mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -59,8 +60,13 @@ check-sb3: VENV := .venv-sb3
 check-sb3: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q '$(TORCH)'
-	$(VENV)/bin/python -m pip install -q -e '.[sb3]'
+	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
+	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py
+
+check-clients: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) tools/check_clients.py
 
 check-jax: VENV := .venv-jax
 check-jax: setup.cfg

@@ -1,11 +1,19 @@
 #!/bin/sh
-# Makes a virtual environment: ensure_venv.sh FOLDER. Debian ships Python without what venv needs;
-# that is installed where we may.
+# Makes a virtual environment: ensure_venv.sh FOLDER, with the first Python on the path that dm_control runs on.
+# Debian ships Python without what venv needs; that is installed where we may.
 set -eu
 folder=$1
-python=$(command -v python3.11 || command -v python3) || { echo "arc_suite needs Python 3.11 or later" >&2; exit 1; }
-"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
-    { echo "arc_suite needs Python 3.11 or later; $python is $("$python" -V)" >&2; exit 1; }
+fits() {
+    "$1" -c 'import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))' 2>/dev/null
+}
+for python in python3.11 python3.12 python3 none; do
+    ! fits "$python" || break
+done
+if [ "$python" = none ]; then
+    found=$(python3 -V 2>/dev/null || echo "no Python")
+    echo "arc_suite needs Python 3.11 or 3.12, found $found: install one, such as by 'uv python install 3.12', or see 'Python 3.13' in the README" >&2
+    exit 1
+fi
 if ! "$python" -c 'import ensurepip' 2>/dev/null; then
     "$(dirname "$0")/ensure_packages.sh" python3-venv
 fi

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import inspect
 import io
 import os
 import re
@@ -25,13 +26,14 @@ _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name
 _VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
 
 
-def run(main: Callable[[], int | None], name: str | None = None, arguments: Sequence[str] | None = None) -> NoReturn:
+def run(main: Callable[..., int | None], name: str | None = None, arguments: Sequence[str] | None = None) -> NoReturn:
     """Parse arguments into absl's flags, call `main` and exit the process, with errors as `guard` shows them.
 
     `--help` prints the docstring of the module of `main`, and the flags of that module and of this package.
 
     Args:
-        main: reads `absl.flags.FLAGS`; takes nothing, returns an exit status or None.
+        main: reads `absl.flags.FLAGS`; takes what is no flag, each with a default, and returns an exit
+            status or None.
         name: how errors name the program; None for the file name of the running script.
         arguments: to parse; None for those of the command line.
     """
@@ -44,9 +46,10 @@ def run(main: Callable[[], int | None], name: str | None = None, arguments: Sequ
             return print(_help(sys.modules[main.__module__], name is None))
         if _VERSION.value:
             return print(VERSION)
-        if rest:
-            raise ValueError(f"unexpected argument {rest[0]!r}; see --help")
-        return main()
+        places = len(inspect.signature(main).parameters)
+        if len(rest) > places:
+            raise ValueError(f"unexpected argument {rest[places]!r}; see --help")
+        return main(*rest)
 
     guard(work, name or Path(script).name)
 

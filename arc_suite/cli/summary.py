@@ -1,12 +1,13 @@
 """A body in a few figures."""
 
 from arc_suite.envs.scene import prepared
+from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 
 
 def summary(body: Body) -> str:
-    """Return a table of what a body is and how it is to walk, as text of several lines."""
+    """Return a table of what a body is, how it is to walk and what keeps it from that, as text of several lines."""
     pose, (task, _) = standing(body), prepared(body, "walk")
     parameters = task.parameters
     links = sorted({len(leg.joints) for leg in body.legs})
@@ -24,4 +25,5 @@ def summary(body: Body) -> str:
         "gait": f"{parameters.gait_frequency:.4g} Hz, duty factor {parameters.duty_factor:.2f}",
     }
     width = max(map(len, rows))
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows.items())
+    lines = [*rows.items(), *(("flaw", flaw.text) for flaw in flaws(body))]
+    return "\n".join(f"{name:<{width}}  {value}" for name, value in lines)

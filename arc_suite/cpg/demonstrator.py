@@ -12,6 +12,7 @@ from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.steering import MANNERS, Manner, Steered
 from arc_suite.cpg.stride import Stride
 from arc_suite.models.sizing import control_timestep
+from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import fitted_gait
@@ -45,8 +46,9 @@ class Demonstrator:
                 presets that go by the task's.
 
         Raises:
-            ValueError: an unknown name, or a value out of range; one line that names it and the
-                nearest valid one.
+            ValueError: an unknown name, or a value out of range, or a body that cannot walk whatever
+                it does, as its feet hang far above the floor; one line that names it and the nearest
+                valid one.
         """
         body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
         if isinstance(gait, str):
@@ -54,6 +56,10 @@ class Demonstrator:
         if not isinstance(preset, Preset):
             presets = presets_of(body)
             preset = presets[checks.name(preset, presets, "preset")]
+        # The numbers of a preset of its own were found for a body, whatever it looks like.
+        hopeless = [] if isinstance(preset, Preset) else [flaw.text for flaw in flaws(body) if flaw.hopeless]
+        if hopeless:
+            raise ValueError(f"{body.name} cannot walk: {hopeless[0]}")
         if isinstance(preset, float):
             speed = preset if froude is None else froude
             self._law = OnClock(body, Stride.fit(body, speed, gait or fitted_gait(body)))
@@ -89,7 +95,10 @@ class Demonstrator:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
         if timestep.first():
             self._law.begin([0])
-        return self._law.act({name: np.asarray(block)[None] for name, block in timestep.observation.items()})[0]
+        observation = timestep.observation
+        if isinstance(observation, Mapping):
+            observation = {name: np.asarray(block)[None] for name, block in observation.items()}
+        return self._law.act(observation)[0]
 
 
 class OnClock:

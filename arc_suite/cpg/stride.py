@@ -159,4 +159,7 @@ def _towards(jacobian, displacement, weights, below, above) -> np.ndarray:
     moved = weighted @ angles
     angles *= moved @ wanted / max(moved @ moved, 1e-12 * (wanted @ wanted))
     room = np.where(angles > 0.0, above, below)
-    return angles * min(1.0, np.min(room / np.maximum(abs(angles), 1e-12)))
+    stuck = (room <= 0.0) & (angles != 0.0)
+    if stuck.any():  # a knee that bends one way only must not hold the others up
+        return _towards(np.where(stuck, 0.0, jacobian), displacement, weights, below, above)
+    return angles * min(1.0, np.min(np.where(angles == 0.0, 1.0, room) / np.maximum(abs(angles), 1e-12)))

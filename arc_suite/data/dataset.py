@@ -80,7 +80,7 @@ class Dataset:
                 "task_kwargs": task_kwargs,
             }
             self._length = checks.integer("total_episodes", self.metadata["total_episodes"], 0, 1 << 32)
-            checks.integer("total_steps", self.metadata["total_steps"], 0)
+            checks.integer("total_steps", self.metadata["total_steps"], 0, 1 << 53)
         try:
             for kind, name in (("domain", domain), ("task", task), ("arena", str(task_kwargs.get("arena", "flat")))):
                 if not _is_body(name):

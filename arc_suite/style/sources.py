@@ -85,7 +85,12 @@ def _played(name: str, preset: str) -> Source:
 
 def _saved(path: str) -> Source:
     tracks = load(path)
-    stage = Stage(tracks[0].body, tracks[0].task, tracks[0].task_kwargs)
+    first = tracks[0]
+    stage = Stage(first.body, first.task, first.task_kwargs)
+    same = (stage, first.progress.keys(), first.parameters is None)
+    for track in tracks:
+        if (Stage(track.body, track.task, track.task_kwargs), track.progress.keys(), track.parameters is None) != same:
+            raise ValueError(f"{path}: expected tracks of one task with the same settings")
     try:
         for kind, name in (("task", stage.task), ("arena", str(stage.task_kwargs.get("arena", "flat")))):
             registry.imported(kind, name)

@@ -36,7 +36,7 @@ def test_help_lists_the_programs(arguments):
 
 def test_every_program_is_listed():
     folder = pathlib.Path(main.__file__).parent
-    programs = {path.stem for path in folder.glob("*.py") if "\ndef main() -> " in path.read_text()}
+    programs = {path.stem for path in folder.glob("*.py") if "\ndef main(" in path.read_text()}
     assert programs - {"main"} == set(main.PROGRAMS)
 
 
@@ -45,9 +45,7 @@ def test_version():
     assert (done.returncode, done.stdout, done.stderr) == (0, VERSION, "")
 
 
-@pytest.mark.parametrize(
-    ("argument", "near"), [("rendr", "render"), ("walk_census", "census"), ("--robot", "doctor"), ("stile", "style")]
-)
+@pytest.mark.parametrize(("argument", "near"), [("rendr", "render"), ("walk_census", "census"), ("stile", "style")])
 def test_an_unknown_program_is_one_line_with_the_nearest(argument, near):
     done = run(argument, "--robot=queen")
     line = f"arc-suite: unknown program {argument!r}; did you mean {near!r}? (there are: {', '.join(main.PROGRAMS)})\n"
@@ -85,7 +83,7 @@ def test_help_of_a_program(program):
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, "stray")
+    done = run(program, *(["--", "a.json"] if program == "check" else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 

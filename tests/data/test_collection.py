@@ -49,7 +49,7 @@ def replay(environment, seed, actions):
     for action in actions:
         observation, reward, terminated, truncated, info = environment.step(action)
         observations.append(observation)
-        terms = {name.removeprefix("reward_"): term for name, term in info.items() if name.startswith("reward_")}
+        terms = {name: info[f"reward_{name}"] for name in environment.unwrapped.task.settings.weights}
         steps.append((reward, terms, terminated, truncated))
     rewards, terms, terminations, truncations = zip(*steps, strict=True)
     terms = {name: np.array([term[name] for term in terms]) for name in terms[0]}

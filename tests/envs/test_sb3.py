@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import data_equivalence
 
 import arc_suite  # noqa: F401 (registers)
 
-vec_env = pytest.importorskip("stable_baselines3.common.vec_env", reason="of the extra `sb3`: make check-clients")
+vec_env = pytest.importorskip("stable_baselines3.common.vec_env", reason="of the extra `sb3`: make check-sb3")
 
 from arc_suite.envs import sb3  # noqa: E402
 

@@ -10,6 +10,8 @@ from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
+ALL = "slow, medium, fast, tuned, steered, surefooted"
+
 
 @pytest.mark.parametrize("name", POLICIES)
 def test_policies_act_on_time_steps(name):
@@ -45,13 +47,16 @@ def test_noise_is_added_to_what_the_policy_does():
         ),
         (
             ("cpg", "queen", "midium"),
-            "unknown preset 'midium'; did you mean 'medium'? (there are: slow, medium, fast, tuned)",
+            f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})",
         ),
         (
             ("cpg", generate(4, 2), "tuned"),
-            "unknown preset 'tuned'; did you mean 'medium'? (there are: slow, medium, fast)",
+            "unknown preset 'tuned' (there are: slow, medium, fast, steered, surefooted)",
         ),
-        (("cpg", "queen", ()), "preset: expected one or more of slow, medium, fast, tuned, got none"),
+        (
+            ("cpg", "queen", ()),
+            f"preset: expected one or more of {ALL}, got none",
+        ),
         (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number from 0 to inf, got -0.1"),
         (
             ("cpg", ROBOTS["bastion"].replace(name="queen")),

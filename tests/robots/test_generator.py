@@ -83,7 +83,7 @@ def test_radial_legs_of_an_even_number_leave_the_front_free():
     assert headings == pytest.approx([30.0, 90.0, 150.0, -150.0, -90.0, -30.0], abs=1e-9)
     with pytest.raises(ValueError, match="^layout: expected radial for an odd number of legs, got 'pairs' for 7$"):
         generator.generate(7, 3, "pairs")
-    with pytest.raises(ValueError, match="^unknown layout 'ring'; did you mean"):
+    with pytest.raises(ValueError, match="^unknown layout 'ring' \\(there are: pairs, radial"):
         generator.generate(6, 3, "ring")
 
 

@@ -100,8 +100,7 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
         (
             ("torso", "solids", 0, "file"),
             "a.stl",
-            "torso.solids[0]: unknown field 'file'; did you mean 'size'? "
-            "(there are: name, shape, size, position, euler_deg)",
+            "torso.solids[0]: unknown field 'file' (there are: name, shape, size, position, euler_deg)",
         ),
         ((*HIP, "axis"), [0, math.nan, 1], f"{AT_HIP}.axis: expected a number from -1000 to 1000, got nan"),
         ((*HIP, "damping"), -1, f"{AT_HIP}.damping: expected a number from 0 to 1e+35, got -1"),
@@ -138,7 +137,7 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
         ),
         (("legs",), [], "legs: expected 1 to 64 Legs, got 0"),
         (("legs",), None, "legs: expected a list of Legs, got null"),
-        (("include",), "a.xml", f"unknown field 'include'; did you mean 'name'? (there are: {IN_BODY})"),
+        (("include",), "a.xml", f"unknown field 'include' (there are: {IN_BODY})"),
     ],
 )
 def test_a_malformed_field_is_named_by_its_path(path, value, message):
@@ -212,7 +211,7 @@ def test_refusing_keeps_no_memory():
         ('{"na\\nme": 1}', "unknown field 'na\\nme'; did you mean 'name'?"),
         (b"\xff\xfe\x00", "expected a body in JSON: "),
         ('{"legs": ' + "1" * 10_000 + "}", "name: missing; a Body needs it"),
-        ('{"' + "x" * 100_000 + '": 1}', f"unknown field '{'x' * 40}'; did you mean "),
+        ('{"' + "x" * 100_000 + '": 1}', f"unknown field '{'x' * 40}' (there are: "),
     ],
 )
 def test_what_is_no_body_is_one_line(text, message):

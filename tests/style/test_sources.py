@@ -122,7 +122,7 @@ def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
         source(dataset.id).takes(TICK, range(1))
     for name, message in (
         ("arc_suite/leaper/niosy-v0", f"unknown dataset 'arc_suite/leaper/niosy-v0'; did you mean {dataset.id!r}?"),
-        ("noisy-v0", "unknown dataset 'noisy-v0'; did you mean"),
+        ("noisy-v0", "unknown dataset 'noisy-v0' (there are: arc_suite/leaper/noisy-v0)"),
         ("arc_suite/leaper/noisy", "dataset id 'arc_suite/leaper/noisy': expected "),
     ):
         with pytest.raises(ValueError) as error:
@@ -131,3 +131,20 @@ def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
     (dataset.path / "data" / "main_data.hdf5").write_bytes(b"HDF")
     with pytest.raises(ValueError, match="is damaged"):
         take(source(dataset.id), LEAPER, range(1))
+
+
+def test_tracks_import_nothing(leaper, tmp_path, monkeypatch):
+    (tmp_path / "strolling.py").write_text("import pathlib; pathlib.Path(__file__).with_name('imported').touch()")
+    monkeypatch.syspath_prepend(tmp_path)
+    path = tmp_path / "tracks.npz"
+    for change in ({"task": "strolling:walk"}, {"task_kwargs": {"arena": "strolling:flat"}}):
+        style.save(path, [track._replace(**change) for track in leaper])
+        with pytest.raises(ValueError, match=f"^{path}: .*: files import nothing; import 'strolling' first$"):
+            source(str(path))
+    assert not (tmp_path / "imported").exists()
+
+
+def test_tracks_of_several_tasks_are_no_source(leaper, tmp_path):
+    style.save(tmp_path / "two.npz", [leaper[0], leaper[1]._replace(progress={})])
+    with pytest.raises(ValueError, match="two.npz: expected tracks of one task with the same settings$"):
+        source(str(tmp_path / "two.npz"))

@@ -118,7 +118,7 @@ def one_array():
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"", "not a file of tracks, or a damaged one: No data left in file"),
+        (b"", "not a file of tracks, or a damaged one: File is not a zip file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
         (one_array(), "not a file of tracks, or a damaged one: "),
         (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 2', got 'no tracks'; record them anew"),
@@ -151,3 +151,79 @@ def test_files_that_cannot_be_read_are_one_line(tmp_path):
     for path, reason in ((tmp_path / "none.npz", "no such file or directory"), (tmp_path, "is a directory")):
         with pytest.raises(OSError, match=f"^cannot read {path}: {reason}$"):
             load(path)
+
+
+def rewritten(saved, path, change):
+    """Save the arrays of a file of tracks again, as a function changes them."""
+    with np.load(saved) as archive:
+        arrays = dict(archive)
+    change(arrays)
+    np.savez(path, **arrays)
+
+
+BAD_ARRAYS = {
+    "empty": ("1/positions", np.zeros((0, 3))),
+    "no axes": ("1/positions", np.float64(1.0)),
+    "short": ("1/contacts", np.zeros((5, 4), bool)),
+    "other feet": ("1/foot_heights", np.zeros((12, 3))),
+    "text": ("1/torques", np.full((12, 12), "heavy")),
+    "complex": ("1/actions", np.zeros((12, 12), complex)),
+    "NaN": ("1/joint_angles", np.full((12, 12), np.nan)),
+    "infinite term": ("1/terms/forward", np.full(12, np.inf)),
+    "short term": ("1/terms/forward", np.zeros(3)),
+    "numbers of feet": ("1/contacts", np.zeros((12, 4))),
+    "text of a number": ("1/mass", np.array("heavy")),
+    "no mass": ("1/mass", np.float64(0.0)),
+    "seed": ("1/seed", np.float64(3.0)),
+    "negative seed": ("1/seed", np.int64(-1)),
+    "weight of no term": ("1/weights/height", np.float64(1.0)),
+    "array of weights": ("1/weights/forward", np.zeros(4)),
+    "offsets": ("1/parameters/phase_offsets", np.zeros(3)),
+    "range": ("1/parameters/healthy_range", np.array(["low", "high"])),
+    "parameter": ("1/parameters/speed", np.float64(1.0)),
+    "legs": ("1/legs", np.array(["a", "b", "c", "d"])),
+    "legs of joints": ("1/joint_legs", np.full(12, 9)),
+    "mirrors": ("1/mirrors", np.full(4, 4)),
+    "field": ("1/altitude", np.zeros(12)),
+    "settings": ("1/task_kwargs", np.array("[1]")),
+    "body": ("body", np.zeros(3)),
+    "deep": ("1/positions/x", np.zeros(12)),
+    "index": ("99999999999/task", np.array("walk")),
+    "name": ("one/task", np.array("walk")),
+}
+
+
+@pytest.mark.parametrize("name", BAD_ARRAYS)
+def test_arrays_that_no_track_has_are_one_line(saved, tmp_path, name):
+    path = tmp_path / "bad.npz"
+    key, array = BAD_ARRAYS[name]
+    rewritten(saved, path, lambda arrays: arrays.update({key: array}))
+    with pytest.raises(ValueError) as error:
+        load(path)
+    assert str(error.value).startswith(f"{path}: not a file of tracks, or a damaged one: ")
+    assert "\n" not in str(error.value) and len(str(error.value)) < 600
+
+
+def header(shape):
+    file = io.BytesIO()
+    np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+    return file.getvalue()
+
+
+@pytest.mark.parametrize("shape", [(1 << 40,), (1 << 20, 1 << 20, 1 << 20), (-1,), (13, 3), ()])
+def test_headers_that_claim_what_the_file_does_not_hold_are_one_line(saved, tmp_path, shape):
+    path = tmp_path / "claims.npz"
+    with zipfile.ZipFile(saved) as whole, zipfile.ZipFile(path, "w") as claims:
+        for name in whole.namelist():
+            content = whole.read(name)
+            claims.writestr(name, header(shape) + content[-288:] if name == "1/positions.npy" else content)
+    with pytest.raises(ValueError, match="1/positions: .* bytes, and there are 288$"):
+        load(path)
+
+
+def test_archives_that_are_larger_than_their_file_are_one_line(saved, tmp_path):
+    path = tmp_path / "compressed.npz"
+    with np.load(saved) as archive:
+        np.savez_compressed(path, zeros=np.zeros(1 << 20), **archive)
+    with pytest.raises(ValueError, match="expected arrays that are not compressed$"):
+        load(path)

@@ -88,6 +88,13 @@ def test_mirrored_bodies_walk_mirrored_tracks():
     np.testing.assert_allclose(mirrored * (1.0, -1.0), positions, atol=1e-6)
 
 
+@pytest.mark.parametrize("robot", ["queen", "tick"])
+def test_knees_that_bend_one_way_only_hold_no_hip_up(robot):
+    body = generator.scaled(ROBOTS[robot], 0.5)
+    assert any(0.0 in joint.range_deg for leg in body.legs for joint in leg.joints)
+    assert speed(body, seconds=20.0 * math.sqrt(body.torso.standing_height / 9.81)) > 0.1  # it was 0
+
+
 def test_bodies_of_one_shape_walk_alike():
     walks = [(generator.scaled(BODY, scale), 8.0 * math.sqrt(scale)) for scale in (1.0, 2.0, 0.12, 12.5)]
     speeds = [speed(body, seconds) for body, seconds in walks]  # 5 cm to 5 m high
@@ -173,8 +180,8 @@ def test_settings_are_fitted_by_the_documented_formulas():
     assert changed.parameters.target_velocity == 1.0
     assert changed.parameters.healthy_range == (0.1, 2.0)
     assert changed.weights["control"] == -1.0
-    with pytest.raises(ValueError, match="^unknown setting of walk 'target_speed'; did you mean 'target_velocity'"):
-        settings(body, {"target_speed": 1.0})
+    with pytest.raises(ValueError, match="^unknown setting of walk 'target_velocty'; did you mean 'target_velocity'"):
+        settings(body, {"target_velocty": 1.0})
 
 
 def test_numbers_go_by_the_name_of_a_body_that_has_the_joints():
@@ -228,7 +235,10 @@ def test_a_demonstrator_serves_batches():
 
 def test_what_a_demonstrator_cannot_do_is_one_line():
     for arguments, message in (
-        ({"robot": "queen", "froude": 0.2}, "froude: queen has presets alone: slow, medium, fast, tuned"),
+        (
+            {"robot": "queen", "froude": 0.2},
+            "froude: queen has presets alone: slow, medium, fast, tuned, steered, surefooted",
+        ),
         ({"robot": BODY, "froude": 0.0}, "froude: expected 0.001 or more, forwards or backwards, got 0.0"),
         ({"robot": BODY, "froude": math.nan}, "froude: expected a number from -1 to 1, got nan"),
     ):

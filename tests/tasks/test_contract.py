@@ -141,8 +141,7 @@ def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, arena, thre
             observation, reward, *ends, info = single.step(action)
             ended = any(ends)
             assert (rewards[1], terminated[1], truncated[1]) == (reward, *ends)
-            for group, figures in info.items():
-                assert {name: infos[group][name][1] for name in figures} == figures
+            assert {name: infos[name][1] for name in info} == info
         assert_array_equal(observations[1], observation)
     assert episodes >= 2
     rows.close()

@@ -1,0 +1,116 @@
+"""What keeps a body from standing or walking, told by its standing pose before anything is simulated."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.models.outline import solid_corners
+from arc_suite.models.standing import Standing, standing
+from arc_suite.robots.spec import Body, Leg
+
+# Shares of the standing height.
+_GAP = 0.12  # of feet from the floor; feet of published robots hang by up to 0.25 and sink by up to 0.07
+_HOPELESS_GAP = 0.6  # beyond which the torso settles outside of the healthy range of a walk
+_LEAST_STRIDE = 0.03  # that the most able foot sweeps or is lifted, within a demonstrator's bounds
+_HOPELESS_OVERHANG = 0.05  # of the centre of mass beyond the feet
+
+_LEAST_TILT = 0.15  # margin of stability as a share of the height of the centre of mass; generated bodies have 0.7 to 2
+_LARGEST_TURN = 0.5  # rad, of a joint
+
+
+class Flaw(NamedTuple):
+    """Something that keeps a body from standing or walking.
+
+    Attributes:
+        text: one line that says what is wrong, and the value that would fit.
+        hopeless: whether nothing can walk with it.
+    """
+
+    text: str
+    hopeless: bool
+
+
+def flaws(body: Body) -> list[Flaw]:
+    """Return what is wrong with how a body stands; nothing for one that should walk."""
+    pose = standing(body)
+    return [flaw for check in (_height, _support, _joints) for flaw in check(body, pose)]
+
+
+def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
+    """Find feet off the floor or in it, and whatever reaches lower than they do."""
+    height, soles = pose.height, pose.soles[:, 2]
+    gap = float(height + soles.min())
+    fits = f"standing_height {-soles.min():.3g} fits"
+    if abs(gap) > _GAP * height:
+        where = "hang {:.3g} m above the floor" if gap > 0.0 else "stand {:.3g} m in the floor"
+        yield Flaw(f"feet {where.format(abs(gap))}: {fits}", abs(gap) > _HOPELESS_GAP * height)
+    short = [leg.name for leg, sole in zip(body.legs, soles, strict=True) if sole - soles.min() > _GAP * height]
+    if short:
+        missing = max(soles) - min(soles)
+        names = ", ".join(short[:4]) + ", ..." * (len(short) > 4)
+        yield Flaw(f"feet of {names} end up to {missing:.3g} m above the lowest foot: legs longer by that fit", False)
+    lowest = min(solid_corners(solid)[:, 2].min() for solid in body.torso.solids)
+    deeper = float(soles.min() - lowest)
+    if deeper > 0.0:
+        text = f"the torso reaches {deeper:.3g} m lower than the feet: legs longer by more than that fit"
+        yield Flaw(text, deeper > _GAP * height)
+
+
+def _support(body: Body, pose: Standing) -> Iterator[Flaw]:
+    """Find a centre of mass that the feet do not hold up."""
+    if len(body.legs) < 3:
+        yield Flaw(f"{len(body.legs)} feet span no area to stand on: 3 or more legs fit", False)
+        return
+    above = pose.centre[2] - pose.soles[:, 2].min()
+    if pose.margin < 0.0:
+        outside = f"the centre of mass lies {-pose.margin:.3g} m outside of the feet"
+        sides = {leg.side for leg in body.legs}
+        if len(sides) == 1:
+            other = "right" if sides == {"left"} else "left"
+            text = f"{outside}, all on the {sides.pop()}: legs mirrored to the {other} fit"
+        else:
+            middle = (pose.soles.min(axis=0) + pose.soles.max(axis=0)) / 2.0
+            # Legs take the centre of mass along with them.
+            x, y, _ = (pose.centre - middle) / (1.0 - _mass_of_legs(body) / pose.mass)
+            text = f"{outside}: legs {_displacement(x, y)} fit"
+        yield Flaw(text, pose.margin < -_HOPELESS_OVERHANG * pose.height)
+    elif pose.margin < _LEAST_TILT * above:
+        tilt, missing = np.degrees(np.arctan2(pose.margin, above)), 1.05 * (_LEAST_TILT * above - pose.margin)
+        tower = f"a tower that tips over when tilted by {tilt:.2g} degrees"
+        yield Flaw(f"{tower}: feet {missing:.2g} m further out all around fit", False)
+
+
+def _mass_of_legs(body: Body) -> float:
+    """Return the mass of all legs, kg: capsules and spheres."""
+    volume = 0.0
+    for leg in body.legs:
+        balls = sum(part.radius**3 for part in (*leg.links, leg.foot))
+        rods = sum(link.radius**2 * math.hypot(*link.end) for link in leg.links)
+        volume += math.pi * (4.0 / 3.0 * balls + rods)
+    return body.density * volume
+
+
+def _displacement(x: float, y: float) -> str:
+    """Return in words a displacement on the floor, m."""
+    parts = ((x, "forward", "backward"), (y, "to the left", "to the right"))
+    return " and ".join(f"{abs(way):.2g} m {high if way > 0.0 else low}" for way, high, low in parts if abs(way) > 1e-6)
+
+
+def _joints(body: Body, pose: Standing) -> Iterator[Flaw]:
+    """Find legs that cannot take a step."""
+    reaches = np.array([_reach(leg, jacobian) for leg, jacobian in zip(body.legs, pose.jacobians, strict=True)])
+    forward, up = reaches.max(axis=0) / pose.height
+    if forward < _LEAST_STRIDE:
+        text = "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits"
+        yield Flaw(text, True)
+    if up < _LEAST_STRIDE:
+        yield Flaw("no joint lifts a foot: a second joint in each leg, about axis [-1, 0, 0], fits", False)
+
+
+def _reach(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
+    """Return how far any one joint moves a foot forward as well as back, and how far up, m."""
+    low, high = np.radians([joint.range_deg for joint in leg.joints]).clip(-_LARGEST_TURN, _LARGEST_TURN).T
+    sweep = abs(jacobian[0]) * np.minimum(-low, high)
+    return sweep.max(), np.maximum(jacobian[2] * low, jacobian[2] * high).max()

@@ -1,0 +1,70 @@
+"""tools/check.py tells what is wrong with a body in a spec file."""
+
+import json
+from pathlib import Path
+
+import programs
+import pytest
+
+from arc_suite.robots import generator, spec_files
+
+ROOT = Path(__file__).parents[2]
+TOOL = ROOT / "tools" / "check.py"
+
+
+def check(*arguments):
+    return programs.run(TOOL, *arguments)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "body.json"
+
+
+def write(path, **torso):
+    """Write the spec of a body 0.4 m high, with some fields of its torso changed; None removes one."""
+    spec = json.loads(spec_files.body_to_json(generator.generate(6, 3)))
+    spec["torso"] = {name: value for name, value in (spec["torso"] | torso).items() if value is not None}
+    path.write_text(json.dumps(spec))
+
+
+def test_a_sound_body_is_said_to_be_one(path):
+    write(path, standing_height=None)
+    done = check(path)
+    assert (done.returncode, done.stdout, done.stderr) == (
+        0,
+        f"{path}: walker_6x3 stands and can take steps\n",
+        "",
+    )
+
+
+def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
+    write(path, standing_height=1.2)
+    done = check(path)
+    line = f"{path}: feet hang 0.8 m above the floor: standing_height 0.4 fits\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, line, "")
+    summary = programs.run(ROOT / "tools" / "build_model.py", "--spec", path, "--summary").stdout
+    assert summary.splitlines()[-1].split(maxsplit=1) == [
+        "flaw",
+        "feet hang 0.8 m above the floor: standing_height 0.4 fits",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "expected a spec file; see --help"),
+        (("missing.json",), "cannot read missing.json: no such file or directory"),
+        (("a.json", "b.json"), "unexpected argument 'b.json'; see --help"),
+    ],
+)
+def test_bad_arguments_are_one_line(arguments, message):
+    done = check(*arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"check.py: {message}\n")
+
+
+def test_a_file_that_holds_no_body_is_one_line(path):
+    write(path, standing_height=-1)
+    done = check(path)
+    line = f"check.py: {path}: torso.standing_height: expected a number from 1e-06 to 100, got -1\n"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", line)

@@ -1,0 +1,319 @@
+"""Datasets made in bad faith: nothing is imported, nothing outside the dataset is read, one line says what is wrong."""
+
+import json
+import os
+import pathlib
+import resource
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
+from test_storage import killed_at
+
+from arc_suite import data, style
+from arc_suite.data import collection, episodes
+
+SETTINGS = data.Settings(QUEEN, **SHORT)
+TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
+READERS = {"open": lambda dataset_id: list(data.open(dataset_id)), "verify": verify}
+
+STROLL = """
+import pathlib
+import arc_suite
+from arc_suite.arenas import FLAT
+from arc_suite.tasks.walk import Walk
+pathlib.Path(__file__).with_name("imported").touch()
+class Stroll(Walk):
+    name = "stroll"
+arc_suite.register(module=__name__, tasks=(Stroll,), arenas={"lawn": lambda body: FLAT})
+"""
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    """Write a module that can be imported, and return the file that its import leaves."""
+    (tmp_path / "strolling.py").write_text(STROLL)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    return tmp_path / "imported"
+
+
+def refused(use, *parts):
+    with pytest.raises(ValueError) as error:
+        use(ID)
+    message = str(error.value)
+    assert message.startswith(f"dataset {ID!r}") and "\n" not in message and len(message) < 600
+    for part in parts:
+        assert part in message
+
+
+def spec(metadata, **names):
+    """Change what the environment is made with."""
+    env_spec = json.loads(metadata["env_spec"])
+    env_spec["kwargs"].update(names)
+    metadata["env_spec"] = json.dumps(env_spec)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda metadata: spec(metadata, domain_name="strolling:queen"),
+        lambda metadata: spec(metadata, task_name="strolling:walk"),
+        lambda metadata: metadata["arc_suite"]["settings"].update(task_kwargs={"arena": "strolling:flat"}),
+    ],
+    ids=["domain", "task", "arena"],
+)
+def test_metadata_import_nothing(root, module, change):
+    collect(ID, SETTINGS, 1)
+    edited(root, change)
+    for use in (*READERS.values(), style.source):
+        refused(use, "files import nothing; import 'strolling' first")
+    done = subprocess.run([sys.executable, TOOL, f"--verify={ID}"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.count("\n") == 1 and "import 'strolling' first" in done.stderr
+    assert not module.exists()
+
+
+def test_what_the_caller_names_is_imported(module):
+    def run(*arguments):
+        command = [sys.executable, TOOL, f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments]
+        return subprocess.run(command, capture_output=True, text=True)
+
+    named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")
+    assert run(*named).returncode == 0
+    assert run(f"--verify={ID}").stderr == (
+        f"collect.py: dataset {ID!r}: task 'strolling:stroll': files import nothing; import 'strolling' first\n"
+    )
+    assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, equal to the bit\n"
+    assert run(f"--verify={ID}", "--set=arena=strolling:lawn", "--task=walk").stderr == (
+        f"collect.py: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "domain", ["/dev/zero", "spider.json", "", "nobody", "{", "{}", "[" * 9999, None, 3, ["queen"], {"name": "queen"}]
+)
+def test_domains_are_registered_names_and_inline_bodies_alone(root, domain):
+    collect(ID, SETTINGS, 1)
+    edited(root, lambda metadata: spec(metadata, domain_name=domain))
+    refused(data.open, "metadata.json: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("seed", value) for value in ("5", 5.0, None, [5], -1, 2**40, True)),
+        *(("steps", value) for value in ("20", 0, 1e3, {})),
+        *(("noise", value) for value in ("0", -1.0, float("nan"), [])),
+        *(("presets", value) for value in ("medium", [1], None)),
+        *(("task_kwargs", value) for value in ("walk", [], None, 3)),
+        ("policy", 7),
+    ],
+)
+def test_settings_of_another_type_are_named(root, name, value):
+    collect(ID, SETTINGS, 1)
+    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update({name: value}))
+    for use in READERS.values():
+        refused(use, f"metadata.json: {name}" if name in ("seed", "steps", "noise") else f"expected {name} ")
+
+
+@pytest.mark.parametrize("value", ["1", -1, 2**70, 1.0, None])
+@pytest.mark.parametrize("name", ["total_episodes", "total_steps"])
+def test_counts_of_another_type_are_named(root, name, value):
+    collect(ID, SETTINGS, 1)
+    edited(root, lambda metadata: metadata.update({name: value}))
+    refused(data.open, name)
+
+
+def test_steps_that_no_episode_has_are_not_allocated(root):
+    collect(ID, SETTINGS, 1)
+    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update(steps=10**15))
+    refused(verify, "20 steps were recorded, 21 replayed")
+
+
+def altered(root, change):
+    with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
+        change(file)
+
+
+def replaced(path, make):
+    """Return a change that puts something else in the place of an array or a group."""
+
+    def change(file):
+        parent, _, name = path.rpartition("/")
+        old = file[path]
+        del file[path]
+        make(file[parent or "/"], name, old)
+
+    return change
+
+
+def claimed(shape):
+    """Return a change that gives the rewards a size that nobody wrote."""
+    return replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, shape, "f8"))
+
+
+HUGE = 1 << 40
+ALTERED = {
+    "huge": (claimed((HUGE,)), "claims"),
+    "huge in two axes": (claimed((HUGE, HUGE >> 20)), "expected"),
+    "huge term": (
+        replaced(
+            "episode_0/infos/reward_terms/forward", lambda group, name, old: group.create_dataset(name, (HUGE,), "f4")
+        ),
+        "expected 20 of float64",
+    ),
+    "chunked": (
+        replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, (20,), "f8", chunks=(5,))),
+        "in one piece",
+    ),
+    "stored elsewhere": (
+        replaced(
+            "episode_0/rewards",
+            lambda group, name, old: group.create_dataset(name, (20,), "f8", external=[("/etc/hostname", 0, 160)]),
+        ),
+        "in one piece",
+    ),
+    "external link": (
+        replaced("episode_0/rewards", lambda group, name, old: group.__setitem__(name, h5py.ExternalLink("/x", "/y"))),
+        "a link to elsewhere",
+    ),
+    "soft link": (
+        replaced("episode_0/rewards", lambda group, name, old: group.__setitem__(name, h5py.SoftLink("/episode_1"))),
+        "a link to elsewhere",
+    ),
+    "external episode": (
+        replaced("episode_0", lambda group, name, old: group.__setitem__(name, h5py.ExternalLink("../x.hdf5", name))),
+        "a link to elsewhere",
+    ),
+    "soft episode": (
+        replaced("episode_0", lambda group, name, old: group.__setitem__(name, h5py.SoftLink("/episode_1"))),
+        "a link to elsewhere",
+    ),
+    "group": (replaced("episode_0/rewards", lambda group, name, old: group.create_group(name)), "expected a dataset"),
+    "text": (replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, data="x")), "expected"),
+    "complex": (
+        replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, data=np.zeros(20, complex))),
+        "complex128",
+    ),
+    "no steps": (claimed((0,)), "episode_0: "),
+    "other joints": (
+        replaced(
+            "episode_0/actions", lambda group, name, old: group.create_dataset(name, data=np.zeros((20, 3), "f4"))
+        ),
+        "expected",
+    ),
+    "seed": (lambda file: file["episode_0"].attrs.create("seed", "five"), "attribute seed to be one int"),
+    "length": (lambda file: file["episode_0"].attrs.create("length", np.zeros(9)), "attribute length to be one int"),
+    "sha256": (lambda file: file["episode_0"].attrs.create("sha256", 3), "attribute sha256 to be one str"),
+}
+
+
+@pytest.mark.parametrize("name", ALTERED)
+def test_episodes_that_are_stored_otherwise_are_one_line(root, name):
+    change, reason = ALTERED[name]
+    collect(ID, SETTINGS, 2)
+    altered(root, change)
+    for use in (*READERS.values(), lambda dataset_id: collect(dataset_id, SETTINGS, 3)):
+        refused(use, "main_data.hdf5: ", reason)
+    collect(ID, SETTINGS, 2, overwrite=True)
+    assert verify(ID) == 2
+
+
+def test_an_array_of_one_place_many_times_is_not_read(root):
+    collect(ID, SETTINGS, 1)
+
+    def change(file):
+        group = file["episode_0"]["infos/reward_terms"]
+        for number in range(1000):
+            group[f"again{number}"] = group["forward"]
+
+    altered(root, change)
+    refused(READERS["open"], "its arrays claim")
+
+
+def test_continuing_compares_what_it_keeps(root):
+    collect(ID, SETTINGS, 2)
+    altered(root, lambda file: file["episode_1/rewards"].__setitem__(3, 7.0))
+    refused(lambda dataset_id: collect(dataset_id, SETTINGS, 3), "main_data.hdf5: episode_1: expected ")
+    collect(ID, SETTINGS, 3, overwrite=True)
+    assert len(digests()) == 3
+
+
+def test_episodes_of_no_index_are_named(root):
+    collect(ID, SETTINGS, 1)
+    altered(root, lambda file: file.move("episode_0", "episode_00"))
+    refused(lambda dataset_id: collect(dataset_id, SETTINGS, 2), "'episode_00': expected the name of an episode")
+
+
+def test_nothing_outside_is_deleted(root, tmp_path):
+    (tmp_path / "home").mkdir()
+    (tmp_path / "home" / ".profile").touch()
+    (root / ID).mkdir(parents=True)
+    (root / ID / "data").symlink_to(tmp_path / "home")
+    refused(lambda dataset_id: collect(dataset_id, SETTINGS, 1), "is a link")
+    assert (tmp_path / "home" / ".profile").exists()
+
+
+@pytest.mark.parametrize("name", ["metadata.json", "main_data.hdf5"])
+def test_a_pipe_is_not_waited_for(root, name):
+    collect(ID, SETTINGS, 1)
+    path = root / ID / "data" / name
+    path.unlink()
+    os.mkfifo(path)
+    refused(READERS["open"], f"{name}: expected a file")
+
+
+def test_metadata_of_any_size_are_not_read(root):
+    collect(ID, SETTINGS, 1)
+    os.truncate(root / ID / "data" / "metadata.json", 1 << 40)
+    refused(data.open, "metadata.json: expected at most 16777216 bytes")
+
+
+def test_author_and_code_are_in_the_metadata_where_they_are_said(root):
+    collect(ID, SETTINGS, 1)
+    assert not {"author", "code_permalink"} & data.open(ID).metadata.keys()
+    collect(ID, SETTINGS, 2, author="A. Walker", code_permalink="file:///walks/1")
+    collect(ID, SETTINGS, 3)
+    import minari
+
+    metadata = minari.load_dataset(ID).storage.metadata
+    assert (metadata["author"], metadata["code_permalink"]) == ({"A. Walker"}, "file:///walks/1")
+
+
+def test_a_full_disk_keeps_every_episode_that_fits(root, monkeypatch):
+    settings = data.Settings(TICK, "random", (), steps=20)
+    collect("arc_suite/test/whole-v0", settings, 6)
+    whole = digests("arc_suite/test/whole-v0")
+    size = (root / "arc_suite/test/whole-v0/data/main_data.hdf5").stat().st_size
+    monkeypatch.setattr(collection, "SHARE", -1.0)  # all that is finished waits for one write
+    process = os.fork()
+    if not process:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size // 3, size // 3))
+        try:
+            collect(ID, settings, 6)
+        except OSError as error:
+            os._exit(0 if "file too large; 6 of 6 episodes" in str(error) else 2)
+        os._exit(3)
+    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 0
+    assert digests() == whole
+
+
+def test_a_dataset_that_is_replaced_is_never_missing(root):
+    collect(ID, SETTINGS, 1)
+    before = digests()
+    for count in range(1, 100):
+        if not killed_at(count, settings=SETTINGS._replace(seed=9), episodes=2, overwrite=True):
+            break
+        there = digests()
+        assert there == before or len(there) == 2
+    assert 3 < count < 99
+
+
+def test_links_while_a_dataset_is_collected_lead_to_its_parts_alone(root):
+    assert killed_at(10, settings=SETTINGS, episodes=6)
+    with h5py.File(root / ID / "data" / "main_data.hdf5") as file:
+        assert episodes.read(file, 0).seed == 5

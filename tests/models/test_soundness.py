@@ -1,0 +1,148 @@
+"""What keeps a body from standing or walking is told in one line, with the value that would fit."""
+
+from pathlib import Path
+
+import pytest
+
+import arc_suite
+from arc_suite.cpg import Demonstrator
+from arc_suite.models.soundness import flaws
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec import Solid
+from arc_suite.robots.spec_files import load_body
+
+EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.json"))
+BODY = generator.generate(6, 3)
+CHASSIS = BODY.torso.solids[0]
+
+
+def high(height):
+    return BODY.replace(torso=BODY.torso.replace(standing_height=height))
+
+
+def with_joints(**fields):
+    def changed(link):
+        return link.replace(joint=link.joint.replace(**fields))
+
+    return BODY.replace(legs=tuple(leg.replace(links=tuple(map(changed, leg.links))) for leg in BODY.legs))
+
+
+def narrow(share):
+    """The body with its feet nearer to the middle."""
+
+    def drawn_in(point):
+        return (share * point[0], share * point[1], point[2])
+
+    def leg(leg):
+        links = tuple(link.replace(end=drawn_in(link.end)) for link in leg.links)
+        return leg.replace(mount=drawn_in(leg.mount), links=links)
+
+    return BODY.replace(legs=tuple(map(leg, BODY.legs)))
+
+
+def ahead(by):
+    """The body with its legs in front of where they were."""
+    legs = (leg.replace(mount=(leg.mount[0] + by, *leg.mount[1:])) for leg in BODY.legs)
+    return BODY.replace(legs=tuple(legs))
+
+
+def deep(radius):
+    return BODY.replace(torso=BODY.torso.replace(solids=(Solid(name="ball", shape="sphere", size=(radius,)),)))
+
+
+def lifted(name, by):
+    """The body with one leg that ends higher."""
+
+    def leg(leg):
+        *links, last = leg.links
+        x, y, z = last.end
+        return leg.replace(links=(*links, last.replace(end=(x, y, z + by * (leg.name == name)))))
+
+    return BODY.replace(legs=tuple(map(leg, BODY.legs)))
+
+
+SOUND = [
+    *(ROBOTS[name] for name in ("queen", "bastion", "tick")),
+    *map(load_body, EXAMPLES),
+    *(generator.generate(legs, links) for legs in (4, 5, 12) for links in (2, 4)),
+    *map(generator.random_body, range(20)),
+    *(generator.scaled(BODY, scale) for scale in (0.05, 50.0)),
+    narrow(0.2),
+    high(0.43),
+]
+
+
+@pytest.mark.parametrize("body", SOUND, ids=lambda body: body.name)
+def test_bodies_that_walk_have_no_flaw(body):
+    assert flaws(body) == []
+
+
+HOPELESS = [
+    (high(1.2), "feet hang 0.8 m above the floor: standing_height 0.4 fits"),
+    (high(0.2), "feet stand 0.2 m in the floor: standing_height 0.4 fits"),
+    (
+        BODY.replace(legs=BODY.legs[:3]),
+        "the centre of mass lies 0.34 m outside of the feet, all on the left: legs mirrored to the right fit",
+    ),
+    (
+        ahead(1.0),
+        "the centre of mass lies 0.233 m outside of the feet: legs 1 m backward fit",
+    ),
+    (
+        with_joints(range_deg=(0.0, 40.0)),
+        "no leg has a joint that sweeps its foot forward and back: a hip about axis [0, 0, 1], both ways, fits",
+    ),
+    (deep(0.5), "the torso reaches 0.1 m lower than the feet: legs longer by more than that fit"),
+]
+DOUBTFUL = [
+    (ROBOTS["leaper"], "feet hang 0.125 m above the floor: standing_height 0.375 fits"),
+    (high(0.5), "feet hang 0.1 m above the floor: standing_height 0.4 fits"),
+    (high(0.35), "feet stand 0.05 m in the floor: standing_height 0.4 fits"),
+    (
+        narrow(0.1),
+        "a tower that tips over when tilted by 6.8 degrees: feet 0.012 m further out all around fit",
+    ),
+    (BODY.replace(legs=(BODY.legs[1], BODY.legs[4])), "2 feet span no area to stand on: 3 or more legs fit"),
+    (
+        generator.generate(6, 1),
+        "no joint lifts a foot: a second joint in each leg, about axis [-1, 0, 0], fits",
+    ),
+    (lifted("l2", 0.1), "feet of l2 end up to 0.1 m above the lowest foot: legs longer by that fit"),
+    (deep(0.41), "the torso reaches 0.01 m lower than the feet: legs longer by more than that fit"),
+]
+
+
+@pytest.mark.parametrize(
+    ("body", "text", "hopeless"),
+    [(*case, True) for case in HOPELESS] + [(*case, False) for case in DOUBTFUL],
+    ids=lambda value: value.split(":")[0] if isinstance(value, str) else "",
+)
+def test_a_flaw_is_told_with_what_fits(body, text, hopeless):
+    assert (text, hopeless) in flaws(body)
+
+
+@pytest.mark.parametrize(("body", "text"), HOPELESS)
+def test_a_demonstrator_refuses_a_body_that_cannot_walk(body, text):
+    for preset in ("medium", "steered"):
+        with pytest.raises(ValueError) as error:
+            Demonstrator(body, preset)
+        assert str(error.value) == f"walker_6x3 cannot walk: {text}"
+
+
+@pytest.mark.parametrize("body", [case[0] for case in DOUBTFUL])
+def test_a_demonstrator_tries_a_body_that_may_walk(body):
+    environment, policy = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body)
+    environment.step(policy(environment.reset()))
+
+
+def test_what_would_fit_fits():
+    assert flaws(high(0.4)) == []
+    assert flaws(ahead(1.0 - 1.0)) == []
+    out = narrow(0.1)
+    wider = tuple(leg.replace(mount=_further(leg.mount, leg.foot_position, 0.012)) for leg in out.legs)
+    assert not any("tower" in flaw.text for flaw in flaws(out.replace(legs=wider)))
+
+
+def _further(mount, foot, by):
+    x, y, z = mount
+    return (x + by * ((foot[0] > 0.0) - (foot[0] < 0.0)), y + by * ((foot[1] > 0.0) - (foot[1] < 0.0)), z)
