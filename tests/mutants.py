@@ -40,7 +40,7 @@ MUTANTS = (
     Mutant("armature of the hip", "-40.0, 40.0),\n    armature=1.0", "-40.0, 40.0),\n    armature=2.0"),
     Mutant("sign of zero kept", "float(value) + 0.0", "float(value)"),
     Mutant("a body's joints not looked at", "body.joint_names != ROBOTS[body.name].joint_names", "False"),
-    Mutant("both sides of a body in step", "0.5 * (leg.side ==", "0.0 * (leg.side =="),
+    Mutant("both sides of a body in step", '0.5 * (side == "right")', '0.0 * (side == "right")'),
     Mutant("feet of a random body above the floor", "(p.height - foot_radius) /", "p.height * 0.9 /"),
     Mutant("a scaled robot keeps its name", 'name=f"{stem}_{how}"', "name=body.name"),
     # Models.
@@ -74,8 +74,8 @@ MUTANTS = (
     # Tasks.
     Mutant(
         "dropped clip of the contact forces",
-        "(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0)",
-        "(forces.shape[:-2] + (-1,))",
+        "contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),",
+        "contact_forces=forces.reshape(forces.shape[:-2] + (-1,)),",
     ),
     Mutant("sign of a weight", '"smoothness": -0.02', '"smoothness": 0.02'),
     Mutant("yaw rate penalised in place of pitch rate", "i) for i in (2, 3, 4))", "i) for i in (2, 3, 5))"),
@@ -84,15 +84,11 @@ MUTANTS = (
     Mutant("a long episode's clock jumps", "np.argmin(np.abs(np.sin(0.5 * phases[ends])))", "-1"),
     Mutant("previous action forgotten", "previous_action=memory.action", "previous_action=action"),
     Mutant("quaternion not normalised", "    qpos[3:7] /= np.linalg.norm(qpos[3:7])\n", ""),
-    Mutant(
-        "reset noise of the joints halved",
-        "random.uniform(-joint, joint, joints)",
-        "random.uniform(0.0, joint, joints)",
-    ),
+    Mutant("reset noise to one side", "random.uniform(-widths, widths)", "random.uniform(0.0 * widths, widths)"),
     Mutant(
         "speed of the state in place of the frame's",
-        "memory.tick + 1, component(readings.frame_position, 0)",
-        "memory.tick + 1, component(readings.torso_position, 0)",
+        "        x = component(readings.frame_position, 0)",
+        "        x = component(readings.torso_position, 0)",
     ),
     Mutant(
         "the first step starts from nowhere", "_replace(x=component(readings.frame_position, 0) + 0.0)", "_replace()"
@@ -112,7 +108,7 @@ MUTANTS = (
     Mutant(
         "a command that is ignored", "numpy.where(numpy.isnan(memory.command), scheduled, memory.command)", "scheduled"
     ),
-    Mutant("a schedule that does not end", "memory.tick % memory.ends[..., -1]", "memory.tick"),
+    Mutant("a schedule that does not end", "memory.steps % memory.ends[..., -1]", "memory.steps"),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
     # Environments.
@@ -127,8 +123,8 @@ MUTANTS = (
     ),
     Mutant(
         "a new stream of a row carries on the old one",
-        "self._streams_begin[row] = True",
-        "self._streams_begin[row] = False",
+        "self._streams_begin[row] = seeds[row], True",
+        "self._streams_begin[row] = seeds[row], False",
     ),
     Mutant("rows share a seed", "checks.seed(first + row) for", "checks.seed(first) for"),
     Mutant(

@@ -46,6 +46,7 @@ class Published:
         mujoco.mj_setState(self.model, self.data, state, STATE)
         mujoco.mj_kinematics(self.model, self.data)
         self.phase, self.last_action = 0.0, np.zeros(self.model.nu)
+        self.speeds, self.wrong_feet = [], []
 
     def step(self, action):
         """Returns the observation and the reward."""
@@ -59,6 +60,7 @@ class Published:
         self.phase = (self.phase + 2 * math.pi * p.gait_frequency * 0.05) % (2 * math.pi)
         wanted = (self.phase + p.phase_offsets) % (2 * math.pi) < 2 * math.pi * p.duty_factor
         wrong = int(((data.xpos[self.feet, 2] < p.stance_threshold) != wanted).sum())
+        self.speeds.append(speed), self.wrong_feet.append(wrong)
         forces = np.clip(data.cfrc_ext[1:], -1.0, 1.0).ravel()
         terms = {
             "forward": max(0.0, 1.0 - abs(speed - p.target_velocity) / p.velocity_band),
@@ -80,7 +82,7 @@ class Published:
 
 @pytest.mark.parametrize("fallen", [False, True], ids=["walking", "falling"])
 @pytest.mark.parametrize("robot", ROBOTS)
-def test_observation_and_reward_are_the_published_ones(robot, fallen):
+def test_observation_reward_and_progress_are_the_published_ones(robot, fallen):
     environment = arc_suite.load(robot, "walk", {"random": 3, "healthy_range": (-9.0, 9.0)})
     policy, random = Demonstrator(robot, "tuned"), np.random.RandomState(4)
     for _ in range(2):  # episodes
@@ -95,4 +97,9 @@ def test_observation_and_reward_are_the_published_ones(robot, fallen):
             assert_allclose(np.concatenate(list(timestep.observation.values())), observation, rtol=0.0, atol=1e-9)
             assert_allclose(timestep.reward, reward, rtol=0.0, atol=1e-12)
             speeds.append(environment.task.terms["forward"])
+        progress = environment.task.progress
+        assert_allclose(progress["speed"], np.mean(published.speeds), rtol=0.0, atol=1e-12)
+        assert 0 < np.sum(published.wrong_feet) < STEPS * len(published.feet)
+        compliance = 1.0 - np.mean(published.wrong_feet) / len(published.feet)
+        assert_allclose(progress["gait_compliance"], compliance, rtol=0.0, atol=1e-12)
         assert np.count_nonzero(speeds) > 0  # the term that looks at the frame's position has been looked at
