@@ -7,7 +7,7 @@ from returns import RETURNS
 
 import arc_suite
 from arc_suite import evaluation
-from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tuning import Judge
