@@ -252,10 +252,10 @@ class TaskRun(control.Task):
         return reward
 
     def get_observation(self, physics):
-        """Return the observation's blocks by name, views of one vector; or that vector, as `observations`."""
+        """Return the observation's blocks by name; or one vector of them, as `observations`."""
         readings = self._begin(physics) if self._starting else self._latest(physics)
-        vector = self.definition.vector(self.definition.observe(self.memory, readings))
-        return collections.OrderedDict({_FLAT: vector}) if self._flat else self.definition.split(vector)
+        blocks = self.definition.observe(self.memory, readings)
+        return {_FLAT: self.definition.vector(blocks)} if self._flat else self.definition.named(blocks)
 
     def get_termination(self, physics):
         """Return 0 where the task is failed or the physics has diverged, 1 where it cuts the episode off, else None."""

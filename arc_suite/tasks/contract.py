@@ -229,10 +229,22 @@ class Task(ABC):
         Raises:
             ValueError: they are not those that the task declares; one line.
         """
+        self._check(blocks)
+        return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
+
+    def named(self, blocks: Mapping[str, np.ndarray]) -> collections.OrderedDict:
+        """Return observed blocks by name, in new memory.
+
+        Raises:
+            ValueError: they are not those that the task declares; one line.
+        """
+        self._check(blocks)
+        return collections.OrderedDict((name, block.copy()) for name, block in blocks.items())
+
+    def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
         if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
             observed = {name: block.shape[-1] for name, block in blocks.items()}
             raise ValueError(f"observation of {self.name}: expected blocks {dict(self.blocks)}, got {observed}")
-        return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
 
     def split(self, vector: np.ndarray) -> collections.OrderedDict:
         """Return an observation vector (..., size) as named blocks, views of it.
