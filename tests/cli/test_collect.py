@@ -47,6 +47,7 @@ def test_collect_continue_verify_and_minaris_own_command(root):
     assert "arc_suite/queen-walk-v0" in shown
 
 
+@pytest.mark.slow
 def test_a_mixture_with_noise_on_a_body_made_to_order():
     done = run("--legs=4", "--links=2", "--preset=slow,fast", "--noise=0.1", "--steps=10", "--episodes=2")
     assert done.returncode == 0, done.stderr

@@ -33,6 +33,7 @@ def pretend(folder, package, version):
     (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: {version}\n")
 
 
+@pytest.mark.slow
 def test_healthy():
     status, found, verdict = doctor(MUJOCO_GL="egl")
     assert (status, verdict) == (0, "all is well")

@@ -61,6 +61,7 @@ def test_bad_arguments_are_one_line(tool, arguments, message, tmp_path):
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"{tool}: {message}\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tool", ["evaluate.py", "render.py", "style.py", "collect.py", "tune_cpg.py", "walk_census.py"]
 )

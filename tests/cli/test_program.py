@@ -118,6 +118,7 @@ def test_help_shows_docstring_and_flags_of_the_program_alone(tool, flag):
     assert "How many." in done.stdout
 
 
+@pytest.mark.slow
 def test_help_is_cut_short_without_complaint(tool):
     line = f"{shlex.join(map(str, tool().args))} --help | head -n 1"
     done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
@@ -129,6 +130,7 @@ def test_version(tool):
     assert (done.returncode, done.stdout, done.stderr) == (0, f"arc_suite {arc_suite.__version__}\n", "")
 
 
+@pytest.mark.slow
 def test_progress_is_shown_on_terminals_alone(tool):
     assert tool("--count=3").stderr == ""
     ours, theirs = pty.openpty()

@@ -57,6 +57,7 @@ def spec(metadata, **names):
     metadata["env_spec"] = json.dumps(env_spec)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -77,6 +78,7 @@ def test_metadata_import_nothing(root, module, change):
     assert not module.exists()
 
 
+@pytest.mark.slow
 def test_what_the_caller_names_is_imported(module):
     def run(*arguments):
         command = [sys.executable, TOOL, f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments]
@@ -235,6 +237,7 @@ def test_an_array_of_one_place_many_times_is_not_read(root):
     refused(READERS["open"], "its arrays claim")
 
 
+@pytest.mark.slow
 def test_continuing_compares_what_it_keeps(root):
     collect(ID, SETTINGS, 2)
     altered(root, lambda file: file["episode_1/rewards"].__setitem__(3, 7.0))
@@ -302,6 +305,7 @@ def test_a_full_disk_keeps_every_episode_that_fits(root, monkeypatch):
     assert digests() == whole
 
 
+@pytest.mark.slow
 def test_a_dataset_that_is_replaced_is_never_missing(root):
     collect(ID, SETTINGS, 1)
     before = digests()

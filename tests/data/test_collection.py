@@ -59,6 +59,7 @@ def replay(environment, seed, actions):
 RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [
@@ -132,6 +133,7 @@ def test_an_episode_is_what_the_single_environment_plays():
         np.testing.assert_array_equal(episode.rewards, [timestep.reward for timestep in steps][1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "settings",
     [

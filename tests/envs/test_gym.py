@@ -431,6 +431,7 @@ def test_human_is_offered_where_there_is_a_display(monkeypatch):
         assert gymnasium.make(IDS[0]).metadata["render_modes"] == modes
 
 
+@pytest.mark.slow
 def test_human_without_a_window_is_one_line():
     code = (
         "import gymnasium, arc_suite\n"

@@ -53,6 +53,7 @@ def arrays(value):
     return [value] if isinstance(value, np.ndarray) else []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_rows_are_single_environments_whatever_the_threads(robot, mode):

@@ -170,6 +170,7 @@ def bad_fields():
             yield changed(path, value), next(key for key in reversed(path) if isinstance(key, str))
 
 
+@pytest.mark.slow
 def test_every_field_refuses_what_it_cannot_be():
     """All leaves of a spec x values that none of them may have: errors of one line, none of which hangs."""
     count, slowest = 0, 0.0

@@ -14,6 +14,7 @@ from arc_suite.simulation.pictures import check_camera, picture
 BODY = ROBOTS["queen"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [None, 0.1])
 @pytest.mark.parametrize("arena", ARENAS)
 def test_a_state_looks_like_the_simulation_in_it(arena, share):

@@ -26,6 +26,7 @@ def test_pictures(tmp_path, count):
         assert (tmp_path / f"{name}.png").stat().st_size > 5000
 
 
+@pytest.mark.slow
 def test_pictures_of_a_task_without_a_gait_or_a_way_to_go():
     from arc_suite.style.plots import OF_GAIT, PICTURES
 

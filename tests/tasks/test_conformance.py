@@ -153,6 +153,7 @@ def test_bad_action_is_refused_and_changes_nothing(domain, task):
         assert_array_equal(flat(a), flat(b))
 
 
+@pytest.mark.slow
 @every_task
 def test_episode_is_1000_steps_of_50_ms(domain, task):
     environment = load(domain, task, healthy_range=(-10.0, 10.0))

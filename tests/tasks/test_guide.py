@@ -61,6 +61,7 @@ def test_arena(package):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imported", "env_id", "kwargs"),
     [

@@ -145,6 +145,7 @@ def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, mess
     rows.close()
 
 
+@pytest.mark.slow
 def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
     earned = {}
     for preset in ("steered", "tuned", None):
@@ -202,6 +203,7 @@ def test_nothing_tells_where_the_body_heads(robot):
         assert_allclose(block, before[name], atol=1e-12, err_msg=name)
 
 
+@pytest.mark.slow
 def test_the_same_shape_earns_the_same_at_any_size():
     """Costs, commands and contact forces have no scale."""
     returns = []
