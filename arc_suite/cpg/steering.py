@@ -13,11 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import robots, rotations
-from arc_suite.cpg.law import felt
-from arc_suite.models.sizing import control_timestep, natural_frequency, sized
+from arc_suite.cpg.law import felt, torques
+from arc_suite.cpg.stride import lifted
+from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import Standing, standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import walk
+from arc_suite.tasks.fitting import velocity_units
 
 
 class Manner(NamedTuple):
@@ -70,8 +72,6 @@ BUILDS = {
 _ACROSS = 0.1  # how much it matters that a foot does not slip across its way
 _DAMPING = 0.1  # of the leg's largest Jacobian entry, for a joint with room for _ROOM
 _ROOM = 0.5  # rad
-_LIFT_WEIGHTS = (0.2, 0.2, 1.0)
-_LARGEST_LIFT = 0.9  # rad
 _SMOOTHING = 0.25  # cycles over which a new command takes hold
 _ONSET = 1.0  # cycles over which the gait grows to its full size
 
@@ -99,15 +99,15 @@ class _Leg(NamedTuple):
 class Steered:
     """Follows the block `command` of a task in the rows of a batch, by the gait that the block `gait_clock` tells."""
 
-    def __init__(self, body: Body, manner: str | Manner = "steered", build: Build | None = None):
+    def __init__(self, body: Body, manner: Manner, build: Build | None = None):
         """Fit the law to a body.
 
         Args:
             body: any body.
-            manner: a name of `MANNERS`, or numbers of one's own.
+            manner: how it walks, one of `MANNERS` or numbers of one's own.
             build: numbers for a body of another build; None for those of its name, or the usual ones.
         """
-        self._manner = MANNERS[manner] if isinstance(manner, str) else manner
+        self._manner = manner
         build = build or robots.row(BUILDS, body, "steering") or Build()
         body = sized(body)
         parameters = walk.settings(body, {}).parameters
@@ -120,15 +120,8 @@ class Steered:
         self._cycles = parameters.gait_frequency * step  # a control step
         self._step = step
         self._stance = parameters.duty_factor / parameters.gait_frequency  # s
-        speed = abs(parameters.target_velocity)
-        radius = np.hypot(*(standing(body).soles - standing(body).centre)[:, :2].T).mean()
-        self._units = np.array((speed, speed, speed / radius))
-        joints = [joint for leg in body.legs for joint in leg.joints]
-        inertia = pose.inertias + [joint.armature for joint in joints]
-        gear, friction = (np.array(values) for values in zip(*((j.motor.gear, j.damping) for j in joints), strict=True))
-        frequency = natural_frequency(body)
-        self._stiffness = inertia * frequency**2 / gear
-        self._damping = (2.0 * inertia * frequency - friction).clip(0.0) / gear
+        self._units = velocity_units(body, parameters.target_velocity)
+        self._stiffness, self._damping = position_gains(body, pose.inertias)
         self._state = None
 
     def begin(self, rows: Sequence[int]) -> None:
@@ -160,8 +153,7 @@ class Steered:
         sweeps, raised, lifts = self._directions(asked, quaternion)
         targets, ahead = (size * (raised + self._swung(at, sweeps, lifts)) for at in (phase, phase + self._cycles))
         speeds = (ahead - targets) / self._step
-        error, slip = self._neutral + targets - angles, velocities - speeds
-        return (self._stiffness * error - self._damping * slip).clip(-1.0, 1.0)
+        return torques(self._neutral + targets, angles, velocities - speeds, self._stiffness, self._damping)
 
     def _directions(self, asked, quaternion):
         """Sweeps, raised poses and lifts of all joints, (rows, joints) each."""
@@ -248,19 +240,8 @@ def _legs(body: Body, pose: Standing, neutral, build: Build, manner: Manner, off
                 jacobian,
                 (sole - pose.centre)[:2],
                 np.minimum(np.minimum(below, above), build.sweep).clip(1e-3),
-                _lift(jacobian, manner.lift * pose.height, below, above),
+                lifted(jacobian, manner.lift * pose.height, below, above),
                 offset / (2.0 * np.pi) + build.lead,
             )
         )
     return legs
-
-
-def _lift(jacobian, height: float, below, above) -> np.ndarray:
-    """Joint angles (n,) that lift a foot by a height."""
-    weighted = np.diag(_LIFT_WEIGHTS) @ jacobian
-    damping = (_DAMPING * abs(jacobian).max()) ** 2 * np.eye(jacobian.shape[1])
-    angles = np.linalg.solve(weighted.T @ weighted + damping, weighted.T @ (0.0, 0.0, height))
-    moved = weighted @ angles
-    angles *= moved[2] * height / max(moved @ moved, 1e-12)
-    room = np.where(angles > 0.0, np.minimum(above, _LARGEST_LIFT), np.minimum(below, _LARGEST_LIFT))
-    return angles * min(1.0, (room / np.maximum(abs(angles), 1e-12)).min())

@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import checks, rotations
 from arc_suite.cpg.law import Pattern, joint_targets, torques
-from arc_suite.models.sizing import GRAVITY, control_timestep, natural_frequency, sized
+from arc_suite.models.sizing import GRAVITY, control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.gaits import Gait
 from arc_suite.robots.spec import Body, Leg
@@ -84,15 +84,13 @@ class Stride(NamedTuple):
         sweeps, lifts, raised = [], [], []
         for leg, jacobian in zip(body.legs, pose.jacobians, strict=True):
             sweep = _sweep(leg, jacobian, reach)
-            lift = _lift(leg, jacobian, LIFT * pose.height)
+            low, high = _ranges(leg)
+            lift = lifted(jacobian, LIFT * pose.height, -low, high)
             able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
             sweeps.append(sweep)
             lifts.append(lift)
             raised.append((1.0 - able) * UNLOAD / LIFT * lift)
-        inertia = pose.inertias + [joint.armature for joint in joints]
-        gear = np.array([joint.motor.gear for joint in joints])
-        friction = np.array([joint.damping for joint in joints])
-        frequency = natural_frequency(body)
+        stiffness, damping = position_gains(body, pose.inertias)
         lateral = pose.soles[:, 1] / max(abs(pose.soles[:, 1]).max(), 1e-9)
         return cls(
             pattern=Pattern(
@@ -105,8 +103,8 @@ class Stride(NamedTuple):
                 swing=np.concatenate(lifts),
             ),
             control_timestep=control_timestep(body),
-            stiffness=inertia * frequency**2 / gear,
-            damping=(2.0 * inertia * frequency - friction).clip(0.0) / gear,
+            stiffness=stiffness,
+            damping=damping,
             steering=math.copysign(STEERING, froude) * np.repeat(lateral, counts),
         )
 
@@ -132,12 +130,17 @@ def _sweep(leg: Leg, jacobian, reach: float) -> np.ndarray:
     return _towards(jacobian, (reach, 0.0, 0.0), _SWEEP_WEIGHTS, room, room)
 
 
-def _lift(leg: Leg, jacobian, height: float) -> np.ndarray:
-    """Return the joint angles (joints of the leg,) that lift a leg's foot by a height."""
-    low, high = _ranges(leg)
-    return _towards(
-        jacobian, (0.0, 0.0, height), _LIFT_WEIGHTS, np.minimum(-low, LARGEST_LIFT), np.minimum(high, LARGEST_LIFT)
-    )
+def lifted(jacobian, height: float, below, above) -> np.ndarray:
+    """Return the joint angles (joints of the leg,) that lift a leg's foot by a height, m.
+
+    Args:
+        jacobian: (3, joints of the leg) of the foot.
+        height: m.
+        below: (joints of the leg,) room that targets have below the pose, rad.
+        above: the same above it.
+    """
+    below, above = np.minimum(below, LARGEST_LIFT), np.minimum(above, LARGEST_LIFT)
+    return _towards(jacobian, (0.0, 0.0, height), _LIFT_WEIGHTS, below, above)
 
 
 def _ranges(leg: Leg) -> np.ndarray:

@@ -56,7 +56,7 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
     options = checks.mapping("environment_kwargs", environment_kwargs)
     random, on_divergence = settings.pop("random", None), settings.pop("on_divergence", "raise")
-    task, model = prepared(domain_name, task_name, settings)
+    task, _ = prepared(domain_name, task_name, settings)
     for name in options:
         if name in _FIXED:
             raise ValueError(f"environment setting {name!r}: {_FIXED[name]}")

@@ -8,6 +8,8 @@ sqrt(h / g), and a mite and a giant walk alike.
 import functools
 import math
 
+import numpy as np
+
 from arc_suite.models.standing import Standing, standing
 from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
 
@@ -58,6 +60,21 @@ def simulation(body: Body) -> Simulation:
 def natural_frequency(body: Body) -> float:
     """Return the natural frequency of the position control of the body's joints, rad/s."""
     return _STIFFNESS / control_timestep(body)
+
+
+def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the stiffness, action per rad, and damping, action per rad/s, of critically damped position control.
+
+    Args:
+        body: sized.
+        inertias: (joints,) that the joints move, without armature, kg m^2.
+    """
+    joints = [joint for leg in body.legs for joint in leg.joints]
+    inertia = inertias + [joint.armature for joint in joints]
+    gear = np.array([joint.motor.gear for joint in joints])
+    friction = np.array([joint.damping for joint in joints])
+    frequency = natural_frequency(body)
+    return inertia * frequency**2 / gear, (2.0 * inertia * frequency - friction).clip(0.0) / gear
 
 
 @functools.lru_cache(maxsize=256)

@@ -58,6 +58,15 @@ def fitted_settings(body: Body) -> dict:
     }
 
 
+def velocity_units(body: Body, target_velocity: float) -> np.ndarray:
+    """Return the units (3,) of commands: the target velocity forward and left, m/s, and a turning velocity, rad/s.
+
+    At the latter the feet move as fast when the body turns on the spot.
+    """
+    pose, speed = standing(body), abs(target_velocity)
+    return np.array((speed, speed, speed / np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean()))
+
+
 @functools.lru_cache(maxsize=256)
 def fitted_gait(body: Body) -> gaits.Gait:
     """The metachronal gait of least duty factor that is statically stable all through its cycle.

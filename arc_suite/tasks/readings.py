@@ -111,13 +111,15 @@ def component(vectors, index: int):
     return vectors[..., index][()]
 
 
-def read(data, layout: Layout, arena: Arena) -> Readings:
+def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
     """Take the readings of a simulation.
 
     Args:
         data: `MjData`, or anything with its fields under any leading axes.
         layout: of the body in the model.
         arena: over whose ground heights are.
+        forces: (..., parts, 6) torque and force on each part in other units or another frame; None
+            for those of the simulation, N m and N in the world.
 
     Returns:
         The readings; arrays may be views of `data`.
@@ -127,7 +129,7 @@ def read(data, layout: Layout, arena: Arena) -> Readings:
     if not arena.is_level:
         numpy = qpos.__array_namespace__()
         pose = numpy.concatenate([arena.clearance(position)[..., None], pose[..., 1:]], axis=-1)
-    forces = data.cfrc_ext[..., layout.parts, :]
+    forces = data.cfrc_ext[..., layout.parts, :] if forces is None else forces
     return Readings(
         posture=pose,
         torso_position=position,

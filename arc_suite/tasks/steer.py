@@ -16,8 +16,10 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
+from arc_suite.tasks import readings as reading
 from arc_suite.tasks import terms, walk
 from arc_suite.tasks.contract import Start
+from arc_suite.tasks.fitting import velocity_units
 from arc_suite.tasks.readings import Readings, component
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
@@ -73,8 +75,7 @@ class Steer(walk.Walk):
     @functools.cached_property
     def units(self) -> np.ndarray:
         """(3,) the target velocity, twice, m/s, and rad/s at which feet move as fast when turning on the spot."""
-        pose, speed = standing(self.scene.body), abs(self.parameters.target_velocity)
-        return np.array((speed, speed, speed / np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean()))
+        return velocity_units(self.scene.body, self.parameters.target_velocity)
 
     @functools.cached_property
     def force_unit(self) -> np.ndarray:
@@ -93,15 +94,13 @@ class Steer(walk.Walk):
 
     def read(self, data) -> Readings:
         """Take the readings, with contact forces in the body's weight and as the torso heads."""
-        readings = super().read(data)
-        numpy, heading = readings.posture.__array_namespace__(), rotations.yaw(readings.torso_quaternion)[..., None]
-        forces = data.cfrc_ext[..., self.scene.layout.parts, :] / self.force_unit
-        turned = (rotations.headed(forces[..., i : i + 2], heading) for i in (0, 3))
-        torque, force = (
-            numpy.concatenate([part, forces[..., i : i + 1]], axis=-1) for part, i in zip(turned, (2, 5), strict=True)
-        )
-        forces = numpy.concatenate([torque, force], axis=-1)
-        return readings._replace(contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0))
+        layout, heading = self.scene.layout, rotations.yaw(data.qpos[..., 3:7])[..., None]
+        forces = data.cfrc_ext[..., layout.parts, :] / self.force_unit
+        parts = []
+        for i in (0, 3):  # torque, force
+            parts += [rotations.headed(forces[..., i : i + 2], heading), forces[..., i + 2 : i + 3]]
+        forces = forces.__array_namespace__().concatenate(parts, axis=-1)
+        return reading.read(data, layout, self.scene.arena, forces)
 
     def lift(self, memory: Memory, readings: Readings) -> np.ndarray:
         """Return the positions that bring every foot clear of the ground, level ground too: none is thrown up."""
