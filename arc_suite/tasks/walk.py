@@ -119,6 +119,9 @@ class Settings(NamedTuple):
     noise: Noise
 
 
+NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")  # of settings that may be overridden
+
+
 def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, float] = BONUSES) -> Settings:
     """Return the settings of a body, some of them overridden.
 
@@ -138,9 +141,8 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
     """
     row = robots.row(SETTINGS, body, "walk")
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
-    known = [*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait"]
     for name in overrides:
-        checks.name(name, known, "setting of walk")
+        checks.name(name, NAMES, "setting of walk")
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)
