@@ -95,7 +95,7 @@ for call in (
 """
     assert package(code) == [
         "unknown domain 'hoper'; did you mean 'hopper'? (there are: queen, bastion, tick, leaper, hopper)",
-        "unknown task 'strol'; did you mean 'stroll'? (there are: walk, steer, stroll)",
+        f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join(TASKS)}, stroll)",
         "domain 'hopper': cannot import nowhere: No module named 'nowhere'",
     ]
 
