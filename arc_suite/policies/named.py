@@ -1,5 +1,6 @@
 """Policies by name: some need no training; any other is found on Python's path."""
 
+import itertools
 import pkgutil
 from collections.abc import Callable, Sequence
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.cpg.presets import TUNINGS
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -43,7 +45,12 @@ HELP = (
     f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name, or from the Body "
     "of what is no robot of the suite."
 )
-PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}."
+PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
+
+
+def preset_names() -> tuple[str, ...]:
+    """Return the names of the presets that there are for any robot, those of other packages included."""
+    return tuple(dict.fromkeys(itertools.chain(PRESETS, *TUNINGS.values())))
 
 
 def policy(
@@ -56,7 +63,8 @@ def policy(
             episode's seed; or `module:attribute`, a function on Python's path that makes a function
             from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        presets: of the demonstrator, one of `cpg.PRESETS`, or several that take turns from seed to seed.
+        presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
+            that take turns from seed to seed.
         rows: of the batch.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
 
@@ -66,7 +74,7 @@ def policy(
     """
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
-        checks.name(preset, PRESETS, "preset")
+        checks.name(preset, preset_names(), "preset")
     checks.number("noise", noise, 0.0)
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, str) and ":" in name:
