@@ -86,7 +86,7 @@ soak: $(INSTALLED)
 	$(PYTHON) tests/soak.py
 
 fuzz: $(INSTALLED)
-	$(PYTHON) tests/fuzz.py --cases 1000
+	$(PYTHON) tests/fuzz.py
 
 mutants: $(INSTALLED)
 	$(PYTHON) tests/mutants.py

@@ -30,6 +30,8 @@ from arc_suite.robots.spec_files import load_body
 
 LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
 ID = "arc_suite/test/fuzz-v0"
+SETTINGS = data.Settings(ROBOTS["tick"], "random", (), steps=5)
+QUIET = functools.partial(tqdm, disable=True)
 SPEC = pathlib.Path(__file__).parents[1] / "examples" / "spider.json"
 
 READ, REFUSED, TRACEBACK, CRASHED, TOO_LONG = OUTCOMES = ("read", "refused", "traceback", "crashed", "too long")
@@ -42,13 +44,13 @@ class Kind(NamedTuple):
     Attributes:
         file: a sound one, relative to a folder in which `make` has left it.
         make: leaves it in the working folder.
-        read: reads whatever is in the working folder.
+        uses: all that reads what is in the working folder.
         may_loop: whether a library that reads it is known to loop.
     """
 
     file: str
     make: Callable[[], object]
-    read: Callable[[], object]
+    uses: tuple[Callable[[], object], ...]
     may_loop: bool = False
 
 
@@ -58,8 +60,7 @@ def _make_tracks() -> None:
 
 
 def _collect() -> None:
-    settings = data.Settings(ROBOTS["tick"], "random", (), steps=5)
-    data.collect(ID, settings, episodes=2, progress=functools.partial(tqdm, disable=True))
+    data.collect(ID, SETTINGS, episodes=2, progress=QUIET)
 
 
 def _read_spec() -> None:
@@ -67,16 +68,21 @@ def _read_spec() -> None:
     load_body("spec.json")
 
 
-def _verify() -> None:
-    list(data.open(ID))
-    data.verify(ID, progress=functools.partial(tqdm, disable=True))
+def _continue() -> None:
+    shutil.rmtree("copy", ignore_errors=True)
+    shutil.copytree("datasets", "copy")
+    os.environ["MINARI_DATASETS_PATH"] = os.path.abspath("copy")
+    data.collect(ID, SETTINGS, episodes=3, progress=QUIET)
+
+
+_USES = (lambda: list(data.open(ID)), lambda: data.verify(ID, progress=QUIET), _continue)
 
 
 KINDS = {
-    "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), _read_spec),
-    "tracks": Kind("tracks.npz", _make_tracks, lambda: style.load("tracks.npz")),
-    "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _verify),
-    "episodes of a dataset": Kind(f"datasets/{ID}/data/main_data.hdf5", _collect, _verify, may_loop=True),
+    "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),
+    "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),)),
+    "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _USES),
+    "episodes of a dataset": Kind(f"datasets/{ID}/data/main_data.hdf5", _collect, _USES, may_loop=True),
 }
 
 
@@ -120,22 +126,22 @@ def _places(tree):
             yield from _places(tree[key])
 
 
-def outcome(read: Callable[[], object], limit: float = LIMIT) -> str:
-    """Return what came of reading a file in a process of its own: one of `OUTCOMES`."""
+def outcome(*uses: Callable[[], object], limit: float = LIMIT) -> str:
+    """Return the worst that came of using a file, in a process of its own: one of `OUTCOMES`."""
     child = os.fork()
     if not child:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process wherever it is, in a library too
         signal.setitimer(signal.ITIMER_REAL, limit)
-        os._exit(OUTCOMES.index(_tried(read)))
+        os._exit(max(OUTCOMES.index(_tried(use)) for use in uses))
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if status < 0:
         return TOO_LONG if status == -signal.SIGALRM else CRASHED
     return OUTCOMES[status]
 
 
-def _tried(read: Callable[[], object]) -> str:
+def _tried(use: Callable[[], object]) -> str:
     try:
-        read()
+        use()
     except (ValueError, OSError) as error:
         if "\n" not in str(error) and 0 < len(str(error)) < 2000:
             return REFUSED
@@ -149,13 +155,13 @@ def _tried(read: Callable[[], object]) -> str:
 
 def fuzz(kind: Kind, cases: int, seed: int, label: str) -> Counter:
     """Return how often each outcome came of reading a kind of file in the working folder, differently damaged."""
-    if outcome(kind.make) != READ or outcome(kind.read) != READ:
+    if outcome(kind.make) != READ or outcome(*kind.uses) != READ:
         raise RuntimeError(f"{label}: cannot make or read a sound file")
     path, outcomes = pathlib.Path(kind.file), Counter()
     sound = path.read_bytes()
     for case in tqdm(range(cases), desc=label, unit="file", leave=False, disable=None):
         path.write_bytes(damaged(sound, np.random.default_rng((seed, case))))
-        result = outcome(kind.read)
+        result = outcome(*kind.uses)
         outcomes[result] += 1
         if result not in (READ, REFUSED):
             print(f"{label}: {result}: --seed {seed}, case {case}", file=sys.stderr)

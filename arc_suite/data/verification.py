@@ -2,25 +2,17 @@
 
 import contextlib
 from collections.abc import Callable
-from typing import Any
 
 from tqdm import tqdm
 
 from arc_suite import registry, versions
 from arc_suite.data import rollouts
 from arc_suite.data.collection import ROWS
-from arc_suite.data.dataset import open
+from arc_suite.data.dataset import open, quoted
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import model_sha256
 from arc_suite.policies import Script
 from arc_suite.robots.spec import Body
-
-_LONGEST = 80  # characters of a value that is quoted from a file
-
-
-def _shown(value: Any) -> str:
-    """Return what a file holds as text that fits into one line."""
-    return " ".join(str(value).split())[:_LONGEST]
 
 
 def verify(
@@ -56,11 +48,11 @@ def verify(
         raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {settings.task}, and not of {task}")
     for package, version in versions.recorded().items():
         if was["versions"].get(package) != version:
-            there = f"{package} {_shown(was['versions'].get(package))}"
+            there = f"{package} {quoted(was['versions'].get(package))}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
     version, task = was["settings"].get("task_version"), registry.task_of(settings.task)
     if version != task.version:
-        there = f"version {_shown(version)} of {task.name}"
+        there = f"version {quoted(version)} of {task.name}"
         raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {task.version} is installed")
     if was["model_sha256"] != model_sha256(settings.body, settings.task, settings.task_kwargs):
         raise ValueError(f"dataset {dataset_id!r} was collected with another model of {settings.body.name}")
