@@ -30,8 +30,10 @@ LONGEST = 300.0  # way ahead of the start
 END = 1.0  # before the end of a lane, at which an episode is cut off
 SINKING = 5  # control steps running after which a foot has sunk for good
 
-# Where ground is seen: points forward and left of the torso, in R, the mean distance of the feet from their centre.
-SCAN = np.stack(np.meshgrid(np.linspace(-1.5, 2.0, 15), np.linspace(-1.25, 1.25, 11), indexing="ij")).reshape(2, -1)
+# Where ground is seen: places forward and left of the torso, in R, the mean distance of the feet from their centre.
+# They are denser along the way, where trenches lie across.
+AHEAD, ASIDE = np.linspace(-1.5, 2.1, 25), np.linspace(-1.2, 1.2, 7)
+SCAN = np.stack(np.meshgrid(AHEAD, ASIDE, indexing="ij")).reshape(2, -1)
 
 
 class Ground(NamedTuple):
@@ -175,7 +177,7 @@ class Lanes(steer.Steer):
         return super().observe(memory, readings) | {"scan": self.scan(memory, readings)}
 
     def scan(self, memory: Memory, readings: Readings):
-        """Return the heights (..., 165) of the ground at `SCAN`, in standing heights, clipped to [-1, 1].
+        """Return the heights (..., 175) of the ground at `SCAN`, in standing heights, clipped to [-1, 1].
 
         0 is where the ground would be if the torso stood over it at its standing height.
         """
