@@ -25,6 +25,7 @@ from arc_suite.tasks.readings import Readings, component
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
 COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
 LOWEST = 0.3  # healthy height of the torso over the ground, in standing heights
+LYING = 0.5  # of the weight: who has it carried by the torso itself lies on the ground
 LEAST_UPRIGHT = 0.4  # healthy cosine of the torso's tilt
 # Walk's weights of rates in SI units, as Queen has them in units of her own.
 RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
@@ -167,9 +168,10 @@ class Steer(walk.Walk):
         return {name: own.get(name, walked.get(name)) for name in self.settings.weights}
 
     def healthy(self, readings: Readings):
-        """Return whether the torso is off the ground and upright: (...) booleans."""
+        """Return whether the torso is upright, and high enough without being carried by the ground: (...) booleans."""
         high = readings.torso_height >= LOWEST * self.scene.body.torso.standing_height
-        return high & (rotations.upright(readings.torso_quaternion) >= LEAST_UPRIGHT)
+        lies = component(readings.contact_forces, 5) >= LYING  # upwards on the torso
+        return high & ~lies & (rotations.upright(readings.torso_quaternion) >= LEAST_UPRIGHT)
 
     def observe(self, memory: Memory, readings: Readings) -> dict:
         """Return walk's blocks as the torso heads, without a clock at a stop; and the command beside the motion."""
