@@ -31,6 +31,7 @@ ROOMS = (
     ("data",),
     ("style",),
     ("tuning",),
+    ("agents",),  # who learns
     ("cli",),  # programs
     ("doctor", "__main__"),  # that Python starts by name
 )
@@ -57,6 +58,10 @@ THIRD_PARTY = {
     "registration": {"gymnasium"},
     "policies": {"numpy", "dm_env"},
     "evaluation.statistics": {"numpy"},
+    "agents": {"numpy", "gymnasium", "tqdm"},
+    "agents.networks": {"numpy", "jax"},
+    "agents.off_policy": {"numpy", "jax"},
+    "agents.soft_actor_critic": {"numpy", "jax", "optax"},
     "style.metrics": {"numpy"},
 }
 
@@ -170,7 +175,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
 
 
 def test_import_is_light():
-    heavy = ("torch", "stable_baselines3", "shimmy", "matplotlib", "imageio")
+    heavy = ("torch", "jax", "stable_baselines3", "shimmy", "matplotlib", "imageio")
     code = f"import sys, arc_suite; print([m for m in {heavy} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"
