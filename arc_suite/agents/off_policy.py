@@ -6,7 +6,6 @@ stopping, a share of the buffer is held out of the phase and tells when to stop.
 """
 
 import functools
-import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -18,10 +17,12 @@ from arc_suite.agents import networks, priors
 from arc_suite.agents import soft_actor_critic as sac
 from arc_suite.agents.algorithms import SoftActorCritic
 from arc_suite.agents.learner import ENVIRONMENT, Diverged, Stage, generator
-from arc_suite.agents.replay import Replay, Transitions
+from arc_suite.agents.replay import Fenced, Replay, Transitions
 from arc_suite.agents.stopping import Patience
 
 SLICE = 1000  # environment steps, or updates of a phase
+
+_ROWS = 4096  # observations that the policy sees at a time
 
 
 class Phase(NamedTuple):
@@ -47,13 +48,21 @@ def begin(row: SoftActorCritic, stage: Stage) -> "OffPolicy":
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=(1, 2))
-def _update(row: SoftActorCritic, state: sac.State, sums: dict, batch: Transitions, noise: sac.Noise):
-    state, figures = sac.update(row, state, batch, noise)
+def _update(row: SoftActorCritic, state: sac.State, sums: dict, batch: Transitions, noise: sac.Noise, following):
+    state, figures = sac.update(row, state, batch, noise, following)
     return state, {name: sums[name] + figure for name, figure in figures.items()}
 
 
-_act = jax.jit(lambda policy, observation, noise: sac.sample(policy, observation, noise)[0])
+_act = jax.jit(lambda policy, observation, noise: sac.sample(*sac.distribution(policy, observation), noise)[0])
+_distribution = jax.jit(sac.distribution)
 _look = jax.jit(sac.held_out_loss, static_argnums=0)
+
+# What an update takes a batch of each from, by what prior data are.
+_SOURCES = {
+    "none": lambda online, prior: [online],
+    "fenced": lambda online, prior: [Fenced(prior, online)],
+    "beside": lambda online, prior: [online, prior],
+}
 
 _FIGURES = ("policy_loss", "critic_loss", "q", "entropy", "alpha")
 _OF_CRITICS = ("critic_loss", "q")
@@ -79,8 +88,7 @@ class OffPolicy:
         self._prior = None if stage.prior is None else priors.mapped(stage, self._environment.task)
         capacity = min(row.capacity, stage.steps)
         self._replay = Replay(stage.folder / "replay", capacity, size, self._joints, slack=SLICE)
-        # What an update takes a batch of each from, unless prior data lie in one buffer with the others.
-        self._sources = [self._replay, *([self._prior] if row.prior == "beside" else [])]
+        self._sources = _SOURCES[row.prior](self._replay, self._prior)
         self._state = sac.begin(row, generator(stage.seed, "networks", 0), size, self._joints)
         self._observation = self._environment.reset()[0][0]
         self._sums = _zeros(_FIGURES)
@@ -88,6 +96,7 @@ class OffPolicy:
         self._earned = {"present": 0.0, "latest": 0.0}  # return of the present episode, and of the one before
         self._phase: Phase | None = None
         self._orders: list[np.ndarray] | None = None  # of each source's transitions; the first are held out
+        self._following: list | None = None  # the policy's distributions after each source's transitions in a phase
 
     @property
     def step(self) -> int:
@@ -133,7 +142,7 @@ class OffPolicy:
         if arrays["phase"].size:
             updates, held_out, best, waited = arrays["phase"]
             self._phase = Phase(int(updates), int(held_out), Patience(float(best), int(waited)))
-            self._orders = self._drawn_orders()
+            self._prepare_phase()
         snapshot = {
             name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)
         }
@@ -153,8 +162,7 @@ class OffPolicy:
         if is_last:
             self._earned = {"present": 0.0, "latest": self._earned["present"]}
         count["steps"] += 1
-        batch, noise = self._drawn(with_policy=True)
-        self._state, self._sums = _update(row, self._state, self._sums, batch, noise)
+        self._state, self._sums = _update(row, self._state, self._sums, *self._drawn(with_policy=True))
         count["updates"] += 1
         count["summed"] += 1
         if row.phase_updates and count["steps"] % row.phase_every == 0:
@@ -162,8 +170,7 @@ class OffPolicy:
 
     def _action(self) -> np.ndarray:
         random = generator(self._seed, "action", self._count["steps"])
-        fenced = len(self._prior) if self._row.prior == "fenced" else 0
-        if fenced + len(self._replay) <= self._row.random_steps:
+        if len(self._sources[0]) <= self._row.random_steps:
             return random.uniform(-1.0, 1.0, self._joints).astype(np.float32)
         noise = random.standard_normal(self._joints, np.float32)
         action = np.asarray(_act(self._state.policy, self._observation, noise))
@@ -171,39 +178,50 @@ class OffPolicy:
             raise Diverged(f"the learner diverged: its action is not finite at step {self.step}")
         return action
 
-    def _drawn(self, with_policy: bool) -> tuple[Transitions, sac.Noise]:
-        """Draw the batch and the noise of the next update."""
+    def _drawn(self, with_policy: bool):
+        """Draw the batch and the noise of the next update; in a phase also return what the policy does next."""
         row, random = self._row, generator(self._seed, "update", self._count["updates"])
-        if row.prior == "fenced":
-            first = len(self._prior)
-            indices = random.integers(first + len(self._replay), size=row.batch)
-            fenced = indices < first
-            batch = _joined(self._prior.at(indices[fenced]), self._replay.at(indices[~fenced] - first))
-        else:
+        batches, following = [], []
+        for place, source in enumerate(self._sources):
             held_out = 0 if self._phase is None else self._phase.held_out
-            batches = []
-            for place, source in enumerate(self._sources):
-                indices = random.integers(held_out, len(source), size=row.batch)
-                batches.append(source.at(self._orders[place][indices] if held_out else indices))
-            batch = _joined(*batches)
-        return batch, sac.noise(row, random, len(batch.rewards), self._joints, with_policy)
+            indices = random.integers(held_out, len(source), size=row.batch)
+            indices = self._orders[place][indices] if held_out else indices
+            batches.append(source.at(indices))
+            if self._phase is not None:
+                following.append([numbers[indices] for numbers in self._following[place]])
+        batch = Transitions(*_joined(batches))
+        noise = sac.noise(row, random, len(batch.rewards), self._joints, with_policy)
+        return batch, noise, _joined(following) if following else None
 
     def _begin_phase(self) -> None:
         row = self._row
         wanted = 0 if row.early_stop == "none" else max(row.batch, int(row.held_out * len(self._replay)))
         most = min(map(len, self._sources)) - row.batch
         held_out = min(wanted, most)
-        self._phase = Phase(0, held_out if held_out >= row.batch else 0, Patience(math.inf))
-        self._orders = self._drawn_orders()
+        self._phase = Phase(0, held_out if held_out >= row.batch else 0, Patience(0.0))
+        self._prepare_phase()
         if self._phase.held_out:
             self._phase = self._phase._replace(patience=Patience(self._look()))
 
-    def _drawn_orders(self) -> list[np.ndarray] | None:
-        """Draw what is held out of the present phase, the same again after a restore."""
-        if not self._phase.held_out:
-            return None
-        random = generator(self._seed, "held out", self._count["steps"])
-        return [random.permutation(len(source)).astype(np.int32) for source in self._sources]
+    def _prepare_phase(self) -> None:
+        """Draw what is held out of the present phase, and let the policy, which rests, say what it does next.
+
+        The same again after a restore.
+        """
+        if self._phase.held_out:
+            random = generator(self._seed, "held out", self._count["steps"])
+            self._orders = [random.permutation(len(source)).astype(np.int32) for source in self._sources]
+        self._following = [self._distributions(source) for source in self._sources]
+
+    def _distributions(self, source) -> list[np.ndarray]:
+        """Return the policy's distribution of the next observation of every transition."""
+        results = [np.empty((len(source), self._joints), np.float32) for _ in range(2)]
+        for first in range(0, len(source), _ROWS):
+            indices = np.arange(first, first + _ROWS).clip(max=len(source) - 1)  # of one shape, so compiled once
+            part = _distribution(self._state.policy, source.at(indices).next_observations)
+            for result, numbers in zip(results, part, strict=True):
+                result[first : first + _ROWS] = numbers[: len(source) - first]
+        return results
 
     def _advance_phase(self) -> None:
         """Make updates of the critics up to the next look, take it, and end the phase if it is time."""
@@ -218,7 +236,7 @@ class OffPolicy:
             self._phase = phase = phase._replace(patience=patience)
         if phase.updates == row.phase_updates or (phase.held_out and phase.patience.waited >= row.patience):
             count["phase_updates"] += phase.updates
-            self._phase = self._orders = None
+            self._phase = self._orders = self._following = None
 
     def _look(self) -> float:
         """Return the policy's loss on what is held out."""
@@ -245,5 +263,6 @@ class OffPolicy:
         return figures
 
 
-def _joined(*batches: Transitions) -> Transitions:
-    return batches[0] if len(batches) == 1 else Transitions(*map(np.concatenate, zip(*batches, strict=True)))
+def _joined(several: list) -> list[np.ndarray]:
+    """Arrays of several sources, one after the other."""
+    return several[0] if len(several) == 1 else [np.concatenate(arrays) for arrays in zip(*several, strict=True)]

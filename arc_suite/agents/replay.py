@@ -121,3 +121,23 @@ class Replay:
         except OSError as error:
             raise OSError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from None
         return np.memmap(path, dtype, self._mode, shape=shape)
+
+
+class Fenced:
+    """Two sources of transitions as one, the first of which is never overwritten."""
+
+    def __init__(self, first: Replay, second: Replay):
+        """Take the sources."""
+        self._first, self._second = first, second
+
+    def __len__(self) -> int:
+        """Return how many transitions can be sampled."""
+        return len(self._first) + len(self._second)
+
+    def at(self, indices: np.ndarray) -> Transitions:
+        """Return copies of transitions by index, those of the first source before those of the second."""
+        count = len(self._first)
+        of_first = indices < count
+        parts = self._first.at(indices[of_first]), self._second.at(indices[~of_first] - count)
+        places = np.argsort(np.concatenate([np.flatnonzero(of_first), np.flatnonzero(~of_first)]))
+        return Transitions(*(np.concatenate(pair)[places] for pair in zip(*parts, strict=True)))

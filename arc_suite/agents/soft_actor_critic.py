@@ -112,9 +112,8 @@ def distribution(policy, observations):
     return networks.linear(policy["mean"], x), jnp.clip(networks.linear(policy["log_std"], x), *LOG_STD)
 
 
-def sample(policy, observations, noise):
+def sample(mean, log_std, noise):
     """Return actions (..., joints) for standard normal noise, and the logarithm of their density (...)."""
-    mean, log_std = distribution(policy, observations)
     action = jnp.tanh(mean + jnp.exp(log_std) * noise)
     density = -0.5 * noise * noise - log_std - 0.5 * _LOG_TWO_PI - jnp.log(1.0 - action * action + _TINY)
     return action, density.sum(axis=-1)
@@ -139,9 +138,10 @@ def values(critics, observations, actions, kept=None, dropout: float = 0.0):
     return results
 
 
-def targets(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise):
-    """Return what the critics are to say of a batch, (batch,)."""
-    action, density = sample(state.policy, batch.next_observations, noise.next_action)
+def targets(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise, following=None):
+    """Return what the critics are to say of a batch, (batch,); `following` as in `update`."""
+    following = distribution(state.policy, batch.next_observations) if following is None else following
+    action, density = sample(*following, noise.next_action)
     kept = None if noise.kept is None else noise.kept[0]
     least = jnp.minimum(*values(state.targets, batch.next_observations, action, kept, row.dropout))
     return batch.rewards + row.discount * batch.goes_on * (least - jnp.exp(state.log_alpha) * density)
@@ -155,12 +155,12 @@ def critics_loss(row: SoftActorCritic, critics, batch: Transitions, wanted, kept
 
 def policy_loss(row: SoftActorCritic, policy, state: State, observations, noise, kept):
     """Return the mean of alpha log pi - mean of the critics, and the mean of log pi."""
-    action, density = sample(policy, observations, noise)
+    action, density = sample(*distribution(policy, observations), noise)
     value = sum(values(state.critics, observations, action, kept, row.dropout)) / CRITICS
     return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
 
 
-def update(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise) -> tuple[State, dict]:
+def update(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise, following=None) -> tuple[State, dict]:
     """Return the state after one update, and its figures, scalars by name.
 
     Args:
@@ -168,9 +168,10 @@ def update(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise)
         state: before.
         batch: transitions, with one leading axis.
         noise: what is random; without `action`, critics alone learn.
+        following: the policy's `distribution` of the next observations, where it has been computed before.
     """
     masks = (None, None, None) if noise.kept is None else noise.kept
-    wanted = targets(row, state, batch, noise)
+    wanted = targets(row, state, batch, noise, following)
     critic_gradient = jax.value_and_grad(critics_loss, argnums=1, has_aux=True)
     (critic_loss, value), gradient = critic_gradient(row, state.critics, batch, wanted, masks[1])
     critics, moments = _moved(row, "critics", state.critics, gradient, state.moments)

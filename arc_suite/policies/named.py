@@ -104,6 +104,8 @@ def _from_file(path: Path, body: Body) -> Policy:
     if made.robot != body.name and made.robot != body_to_json(body):
         name = "another body" if made.robot.startswith("{") else made.robot
         raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
+    if made.joints != len(body.joint_names):
+        raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
     return made
 
 

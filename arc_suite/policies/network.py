@@ -22,10 +22,10 @@ from arc_suite import checks, files
 EXTENSION = ".npz"
 FILE = f"policy{EXTENSION}"  # in the folder of a run
 
-_EPSILON = 1e-5  # of a layer norm, as in PyTorch
+EPSILON = 1e-5  # of a layer norm, as in PyTorch
 
 # What may be wrong with a file.
-_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
+_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, MemoryError, zipfile.BadZipFile)
 _MAX_BYTES = 1 << 28
 
 
@@ -48,7 +48,7 @@ def _linear(x, weight, bias):
 
 def _layer_norm(x, scale, offset):
     x = x - x.mean(axis=-1, keepdims=True)
-    return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(_EPSILON)) * scale + offset
+    return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(EPSILON)) * scale + offset
 
 
 class Kind(NamedTuple):
@@ -94,6 +94,16 @@ class Network(NamedTuple):
     task: str
     task_kwargs: Mapping[str, Any]
     blocks: Mapping[str, int]
+
+    @property
+    def size(self) -> int:
+        """Of a flat observation."""
+        return sum(self.blocks.values())
+
+    @property
+    def joints(self) -> int:
+        """Of an action."""
+        return self.actions(np.zeros((1, self.size), np.float32)).shape[1]
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
         """Return actions (rows, joints) float32 for flat observations (rows, size)."""
@@ -150,14 +160,24 @@ def load(path: str | os.PathLike) -> Network:
             arrays = {name: stored[name] for name in stored.files}
         network = Network(
             tuple(_layer(kind, index, arrays) for index, kind in enumerate(known["layers"])),
-            *(known[name] for name in ("robot", "task", "task_kwargs", "blocks")),
+            **{name: _typed(name, known[name], kind) for name, kind in _KINDS_OF_FIELDS.items()},
         )
-        network.actions(np.zeros((1, sum(network.blocks.values())), np.float32))  # the shapes fit
+        if network.joints < 1:  # finds out whether the shapes fit
+            raise ValueError("expected actions")
         return network
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except _DAMAGES as error:
         raise ValueError(f"{path}: no policy, or a damaged one: {' '.join(str(error).split())[:200]}") from None
+
+
+_KINDS_OF_FIELDS = {"robot": str, "task": str, "task_kwargs": dict, "blocks": dict}
+
+
+def _typed(name: str, value: Any, kind: type) -> Any:
+    if not isinstance(value, kind):
+        raise TypeError(f"expected {name} to be a {kind.__name__}")
+    return value
 
 
 def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray]) -> Layer:

@@ -57,6 +57,8 @@ THIRD_PARTY = {
     "cpg.presets": set(),
     "registration": {"gymnasium"},
     "policies": {"numpy", "dm_env"},
+    "policies.network": {"numpy"},
+    "policies.onnx_file": {"numpy", "onnx"},
     "evaluation.statistics": {"numpy"},
     "agents": {"numpy", "gymnasium", "tqdm"},
     "agents.networks": {"numpy", "jax"},
