@@ -83,6 +83,8 @@ class OffPolicy:
             OSError: the disk is too small for the buffer; one line.
         """
         self._row, self._seed, self._steps_of_run = row, stage.seed, stage.steps
+        # What updates depend on: rows that differ in the rest share compiled programs.
+        self._core = SoftActorCritic(**{name: getattr(row, name) for name in sac.NUMBERS})
         self._environment = stage.environment()
         size, self._joints = self._environment.task.size, self._environment.single_action_space.shape[0]
         self._prior = None if stage.prior is None else priors.mapped(stage, self._environment.task)
@@ -162,7 +164,7 @@ class OffPolicy:
         if is_last:
             self._earned = {"present": 0.0, "latest": self._earned["present"]}
         count["steps"] += 1
-        self._state, self._sums = _update(row, self._state, self._sums, *self._drawn(with_policy=True))
+        self._state, self._sums = _update(self._core, self._state, self._sums, *self._drawn(with_policy=True))
         count["updates"] += 1
         count["summed"] += 1
         if row.phase_updates and count["steps"] % row.phase_every == 0:
@@ -228,7 +230,7 @@ class OffPolicy:
         row, count, phase, sums = self._row, self._count, self._phase, _zeros(_OF_CRITICS)
         updates = min(row.check_every, row.phase_updates - phase.updates)
         for _ in range(updates):
-            self._state, sums = _update(row, self._state, sums, *self._drawn(with_policy=False))
+            self._state, sums = _update(self._core, self._state, sums, *self._drawn(with_policy=False))
             count["updates"] += 1
         self._phase = phase = phase._replace(updates=phase.updates + updates)
         if phase.held_out:
@@ -247,7 +249,7 @@ class OffPolicy:
         random = generator(self._seed, "look", self._count["updates"])
         noise = sac.noise(row, random, len(observations), self._joints, with_policy=True)
         kept = None if noise.kept is None else noise.kept[2]
-        return float(_look(row, self._state, observations, noise.action, kept))
+        return float(_look(self._core, self._state, observations, noise.action, kept))
 
     def _figures(self) -> dict[str, float]:
         count = self._count

@@ -24,6 +24,7 @@ from arc_suite.agents.algorithms import SoftActorCritic
 from arc_suite.agents.replay import Transitions
 from arc_suite.policies.network import Layer
 
+NUMBERS = ("hidden", "learning_rate", "discount", "averaging", "dropout")  # of a row, that an update depends on
 CRITICS = 2
 HIDDEN_LAYERS = 2
 LOG_STD = (-20.0, 2.0)  # bounds of the logarithm of the policy's standard deviation
