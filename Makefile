@@ -8,6 +8,7 @@
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make census  walks 500 random bodies and tells which do
 # make soak    two million steps: memory, threads and files stay what they are
+# make fuzz    damages specs, tracks and datasets at random and reads them; minutes
 # make mutants plants mistakes and tells which test catches each; takes hours
 # make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
 SHELL := /bin/bash
@@ -15,7 +16,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-clients check-jax bench census soak mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients check-jax bench census soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -50,8 +51,9 @@ check-lowest: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	tools/ensure_egl.sh $(VENV)/bin/python
 	$(VENV)/bin/python -m pip install -q -e '.[test]' 'gymnasium==1.2.0'
-	$(VENV)/bin/python -m pytest tests/envs tests/data tests/tasks/test_conformance.py tests/simulation/test_divergence.py \
-		tests/house/test_threads.py tests/house/test_errors.py tests/house/test_surroundings.py
+	$(VENV)/bin/python -m pytest $(PARALLEL) tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
+		tests/tasks/test_conformance.py tests/simulation/test_divergence.py tests/house/test_threads.py \
+		tests/house/test_errors.py
 
 # torch comes first, so that stable-baselines3 keeps it. Where the default build is one for GPUs, a CPU
 # build is had with PIP_EXTRA_INDEX_URL set to PyTorch's CPU index and TORCH=torch==2.13.0+cpu.
@@ -82,6 +84,9 @@ census: $(INSTALLED)
 
 soak: $(INSTALLED)
 	$(PYTHON) tests/soak.py
+
+fuzz: $(INSTALLED)
+	$(PYTHON) tests/fuzz.py
 
 mutants: $(INSTALLED)
 	$(PYTHON) tests/mutants.py

@@ -76,6 +76,21 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
     return float(value)
 
 
+def boolean(what: str, value: Any) -> bool:
+    """Return the value as a Python boolean.
+
+    Args:
+        what: name of the value, with which an error begins.
+        value: True or False, of Python or NumPy.
+
+    Raises:
+        ValueError: it is neither; one line.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{what}: expected true or false, got {value!r}")
+    return bool(value)
+
+
 def array(what: str, value: Any, size: int) -> np.ndarray:
     """Return the value as (size,) floats; a single number stands for all of them.
 

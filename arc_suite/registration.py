@@ -38,7 +38,8 @@ def register(
             one's memory import it to know the names too. None where nobody else needs them.
         body: of the robot; its name becomes a domain.
         walk: the robot's row of numbers in the task walk: keys and units as in `tasks.walk.SETTINGS`,
-            and any of `tasks.walk.COMMON`; None to have them fitted to the body.
+            and any of `tasks.walk.COMMON`; noise that it does not set is fitted, and None has all
+            numbers fitted to the body.
         tuning: presets of a demonstrator of the robot by name, slow, medium and fast among them; None
             to have them fitted likewise.
         look: what the robot wears; None for what every body wears.
@@ -94,7 +95,7 @@ def _register_body(body, row, tuning, look) -> None:
 
 
 def _check_row(body: Body, row: Mapping[str, Any]) -> None:
-    needed = walk.SETTINGS["queen"].keys() - {"weights"}
+    needed = walk.SETTINGS["queen"].keys() - {"weights", *walk.SHARED_NOISE}
     if missing := sorted(needed - row.keys()):
         raise ValueError(f"walk: {body.name} has no {' and no '.join(missing)}")
     walk.settings(body, row)

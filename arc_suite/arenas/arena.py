@@ -32,6 +32,10 @@ class Arena(ABC):
         """Return the heights (...) of points (..., 3) over the ground under them, m."""
         return points[..., 2] - self.height(points[..., 0], points[..., 1])
 
+    def torso_clearance(self, positions):
+        """Return the heights (...) of torsos at positions (..., 3) over the ground that counts for them, m."""
+        return self.clearance(positions)
+
     @property
     def is_level(self) -> bool:
         """Return whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""

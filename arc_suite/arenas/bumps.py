@@ -7,6 +7,7 @@ import math
 import numpy as np
 from dm_control import mjcf
 
+from arc_suite.arenas import field
 from arc_suite.arenas.arena import Arena
 from arc_suite.robots.spec import Body
 
@@ -31,33 +32,15 @@ class Bumps(Arena):
 
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the height field `floor`."""
-        shares = self._shares
-        rows, columns = shares.shape
-        root.asset.add(
-            "hfield",
-            name="floor",
-            nrow=rows,
-            ncol=columns,
-            size=(*self._halves, self.highest * self.unit, _BASE * self.unit),
-            elevation=shares[::-1].ravel(),  # MJCF lists rows from the far side in y
-        )
-        root.worldbody.add("geom", name="floor", type="hfield", hfield="floor", conaffinity=1, **contact)
+        field.add(root, self._shares, (*self._halves, self.highest * self.unit, _BASE * self.unit), **contact)
 
     def height(self, x, y):
         """Return the height (...) of the triangles under points: those that MuJoCo's collisions meet, m."""
-        numpy = x.__array_namespace__()
-        shares, (half_x, half_y) = numpy.asarray(self._shares), self._halves
+        shares, (half_x, half_y) = self._shares, self._halves
         rows, columns = shares.shape
-        u = ((x + half_x) / (2.0 * half_x)).clip(0.0, 1.0) * (columns - 1)
-        v = ((y + half_y) / (2.0 * half_y)).clip(0.0, 1.0) * (rows - 1)
-        column = numpy.floor(u).astype(int).clip(0, columns - 2)
-        row = numpy.floor(v).astype(int).clip(0, rows - 2)
-        u, v = u - column, v - row
-        low, high = shares[row, column], shares[row + 1, column + 1]
-        # A cell is two triangles, on either side of the diagonal from its lowest to its highest indices.
-        right = low + u * (shares[row, column + 1] - low) + v * (high - shares[row, column + 1])
-        left = low + v * (shares[row + 1, column] - low) + u * (high - shares[row + 1, column])
-        return self.highest * self.unit * numpy.where(u > v, right, left)
+        u = (x + half_x) / (2.0 * half_x) * (columns - 1)
+        v = (y + half_y) / (2.0 * half_y) * (rows - 1)
+        return self.highest * self.unit * field.height(shares, u, v)
 
     @property
     def _halves(self) -> tuple[float, float]:
@@ -72,7 +55,7 @@ class Bumps(Arena):
         turn = 2.0 * math.pi / _WAVE
         wave = 0.5 - 0.5 * np.cos(turn * x) * np.cos(turn * y)[:, None]
         wave *= (np.hypot(x, y[:, None]) / _WAVE - 0.5).clip(0.0, 1.0)  # level where a body stands at first
-        return wave.astype(np.float32).astype(float)
+        return field.shares(wave)
 
 
 def fitted(body: Body) -> Bumps:

@@ -15,18 +15,16 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import bodies, define_body, define_task, made_body, task
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
 from arc_suite.cli.program import progress
-from arc_suite.cpg import PRESETS
-from arc_suite.robots import ROBOTS
 from arc_suite.tasks.contract import STEPS
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{', '.join(ROBOTS)}, or all in turn.")
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all in turn.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
-flags.DEFINE_list("preset", ["medium"], f"Of the cpg: {', '.join(PRESETS)}; several with commas take turns.")
+flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
 flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1)
 flags.DEFINE_integer(
@@ -58,7 +56,7 @@ def main() -> None:
         return
     if FLAGS.id is not None and len(walkers) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(walkers)}")
-    presets = tuple(checks.name(preset, PRESETS, "preset") for preset in FLAGS.preset)
+    presets = tuple(checks.name(preset, policies.preset_names(), "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
     for body in walkers.values():
         settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)

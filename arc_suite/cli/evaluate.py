@@ -13,14 +13,13 @@ from absl import flags
 
 import arc_suite
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
 from arc_suite.cli.program import progress
-from arc_suite.robots import ROBOTS
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "all", f"{', '.join(ROBOTS)}, or all.")
+_ROBOT = flags.DEFINE_string("robot", "all", f"{ROBOT_HELP}, or all.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)

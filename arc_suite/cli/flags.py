@@ -12,6 +12,8 @@ from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
 
+ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
+
 
 def define_body() -> None:
     """Define --spec, --legs and --links, by which a program takes any body."""
@@ -52,12 +54,17 @@ def made_body() -> Body | None:
 def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
 
+    A robot of another package is named `module:name`, and its module imported.
+
     Raises:
         ValueError: as `made_body`, or an unknown robot, or a robot beside a body; one line.
         OSError: as `made_body`.
     """
     body = made_body()
     if body is None:
+        if ":" in robot.value:
+            body = registry.body_of(robot.value)
+            return {body.name: body}
         name = checks.name(robot.value, [*ROBOTS, "all"], "robot")
         return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
     if robot.present:

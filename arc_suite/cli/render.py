@@ -20,12 +20,11 @@ from absl import flags
 import arc_suite
 from arc_suite import checks, files
 from arc_suite.cli import films
-from arc_suite.cli.flags import bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.policies import HELP, PRESET_HELP, alone, policy
-from arc_suite.robots import ROBOTS
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80}
 _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
@@ -34,7 +33,7 @@ _CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{', '.join(ROBOTS)}, or all of them side by side.")
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all of them side by side.")
 flags.DEFINE_string("policy", "cpg", HELP)
 flags.DEFINE_string("preset", "medium", PRESET_HELP)
 flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)

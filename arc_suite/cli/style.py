@@ -17,17 +17,14 @@ import pathlib
 from absl import flags
 
 from arc_suite import evaluation, files, policies, style, versions
-from arc_suite.cli.flags import bodies, define_body, define_task, made_body, task
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
 from arc_suite.cli.program import progress
-from arc_suite.robots import ROBOTS
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string(
-    "robot", "queen", f"{', '.join(ROBOTS)}, or all. [default: the one of stored tracks, else queen]"
-)
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all. [default: the one of stored tracks, else queen]")
 flags.DEFINE_string("policy", "cpg", sources.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_string("compare", None, "A second policy, file or dataset, shown beside the first.")
@@ -156,7 +153,9 @@ def saving(robots: list[str]):
 
 def main() -> None:
     """Record, measure, print and write."""
-    task()  # imports the modules that flags name, which datasets and tracks may need and cannot import
+    # Both import the modules that flags name, which datasets and tracks may need and cannot import.
+    task()
+    bodies(_ROBOT)
     chosen = chosen_sources()
     stages = chosen_stages([source.stage for source in chosen.values() if source.stage is not None])
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)

@@ -1,6 +1,7 @@
 """Demonstrators: policies that walk by a law, each a preset by name for any body."""
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
@@ -29,6 +30,11 @@ class Demonstrator:
     `steering.MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
     of a batch by `begin` and `act`, as every policy does, and in one environment as a function of a
     `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
+
+    An observation tells little of whose it is: one of another number of joints or rigid bodies is
+    refused, and one whose episode starts at less than half or more than twice the height at which the
+    body stands is warned of, since a task may start so. Another robot of as many parts and about the
+    same height cannot be told from the body, and walks badly.
     """
 
     def __init__(self, robot: str | Body, preset: str | Preset = "medium", froude: float | None = None, gait=None):
@@ -60,6 +66,7 @@ class Demonstrator:
         hopeless = [] if isinstance(preset, Preset) else [flaw.text for flaw in flaws(body) if flaw.hopeless]
         if hopeless:
             raise ValueError(f"{body.name} cannot walk: {hopeless[0]}")
+        self._body, self._started = body, []
         if isinstance(preset, float):
             speed = preset if froude is None else froude
             self._law = OnClock(body, Stride.fit(body, speed, gait or fitted_gait(body)))
@@ -75,6 +82,7 @@ class Demonstrator:
     def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start episodes in some rows, given by their indices; seeds make no difference."""
         self._law.begin(rows)
+        self._started = list(rows)
 
     def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
         """Return the actions of a control step.
@@ -89,16 +97,27 @@ class Demonstrator:
         Raises:
             ValueError: not named blocks, those of another body, or none that the preset needs; one line.
         """
-        return self._law.act(observation)
+        actions = self._law.act(observation)
+        if self._started:
+            self._look_at_start(observation)
+        return actions
 
     def __call__(self, timestep) -> np.ndarray:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
         if timestep.first():
-            self._law.begin([0])
+            self.begin([0])
         observation = timestep.observation
         if isinstance(observation, Mapping):
             observation = {name: np.asarray(block)[None] for name, block in observation.items()}
-        return self._law.act(observation)[0]
+        return self.act(observation)[0]
+
+    def _look_at_start(self, observation: Mapping[str, np.ndarray]) -> None:
+        """Warn of starts that look like those of another body."""
+        heights = np.atleast_2d(observation["posture"])[self._started, ..., 0]
+        name, stands, self._started = self._body.name, self._body.torso.standing_height, []
+        if ((heights < 0.5 * stands) | (heights > 2.0 * stands)).any():
+            text = f"{name} stands {stands:g} m high, and the torso starts below half or above twice that"
+            warnings.warn(f"{text}: is this the demonstrator of another robot?", stacklevel=3)
 
 
 class OnClock:
@@ -106,7 +125,7 @@ class OnClock:
 
     def __init__(self, body: Body, control: "Stride | Prescribed"):
         """Take the control of a body."""
-        self._control, self._joints = control, len(body.joint_names)
+        self._control, self._size = control, (len(body.joint_names), len(body.part_names))
         self._clock = np.array(0)
 
     def begin(self, rows: Sequence[int]) -> None:
@@ -118,7 +137,7 @@ class OnClock:
 
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the actions; see `Demonstrator.act`."""
-        quaternion, angles, velocities = felt(observation, self._joints)
+        quaternion, angles, velocities = felt(observation, *self._size)
         if self._clock.shape != angles.shape[:-1]:
             self._clock = np.broadcast_to(self._clock, angles.shape[:-1]).copy()
         action = self._control(self._clock, quaternion, angles, velocities)

@@ -48,11 +48,19 @@ def torques(targets, angles, velocities, stiffness, damping) -> np.ndarray:
     return (stiffness * (targets - angles) - damping * velocities).clip(-1.0, 1.0)
 
 
-def felt(observation: Mapping[str, np.ndarray], joints: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def felt(
+    observation: Mapping[str, np.ndarray], joints: int, parts: int | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return what a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities.
 
+    Args:
+        observation: blocks by name, each (..., size).
+        joints: of the body.
+        parts: rigid bodies of the body, to compare with contact forces where those are observed; None to
+            compare nothing.
+
     Raises:
-        ValueError: not named blocks, or those of a body with another number of joints; one line.
+        ValueError: not named blocks, or those of a body with another number of joints or parts; one line.
     """
     if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
         raise ValueError(
@@ -64,4 +72,7 @@ def felt(observation: Mapping[str, np.ndarray], joints: int) -> tuple[np.ndarray
     if (angles.shape[-1], speeds.shape[-1]) != (joints, joints):
         found = f"{angles.shape[-1]} angles and {speeds.shape[-1]} velocities"
         raise ValueError(f"observation: expected those of {joints} joints, got {found}")
+    forces = np.shape(observation.get("contact_forces"))
+    if parts is not None and forces and forces[-1] != 6 * parts:
+        raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces[-1] / 6:g}")
     return quaternion, angles, speeds

@@ -109,7 +109,7 @@ class Steered:
         """
         self._manner = manner
         build = build or robots.row(BUILDS, body, "steering") or Build()
-        body = sized(body)
+        body, self._parts = sized(body), len(body.part_names)
         parameters = walk.settings(body, {}).parameters
         self._duty, self._unload = parameters.duty_factor, build.unload / self._manner.lift
         self._neutral = _neutral(body, build.share)
@@ -132,7 +132,7 @@ class Steered:
 
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
-        quaternion, angles, velocities = felt(observation, len(self._neutral))
+        quaternion, angles, velocities = felt(observation, len(self._neutral), self._parts)
         if missing := {"gait_clock", "command"} - observation.keys():
             raise ValueError(f"observation: expected a block {min(missing)}, as the task steer has")
         clock, commanded = (np.asarray(observation[name], dtype=float) for name in ("gait_clock", "command"))

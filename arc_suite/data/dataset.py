@@ -139,8 +139,12 @@ def damages(dataset_id: str, file: Path):
     try:
         yield
     except _DAMAGES as error:
-        reason = " ".join(str(error).split())[:_REASON]
-        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {reason}") from None
+        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {quoted(error)}") from None
+
+
+def quoted(value) -> str:
+    """Return what comes from a file as text that fits into a line."""
+    return " ".join(str(value).split())[:_REASON]
 
 
 def plain(path: Path) -> Path:

@@ -32,6 +32,8 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     body, kind = registry.body_of(domain_name), registry.task_of(task_name)
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
     time_limit, arena = settings.pop("time_limit", None), settings.pop("arena", None)
+    if arena is not None and kind.own_arena:
+        raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
     settings = kind.fitted(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)

@@ -94,10 +94,10 @@ def sized(body: Body) -> Body:
     pose = standing(body)
     frequency = natural_frequency(body)
     least_load = _LEAST_LEVER * pose.height * pose.mass * GRAVITY / len(body.legs)
-    legs, first = [], 0
+    legs, loads, first = [], abs(pose.loads), 0
     for leg in body.legs:
         last = first + len(leg.joints)
-        legs.append(_sized_leg(leg, pose.inertias[first:last], pose.loads[first:last], least_load, frequency))
+        legs.append(_sized_leg(leg, pose.inertias[first:last], loads[first:last], least_load, frequency))
         first = last
     return body.replace(
         legs=tuple(legs),

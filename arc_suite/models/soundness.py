@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.models.outline import solid_corners
+from arc_suite.models.sizing import sized
 from arc_suite.models.standing import Standing, standing
-from arc_suite.robots.spec import Body, Leg
+from arc_suite.robots.spec import Body, Leg, Link
 
 # Shares of the standing height.
 _GAP = 0.12  # of feet from the floor; feet of published robots hang by up to 0.25 and sink by up to 0.07
@@ -35,7 +36,7 @@ class Flaw(NamedTuple):
 def flaws(body: Body) -> list[Flaw]:
     """Return what is wrong with how a body stands; nothing for one that should walk."""
     pose = standing(body)
-    return [flaw for check in (_height, _support, _joints) for flaw in check(body, pose)]
+    return [flaw for check in (_height, _support, _motors, _joints) for flaw in check(body, pose)]
 
 
 def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
@@ -96,6 +97,30 @@ def _displacement(x: float, y: float) -> str:
     """Return in words a displacement on the floor, m."""
     parts = ((x, "forward", "backward"), (y, "to the left", "to the right"))
     return " and ".join(f"{abs(way):.2g} m {high if way > 0.0 else low}" for way, high, low in parts if abs(way) > 1e-6)
+
+
+def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
+    """Find motors that are too weak to hold the body up in its standing pose, where no limit of their joint does."""
+    joints = [joint for leg in body.legs for joint in leg.joints]
+    low, high = np.transpose([joint.range_deg for joint in joints])
+    needed = np.where(np.where(pose.loads > 0.0, low, high) == 0.0, 0.0, abs(pose.loads))
+    given = np.array([np.inf if joint.motor is None else joint.motor.gear for joint in joints])
+    weak = int((given < needed).sum())
+    if weak:
+        worst = int((needed / given).argmax())
+        lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that hold the body up"
+        others = f", as do those of {weak - 1} more joints" * (weak > 1)
+        fits = [joint.motor.gear for leg in sized(_unpowered(body)).legs for joint in leg.joints][worst]
+        yield Flaw(f"the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False)
+
+
+def _unpowered(body: Body) -> Body:
+    """Return the body with its motors left to be sized."""
+
+    def unpowered(link: Link) -> Link:
+        return link.replace(joint=link.joint and link.joint.replace(motor=None))
+
+    return body.replace(legs=tuple(leg.replace(links=tuple(map(unpowered, leg.links))) for leg in body.legs))
 
 
 def _joints(body: Body, pose: Standing) -> Iterator[Flaw]:

@@ -1,13 +1,21 @@
 """The standing pose of a body, all joints at zero, from which its proportions, motors and gait are derived."""
 
 import functools
+import math
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite.models import builder
-from arc_suite.robots.spec import Body, Joint, Motor, Simulation, TrackingCamera
+from arc_suite.robots.spec import Ballast, Body
+
+_GEOMS = {
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+}
 
 
 class Standing(NamedTuple):
@@ -20,7 +28,7 @@ class Standing(NamedTuple):
         soles: (legs, 3) the lowest points of the feet.
         jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
         inertias: (joints,) diagonal of the mass matrix without armature.
-        loads: (joints,) torques, unsigned, that hold the pose while all feet carry.
+        loads: (joints,) torques of the joints that hold the pose while all feet carry.
         margin: static stability: distance of the centre of mass, on the floor, from the nearest
             edge of the polygon of the soles; negative outside.
     """
@@ -71,26 +79,37 @@ def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
         soles=soles,
         jacobians=tuple(jacobians),
         inertias=np.diag(matrix)[6:].copy(),
-        loads=abs(data.qfrc_bias[6:] - held),
+        loads=data.qfrc_bias[6:] - held,
         margin=stability_margin(centre, soles),
     )
 
 
 @functools.lru_cache(maxsize=256)
 def _model(body: Body) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(builder.build(_unpowered(body)).to_xml_string())
+    """Compile what `builder.build` makes of a body, without all that plays no part in how it stands.
 
-
-def _unpowered(body: Body) -> Body:
-    """Return the body with everything that is left to be sized set to what does not matter to its standing pose."""
-
-    def plain(joint: Joint | None) -> Joint | None:
-        return joint and joint.replace(armature=0.0, damping=0.0, motor=Motor(gear=1.0))
-
-    legs = tuple(
-        leg.replace(links=tuple(link.replace(joint=plain(link.joint)) for link in leg.links)) for leg in body.legs
-    )
-    return body.replace(legs=legs, simulation=Simulation(), camera=TrackingCamera(position=(0.0, -1.0, 0.0)))
+    By MuJoCo's own means: PyMJCF would take as long again as the whole model does.
+    """
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    torso = spec.worldbody.add_body(name="torso", pos=(0.0, 0.0, body.torso.standing_height))
+    torso.add_freejoint()
+    for solid in (*body.torso.solids, *body.ballast):
+        weight = {"mass": solid.mass} if isinstance(solid, Ballast) else {"density": body.density}
+        turn = [math.radians(angle) for angle in solid.euler_deg]
+        torso.add_geom(type=_GEOMS[solid.shape], size=solid.size, pos=solid.position, euler=turn, **weight)
+    for leg in body.legs:
+        parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
+        for link in leg.links:
+            parent = parent.add_body(name=leg.full_name(link), pos=pos, euler=(0.0, 0.0, yaw))
+            if link.joint:
+                parent.add_joint(name=leg.full_name(link.joint), axis=link.joint.axis)
+            ends = (0.0, 0.0, 0.0, *link.end)
+            parent.add_geom(type=_GEOMS["capsule"], fromto=ends, size=(link.radius,), density=body.density)
+            pos, yaw = link.end, 0.0
+        foot = parent.add_body(name=leg.full_name(leg.foot), pos=pos)
+        foot.add_geom(type=_GEOMS["sphere"], size=(leg.foot.radius,), density=body.density)
+    return spec.compile()
 
 
 def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:

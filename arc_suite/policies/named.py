@@ -1,5 +1,6 @@
 """Policies by name: some need no training; any other is found on Python's path."""
 
+import itertools
 import os
 import pkgutil
 from collections.abc import Callable, Sequence
@@ -9,6 +10,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg import PRESETS, Demonstrator
+from arc_suite.cpg.presets import TUNINGS
 from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
 from arc_suite.robots import ROBOTS
@@ -47,7 +49,12 @@ HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or module:attribute, which makes a "
     "policy from a robot's name, or from the Body of what is no robot of the suite."
 )
-PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}."
+PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
+
+
+def preset_names() -> tuple[str, ...]:
+    """Return the names of the presets that there are for any robot, those of other packages included."""
+    return tuple(dict.fromkeys(itertools.chain(PRESETS, *TUNINGS.values())))
 
 
 def policy(
@@ -61,7 +68,8 @@ def policy(
             or `module:attribute`, a function on Python's path that makes a function
             from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        presets: of the demonstrator, one of `cpg.PRESETS`, or several that take turns from seed to seed.
+        presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
+            that take turns from seed to seed.
         rows: of the batch.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
 
@@ -72,7 +80,7 @@ def policy(
     """
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
-        checks.name(preset, PRESETS, "preset")
+        checks.name(preset, preset_names(), "preset")
     checks.number("noise", noise, 0.0)
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import checks, policies, registry
-from arc_suite.cpg import PRESETS
 from arc_suite.envs.dm import load as load_environment
 from arc_suite.robots.spec import Body
 from arc_suite.style.files import load
@@ -64,7 +63,7 @@ def source(name: str, preset: str = "medium") -> Source:
             replay whose rewards are not those recorded.
         OSError: a file cannot be read; one line.
     """
-    checks.name(preset, PRESETS, "preset")
+    checks.name(preset, policies.preset_names(), "preset")
     if name.endswith(".npz"):
         return _saved(name)
     if ":" not in name and re.search(r"/|-v\d+$", name):

@@ -1,9 +1,10 @@
 """What bodies are asked to do: name -> task."""
 
 from arc_suite.tasks.contract import Task
+from arc_suite.tasks.ground import Course, Gaps, Rough, Slopes, Stairs
 from arc_suite.tasks.steer import Steer
 from arc_suite.tasks.walk import Walk
 
-TASKS = {task.name: task for task in (Walk, Steer)}
+TASKS = {task.name: task for task in (Walk, Steer, Rough, Slopes, Stairs, Gaps, Course)}
 
 __all__ = ["TASKS", "Task"]

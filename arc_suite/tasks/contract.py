@@ -104,6 +104,7 @@ class Task(ABC):
         reads: fields of the simulation that `read` takes.
         commands: what may be set from outside while an episode runs, such as by a player's stick:
             size by name of a field of the memory; NaN stands for what the task itself would do.
+        own_arena: whether it takes place in an arena of its own, and in no other.
     """
 
     scene: Scene
@@ -114,6 +115,7 @@ class Task(ABC):
     version: ClassVar[int] = 0
     reads: ClassVar[tuple[str, ...]] = reading.FIELDS
     commands: ClassVar[Mapping[str, int]] = {}
+    own_arena: ClassVar[bool] = False
 
     @classmethod
     @abstractmethod
@@ -126,7 +128,7 @@ class Task(ABC):
 
     @classmethod
     def arena(cls, body: Body, settings) -> Arena:
-        """Return where the task takes place unless the caller chooses another arena."""
+        """Return where the task takes place; a caller may choose another arena unless the task has its own."""
         return FLAT
 
     @property

@@ -48,13 +48,22 @@ def fitted_settings(body: Body) -> dict:
         "phase_offsets": tuple(2.0 * math.pi * offset for offset in gait.offsets),
         "stance_threshold": max(leg.foot.radius for leg in body.legs) + STANCE_HEIGHT * height,
         "healthy_range": tuple(share * height for share in HEALTHY_RANGE),
+        "weights": {},
+        **fitted_noise(body),
+    }
+
+
+def fitted_noise(body: Body) -> dict[str, float]:
+    """Return every noise of a start that suits any body: names and units as in `walk.Noise`."""
+    height = body.torso.standing_height
+    unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
+    return {
         "position_noise": POSITION_NOISE * height,
         "orientation_noise": ORIENTATION_NOISE,
         "linear_velocity_noise": LINEAR_VELOCITY_NOISE * unit,
         "angular_velocity_noise": ANGULAR_VELOCITY_NOISE * rate,
         "joint_angle_noise": JOINT_ANGLE_NOISE,
         "joint_velocity_noise": JOINT_VELOCITY_NOISE * rate,
-        "weights": {},
     }
 
 

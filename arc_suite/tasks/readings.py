@@ -128,7 +128,7 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
     pose, position = qpos[..., layout.pose], qpos[..., 0:3]
     if not arena.is_level:
         numpy = qpos.__array_namespace__()
-        pose = numpy.concatenate([arena.clearance(position)[..., None], pose[..., 1:]], axis=-1)
+        pose = numpy.concatenate([arena.torso_clearance(position)[..., None], pose[..., 1:]], axis=-1)
     forces = data.cfrc_ext[..., layout.parts, :] if forces is None else forces
     return Readings(
         posture=pose,

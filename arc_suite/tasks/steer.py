@@ -28,7 +28,10 @@ LOWEST = 0.3  # healthy height of the torso over the ground, in standing heights
 LEAST_UPRIGHT = 0.4  # healthy cosine of the torso's tilt
 # Walk's weights of rates in SI units, as Queen has them in units of her own.
 RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
-_OWN = [(field, np.ndarray) for field in ("steps", "place", "motion", "ends", "schedule", "command", "tracking")]
+_OWN = [
+    (field, np.ndarray)
+    for field in ("steps", "place", "motion", "ends", "schedule", "command", "followed", "tracking", "fell")
+]
 
 
 class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *_OWN])):
@@ -41,7 +44,9 @@ class Memory(NamedTuple("Memory", [*walk.Memory.__annotations__.items(), *_OWN])
         ends: (..., COMMANDS) steps at which the commands of the schedule end.
         schedule: (..., COMMANDS, 3) commands.
         command: (..., 3) set from outside, in place of the schedule where it is not NaN.
+        followed: (...) tracking of the latest step.
         tracking: (...) sum over the steps.
+        fell: (...) whether the torso lies on the ground or is tilted too far.
     """
 
 
@@ -55,10 +60,15 @@ def draw_command(random: np.random.RandomState) -> np.ndarray:
 
 
 class Steer(walk.Walk):
-    """Following a velocity command."""
+    """Following a velocity command.
+
+    Attributes:
+        yaw: half-width of the heading at the start, rad.
+    """
 
     name, target_velocity = "steer", None
     commands = {"command": 3}
+    yaw = math.pi
     bonuses = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
 
     @classmethod
@@ -86,10 +96,11 @@ class Steer(walk.Walk):
     def start(self, random: np.random.RandomState, carry: Any) -> Start:
         """Draw walk's start, then the yaw, then how long each command is held, then what they are."""
         start = super().start(random, carry)
-        start.qpos[3:7] = rotations.turned(start.qpos[3:7], random.uniform(-math.pi, math.pi))
+        start.qpos[3:7] = rotations.turned(start.qpos[3:7], random.uniform(-self.yaw, self.yaw))
         ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
         schedule = np.array([draw_command(random) for _ in range(COMMANDS)])
-        own = (0, np.zeros(3), np.zeros(3), ends, schedule, np.full(3, np.nan), np.float64(0.0))
+        zero = np.float64(0.0)
+        own = (0, np.zeros(3), np.zeros(3), ends, schedule, np.full(3, np.nan), zero, zero, np.False_)
         return start._replace(memory=Memory(*start.memory, *own))
 
     def read(self, data) -> Readings:
@@ -123,8 +134,9 @@ class Steer(walk.Walk):
         tick = memory.tick + going
         stance = self.clock.at(self.clock.stance, tick) | ~going[..., None]  # all feet, while the command says stop
         memory = self.measured(memory, readings, tick, stance)
-        memory = memory._replace(steps=memory.steps + 1, place=place, motion=motion)
-        return memory._replace(tracking=memory.tracking + self.tracked(memory))
+        memory = memory._replace(steps=memory.steps + 1, place=place, motion=motion, fell=~self.healthy(readings))
+        followed = self.tracked(memory)
+        return memory._replace(followed=followed, tracking=memory.tracking + followed)
 
     def wanted(self, memory: Memory):
         """Return the command (..., 3) that holds; a schedule that has run out begins again."""
@@ -143,12 +155,12 @@ class Steer(walk.Walk):
 
     def terms(self, memory: Memory, readings: Readings) -> dict:
         """Return walk's costs without scale, and bonuses for following the command in the prescribed gait."""
-        walked, tracking = super().terms(memory, readings), self.tracked(memory)
+        walked = super().terms(memory, readings)
         height = self.scene.body.torso.standing_height
         own = {
-            "tracking": tracking,
+            "tracking": memory.followed,
             "healthy": self.healthy(readings).astype(float),
-            "obedient_gait": tracking * walked["gait_bonus"],
+            "obedient_gait": memory.followed * walked["gait_bonus"],
             "angular_velocity": walked["angular_velocity"] * (height / GRAVITY),
             "vertical_velocity": walked["vertical_velocity"] / (GRAVITY * height),
         }
@@ -174,14 +186,14 @@ class Steer(walk.Walk):
         }
 
     def ended(self, memory: Memory, readings: Readings) -> tuple:
-        """Return as terminated who is not healthy; nobody is truncated."""
-        return ~self.healthy(readings), False
+        """Return as terminated who fell; nobody is truncated."""
+        return memory.fell, False
 
     def progress(self, memory: Memory) -> dict:
-        """Return the mean `tracking`, and `gait_compliance`."""
+        """Return the mean `tracking`, whether the body `fell`, and `gait_compliance`."""
         steps = memory.steps + (memory.steps == 0)
         right = 1.0 - memory.wrong_in_all / (steps * len(self.parameters.phase_offsets))
-        return {"tracking": memory.tracking / steps, "gait_compliance": right}
+        return {"tracking": memory.tracking / steps, "fell": memory.fell * 1.0, "gait_compliance": right}
 
 
 def _place(readings: Readings):

@@ -12,7 +12,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
 from arc_suite.tasks.clock import TWO_PI, Clock
 from arc_suite.tasks.contract import Inputs, Start, Task
-from arc_suite.tasks.fitting import fitted_settings
+from arc_suite.tasks.fitting import fitted_noise, fitted_settings
 from arc_suite.tasks.readings import Readings, component
 from arc_suite.tasks.terms import Parameters
 
@@ -29,7 +29,7 @@ COSTS = {
 }
 
 # What a robot does not set itself.
-COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "joint_noise": 0.1, "weights": {}}
+COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "weights": {}}
 
 # One number for several kinds of noise, whatever their units, as published: name -> the settings that it sets.
 SHARED_NOISE = {
@@ -50,6 +50,7 @@ SETTINGS = {
         "stance_threshold": 0.12,
         "healthy_range": (0.25, 1.2),
         "base_noise": 0.02,
+        "joint_noise": 0.1,
         "weights": {"control": -0.05},
     },
     "bastion": {
@@ -60,6 +61,7 @@ SETTINGS = {
         "stance_threshold": 0.08,
         "healthy_range": (0.15, 1.0),
         "base_noise": 0.1,
+        "joint_noise": 0.1,
         "weights": {"control": -0.08},
     },
     "tick": {
@@ -70,6 +72,7 @@ SETTINGS = {
         "stance_threshold": 0.06,
         "healthy_range": (0.08, 0.35),
         "base_noise": 0.02,
+        "joint_noise": 0.1,
         "weights": {"control": -0.05},
     },
     "leaper": {
@@ -80,6 +83,7 @@ SETTINGS = {
         "stance_threshold": 0.08,
         "healthy_range": (0.2, 1.0),
         "base_noise": 0.1,
+        "joint_noise": 0.1,
         "weights": {"control": -0.1},
     },
 }
@@ -119,6 +123,9 @@ class Settings(NamedTuple):
     noise: Noise
 
 
+NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")  # of settings that may be overridden
+
+
 def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, float] = BONUSES) -> Settings:
     """Return the settings of a body, some of them overridden.
 
@@ -138,15 +145,15 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
     """
     row = robots.row(SETTINGS, body, "walk")
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
-    known = [*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait"]
     for name in overrides:
-        checks.name(name, known, "setting of walk")
+        checks.name(name, NAMES, "setting of walk")
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)
         table |= {"duty_factor": gait.duty_factor, "phase_offsets": offsets}
     weights = _changed({**bonuses, **COSTS, **table["weights"]}, overrides.get("weights"))
-    values = _spread(table) | _spread(overrides)
+    # What sets no noise has it fitted to the body.
+    values = fitted_noise(body) | _spread(table) | _spread(overrides)
     numbers = {
         name: checks.number(name, values[name], low, high)
         for name, low, high in (

@@ -12,6 +12,7 @@ import pytest
 from arc_suite import data, style
 from arc_suite.robots import ROBOTS
 from arc_suite.style import METRICS
+from arc_suite.tasks import TASKS
 
 ROOT = pathlib.Path(__file__).parents[2]
 TOOL, SPIDER = ROOT / "tools" / "style.py", ROOT / "examples" / "spider.json"
@@ -147,7 +148,7 @@ def test_other_tasks(tmp_path, task):
         assert list(report["robots"]["tick"].values()) == [recorded, recorded]
     else:  # nothing says which module registers the task
         assert (again.returncode, again.stdout) == (1, "")
-        assert again.stderr.startswith("style.py: unknown task 'stay' (there are: walk, steer)")
+        assert again.stderr.startswith(f"style.py: unknown task 'stay' (there are: {', '.join(TASKS)})")
         again = programs.run(TOOL, f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path)
         assert again.returncode == 0, again.stderr
         assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]

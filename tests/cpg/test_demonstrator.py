@@ -1,6 +1,7 @@
 """Demonstrators: the published law, rows and single ones, any control step."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -102,6 +103,7 @@ def test_time_steps_blocks_and_rows_give_the_same_action():
         timestep = environment.step(action)
 
 
+@pytest.mark.filterwarnings("ignore:.*another robot")  # what is felt here is drawn at random
 def test_batch_rows_are_single_demonstrators_and_restart_alone():
     rng = np.random.default_rng(0)
     batch, singles = Demonstrator("tick"), [Demonstrator("tick") for _ in range(3)]
@@ -225,3 +227,39 @@ def test_stacked_controls_are_single_ones():
         actions = stacked(np.full(len(presets), clock), None, angles, velocities)
         for row, control in enumerate(controls):
             assert_array_equal(actions[row], control(np.array(clock), None, angles[row], velocities[row]))
+
+
+@pytest.mark.parametrize("preset", ["medium", "steered"])
+@pytest.mark.parametrize(("robot", "other"), [("bastion", "leaper"), ("leaper", "bastion")])
+def test_another_robot_of_as_many_joints_is_told_by_its_parts(robot, other, preset):
+    timestep = arc_suite.load(other, "steer", {"random": 0}).reset()
+    parts, theirs = len(ROBOTS[robot].part_names), len(ROBOTS[other].part_names)
+    with pytest.raises(ValueError) as error:
+        Demonstrator(robot, preset)(timestep)
+    assert str(error.value) == f"observation: expected contact forces of {parts} rigid bodies, got {theirs}"
+
+
+@pytest.mark.parametrize(("robot", "other", "stands"), [("queen", "tick", "0.75"), ("tick", "queen", "0.18")])
+def test_another_robot_of_as_many_parts_is_warned_of_by_its_height(robot, other, stands):
+    environment, demonstrator = arc_suite.load(other, "walk", {"random": 0}), Demonstrator(robot)
+    with pytest.warns(UserWarning) as caught:
+        timestep = environment.step(demonstrator(environment.reset()))
+        demonstrator(timestep)
+    (warning,) = caught
+    assert str(warning.message) == (
+        f"{robot} stands {stands} m high, and the torso starts below half or above twice that: "
+        "is this the demonstrator of another robot?"
+    )
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_nobody_is_warned_of_the_robot_itself(robot):
+    demonstrator = Demonstrator(robot)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        environment = arc_suite.load(robot, "walk", {"random": 0})
+        for _ in range(20):
+            demonstrator(environment.reset())
+        low = environment.reset().observation
+        low["posture"][0] *= 0.3  # it may fall once it walks
+        demonstrator.act({name: block[None] for name, block in low.items()})

@@ -95,6 +95,16 @@ def test_what_the_caller_names_is_imported(module):
     )
 
 
+@pytest.mark.parametrize("value", ["1\n2", "x" * 10_000, ["\n"] * 1000])
+def test_versions_are_told_in_one_line(root, value):
+    collect(ID, SETTINGS, 1)
+    edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=value))
+    refused(verify, "was collected with numpy ")
+    edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=np.__version__))
+    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update(task_version=value))
+    refused(verify, "was collected with version ", " of walk; ")
+
+
 @pytest.mark.parametrize(
     "domain", ["/dev/zero", "spider.json", "", "nobody", "{", "{}", "[" * 9999, None, 3, ["queen"], {"name": "queen"}]
 )

@@ -24,6 +24,7 @@ from gymnasium.wrappers import (
 )
 
 import arc_suite
+from arc_suite.tasks import TASKS
 from arc_suite.tasks.walk import BONUSES, COSTS
 
 WEIGHTS = BONUSES | COSTS
@@ -404,7 +405,7 @@ def test_actions_out_of_range_are_clipped():
             {"domain_name": "quen"},
             "unknown domain 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
         ),
-        ({"task_name": "wlak"}, "unknown task 'wlak'; did you mean 'walk'? (there are: walk, steer)"),
+        ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? (there are: {', '.join(TASKS)})"),
     ],
 )
 def test_bad_arguments_are_one_line(kwargs, message):

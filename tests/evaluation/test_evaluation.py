@@ -46,7 +46,7 @@ def test_policies_get_named_rows_and_the_reward_of_the_step_before():
     assert policy.begun == [([0], [4])]
     np.testing.assert_array_equal(policy.rewards, [[0.0], *([step.reward] for step in steps[1:-1])])
     episode = evaluation.run(environment, policy, seed=4)
-    assert episode.progress.keys() == {"tracking", "gait_compliance"}
+    assert episode.progress.keys() == {"tracking", "fell", "gait_compliance"}
     assert episode.total == sum(step.reward for step in steps[1:])
 
 

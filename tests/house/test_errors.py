@@ -11,6 +11,7 @@ import pytest
 
 import arc_suite
 from arc_suite import policies
+from arc_suite.arenas import ARENAS
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
@@ -19,7 +20,7 @@ ID = "arc_suite/bastion-walk-v0"
 ZEROS = np.zeros(12)
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
-TASK_NAMES = "(there are: walk, steer)"
+TASK_NAMES = f"(there are: {', '.join(TASKS)})"
 DOMAINS = "(there are: queen, bastion, tick, leaper)"
 PRESETS = "slow, medium, fast, tuned, steered, surefooted"
 CAMERAS = "['tracking', 'portrait', 'profile']"
@@ -244,7 +245,7 @@ CASES = [
         "unknown environment setting 'flat_observations'; did you mean 'flat_observation'? "
         "(there are: flat_observation)",
     ),
-    (walk(arena="bumpy"), "unknown arena 'bumpy'; did you mean 'bumps'? (there are: flat, bumps)"),
+    (walk(arena="bumpy"), f"unknown arena 'bumpy'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
     (rows(num_envs=2.5), "num_envs: expected an integer from 1, got 2.5"),
     (rows(num_threads="all"), "num_threads: expected an integer from 1, got 'all'"),
     (rows(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),

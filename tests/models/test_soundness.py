@@ -8,12 +8,14 @@ import arc_suite
 from arc_suite.cpg import Demonstrator
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec import Solid
+from arc_suite.robots.spec import Motor, Solid
 from arc_suite.robots.spec_files import load_body
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.json"))
 BODY = generator.generate(6, 3)
 CHASSIS = BODY.torso.solids[0]
+ALL = tuple(leg.name for leg in BODY.legs)
+WEAK = 0.05  # N m, of a knee's motor
 
 
 def high(height):
@@ -25,6 +27,17 @@ def with_joints(**fields):
         return link.replace(joint=link.joint.replace(**fields))
 
     return BODY.replace(legs=tuple(leg.replace(links=tuple(map(changed, leg.links))) for leg in BODY.legs))
+
+
+def with_gear(gear, joints=("knee",), legs=("l1",), **fields):
+    """The body with motors of a gear in some joints of some legs."""
+
+    def changed(leg, link):
+        chosen = leg.name in legs and link.joint.name in joints
+        return link.replace(joint=link.joint.replace(motor=Motor(gear=gear), **fields)) if chosen else link
+
+    legs_ = (leg.replace(links=tuple(changed(leg, link) for link in leg.links)) for leg in BODY.legs)
+    return BODY.replace(legs=tuple(legs_))
 
 
 def narrow(share):
@@ -69,6 +82,8 @@ SOUND = [
     *(generator.scaled(BODY, scale) for scale in (0.05, 50.0)),
     narrow(0.2),
     high(0.43),
+    with_gear(WEAK, range_deg=(0.0, 40.0)),  # the limit holds what the motor cannot
+    with_gear(1e-6, ("hip",)),  # which carries nothing
 ]
 
 
@@ -108,6 +123,15 @@ DOUBTFUL = [
         "no joint lifts a foot: a second joint in each leg, about axis [-1, 0, 0], fits",
     ),
     (lifted("l2", 0.1), "feet of l2 end up to 0.1 m above the lowest foot: legs longer by that fit"),
+    (
+        with_gear(WEAK),
+        "the motor of l1_knee lacks 0.0422 of the 0.0922 N m that hold the body up: gear 0.922 fits",
+    ),
+    (
+        with_gear(0.01, ("knee", "ankle"), ALL),
+        "the motor of l1_knee lacks 0.0822 of the 0.0922 N m that hold the body up, as do those of 11 more joints: "
+        "gear 0.922 fits",
+    ),
     (deep(0.41), "the torso reaches 0.01 m lower than the feet: legs longer by more than that fit"),
 ]
 
@@ -141,6 +165,21 @@ def test_what_would_fit_fits():
     out = narrow(0.1)
     wider = tuple(leg.replace(mount=_further(leg.mount, leg.foot_position, 0.012)) for leg in out.legs)
     assert not any("tower" in flaw.text for flaw in flaws(out.replace(legs=wider)))
+
+
+@pytest.mark.parametrize(("gear", "stands"), [(0.02, False), (0.922, True)])
+def test_the_body_stands_on_motors_of_the_gear_that_fits_and_sinks_on_those_that_lack(gear, stands):
+    body = with_gear(gear, ("knee",), ALL)
+    assert (flaws(body) == []) == stands
+    environment = arc_suite.load(body, "walk", {"random": 0})
+    timestep = environment.reset()
+    for _ in range(90):
+        angles, velocities = timestep.observation["posture"][5:], timestep.observation["velocities"][6:]
+        timestep = environment.step(-4.0 * angles - 0.4 * velocities)  # hold the pose
+        if timestep.last():
+            break
+    height = timestep.observation["posture"][0]
+    assert height > 0.38 if stands else height < 0.25
 
 
 def _further(mount, foot, by):

@@ -74,6 +74,7 @@ VARIANTS = [
 ]
 
 
+@pytest.mark.filterwarnings("ignore:.*another robot")  # what is felt here is drawn at random
 @pytest.mark.parametrize("body", [ROBOTS["leaper"], generator.generate(5, 2)], ids=["leaper", "made"])
 @pytest.mark.parametrize(("name", "settings"), VARIANTS)
 def test_a_row_acts_as_its_episode_alone(name, settings, body):

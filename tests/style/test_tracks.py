@@ -55,7 +55,7 @@ def test_tracks_of_any_task_and_ground(task, arena):
     assert len(track.times) == episode.length == 40
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
     assert track.progress == episode.progress
-    assert track.progress.keys() == ({"tracking", "gait_compliance"} if task == "steer" else set())
+    assert track.progress.keys() == ({"tracking", "fell", "gait_compliance"} if task == "steer" else set())
     assert np.isnan(track.target_velocity)
     for points in (track.foot_positions, track.positions):
         assert arena.height(points[..., 0], points[..., 1]).any() == (arena != FLAT)

@@ -1,4 +1,4 @@
-"""The contract: every task of the registry, on every robot, another body and every arena, keeps it."""
+"""The contract: every task of the registry, on every robot and another body, keeps it, where it takes place or may."""
 
 import types
 
@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import arc_suite
-from arc_suite.arenas import ARENAS
 from arc_suite.envs.scene import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch
+from arc_suite.simulation.model import compiled
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.contract import Inputs
 from arc_suite.tasks.walk import Walk
@@ -20,7 +20,13 @@ from arc_suite.tasks.walk import Walk
 BODIES = {**ROBOTS, "random": generator.random_body(3)}
 every_task = pytest.mark.parametrize("task_name", TASKS)
 every_body = pytest.mark.parametrize("body", BODIES)
-every_arena = pytest.mark.parametrize("arena", ARENAS)
+# Every task in its own arena, or in one of each kind: a plane, a height field, boxes.
+PLACES = [
+    (name, settings)
+    for name, task in TASKS.items()
+    for settings in ([{}] if task.own_arena else [{"arena": "flat"}, {"arena": "bumps"}, {"arena": "stairs"}])
+]
+every_place = pytest.mark.parametrize(("task_name", "settings"), PLACES)
 
 
 def frozen(memory):
@@ -33,8 +39,7 @@ def frozen(memory):
 
 def started(task, seed=0):
     """A simulation of one row at the start of an episode, its data, and the memory."""
-    _, model = prepared(task.scene.body, task.name, {"arena": task.scene.arena})
-    batch = Batch(model, 1, 1, task.reads)
+    batch = Batch(compiled(task.scene.body, task.scene.arena), 1, 1, task.reads)
     start = task.start(np.random.RandomState(seed), task.first())
     row = np.ones(1, bool)
     batch.reset(row, start.qpos[None], start.qvel[None])
@@ -53,11 +58,10 @@ def read_only(batch, task):
     return types.SimpleNamespace(**fields)
 
 
-@every_task
+@every_place
 @every_body
-@every_arena
-def test_functions_are_pure_and_read_what_is_declared(task_name, body, arena):
-    task, _ = prepared(BODIES[body], task_name, {"arena": arena})
+def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings):
+    task, _ = prepared(BODIES[body], task_name, settings)
     batch, memory = started(task)
     rng = np.random.RandomState(1)
     for _ in range(5):
@@ -118,13 +122,12 @@ class Counting(np.random.RandomState):
         return drawn
 
 
-@every_task
+@every_place
 @every_body
-@every_arena
-@pytest.mark.parametrize("threads", [1, 2, 3])
-def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, arena, threads):
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
     """Over several episodes, among rows that fall or stand still at other times."""
-    settings = {"arena": arena, "time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}
+    settings = settings | {"time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}
     rows = VectorEnv(BODIES[body], task_name, 3, threads, task_kwargs=settings)
     single = gymnasium.make(SINGLE, domain_name=BODIES[body], task_name=task_name, task_kwargs=settings)
     observations, observation = rows.reset(seed=40)[0], single.reset(seed=41)[0]
@@ -152,10 +155,12 @@ SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take
 
 @every_task
 def test_settings_check_themselves(task_name):
+    own = f"arena: task {task_name} has a ground of its own, expected none" if TASKS[task_name].own_arena else None
+    kind = task_name if own else "walk"
     for settings, message in (
-        ({"targt_velocity": 1.0}, "unknown setting of walk 'targt_velocity'; did you mean 'target_velocity'?"),
+        ({"targt_velocity": 1.0}, f"unknown setting of {kind} 'targt_velocity'; did you mean 'target_velocity'?"),
         ({"weights": {"helthy": 1.0}}, "unknown weight 'helthy'; did you mean 'healthy'?"),
-        ({"arena": "bump"}, "unknown arena 'bump'; did you mean 'bumps'? (there are: flat, bumps)"),
+        ({"arena": "bump"}, own or "unknown arena 'bump'; did you mean 'bumps'? (there are: flat, bumps, rough,"),
         ({"time_limit": 0}, "time_limit: expected a finite number from 1e-09 to inf, got 0"),
     ):
         with pytest.raises(ValueError) as error:

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from arc_suite.arenas import ARENAS
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import TASKS
@@ -22,9 +21,9 @@ def assert_close(ours, theirs):
         np.testing.assert_allclose(np.asarray(other), np.asarray(mine), rtol=1e-12, atol=1e-12)
 
 
-def recorded(body, task_name, arena):
+def recorded(body, task_name, settings):
     """Yields memory, action and fields of the simulation, before and after steps of rows that walk about."""
-    rows = VectorEnv(body, task_name, ROWS, 1, task_kwargs={"arena": arena})
+    rows = VectorEnv(body, task_name, ROWS, 1, task_kwargs=settings)
     rows.reset(seed=0)
     task, random = rows.task, np.random.RandomState(0)
     for _ in range(STEPS):
@@ -35,10 +34,16 @@ def recorded(body, task_name, arena):
     rows.close()
 
 
-@pytest.mark.parametrize("task_name", TASKS)
-@pytest.mark.parametrize("arena", ARENAS)
+PLACES = [
+    (name, settings)
+    for name, task in TASKS.items()
+    for settings in ([{}] if task.own_arena else [{"arena": "flat"}, {"arena": "bumps"}, {"arena": "stairs"}])
+]
+
+
+@pytest.mark.parametrize(("task_name", "settings"), PLACES)
 @pytest.mark.parametrize("body", BODIES)
-def test_jit_and_vmap_compute_what_numpy_computes(task_name, arena, body):
+def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
     def step(task, memory, action, fields):
         """A control step as a driver runs it, but for the simulation: everything that a task computes."""
         readings = task.read(Fields(fields))
@@ -58,7 +63,7 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, arena, body):
         )
 
     compiled = None
-    for task, memory, action, fields in recorded(BODIES[body], task_name, arena):
+    for task, memory, action, fields in recorded(BODIES[body], task_name, settings):
         if compiled is None:
             compiled = {
                 "rows at once": jax.jit(lambda *values, task=task: step(task, *values)),

@@ -8,6 +8,7 @@ from dm_env import StepType
 from numpy.testing import assert_array_equal
 
 import arc_suite
+from arc_suite.tasks import TASKS
 
 SIZES = {"queen": 199, "bastion": 151, "tick": 199, "leaper": 163}
 JOINTS = {"queen": 18, "bastion": 12, "tick": 18, "leaper": 12}
@@ -205,7 +206,7 @@ def test_overriding_one_weight_keeps_the_others():
     ("arguments", "message"),
     [
         (("quen", "walk"), "unknown domain 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)"),
-        (("queen", "wlak"), "unknown task 'wlak'; did you mean 'walk'? (there are: walk, steer)"),
+        (("queen", "wlak"), f"unknown task 'wlak'; did you mean 'walk'? (there are: {', '.join(TASKS)})"),
         (
             ("queen", "walk", {"target_velocty": 1}),
             "unknown setting of walk 'target_velocty'; did you mean 'target_velocity'?",

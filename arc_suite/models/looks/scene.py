@@ -12,6 +12,7 @@ _HORIZON = tuple((top + bottom) / 2.0 for top, bottom in zip(_SKY["rgb1"], _SKY[
 _GROUND = {"rgb1": (0.33, 0.37, 0.42), "rgb2": (0.29, 0.33, 0.375), "markrgb": (0.50, 0.56, 0.62)}
 
 
+_SHADE = 0.35  # by which ground is darker that is a height of the creature lower
 _EXTENT = 3.5  # of the scene, in heights of the creature, about what MuJoCo makes of one on a plane
 
 
@@ -44,8 +45,13 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
         specular=0.1,
         shininess=0.1,
     )
-    for geom in root.worldbody.geom:  # of the arena; the bodies have theirs
+    ground = root.worldbody.geom  # of the arena; the bodies have theirs
+    tops = {geom: geom.pos[2] + geom.size[2] for geom in ground if geom.type == "box"}
+    for geom in ground:
         geom.material = "ground"
+        if geom in tops:  # steps are told apart by their shade, the higher the brighter
+            shade = 1.0 - _SHADE * (max(tops.values()) - tops[geom]) / height
+            geom.rgba = (shade, shade, shade, 1.0)
         if geom.type != "plane":  # ground of finite size would stretch the map of shadows over all of it
             root.statistic.set_attributes(extent=_EXTENT * height, center=(0.0, 0.0, height))
 

@@ -1,0 +1,216 @@
+"""Terrain: lanes of rough ground, slopes, stairs and trenches side by side, each level where a body starts.
+
+Lanes lead along x. What is rough or slopes is one height field, whose cells are large beside feet;
+stairs and trenches are boxes, since feet sink into a height field that is steep.
+"""
+
+import dataclasses
+import functools
+from collections.abc import Mapping
+
+import numpy as np
+from dm_control import mjcf
+
+from arc_suite.arenas import field
+from arc_suite.arenas.arena import Arena
+from arc_suite.robots.spec import Body
+
+DIFFICULTY = 2.0 / 3.0  # unless something else is asked for
+WIDTH = 24.0  # of a lane, in standing heights, as are all lengths here
+BACK = 4.0  # level ground behind the start
+LEVEL = 3.0  # level ground ahead of the start, where nothing is said of it
+
+_LENGTH = 80.0  # ahead of the start, of arenas that no task has made
+_LANES = 3  # of these
+_CELL = 0.5  # of the height field
+_GRAIN = 1.0 / 16.0  # of stairs and trenches along x
+_THICKNESS = 2.0  # of the ground
+_TRENCH = 0.6  # depth
+_NEAR = 0.5  # how far around its centre the ground under a torso counts
+
+
+def _rough(random: np.random.RandomState, difficulty: float, x: np.ndarray, rows: int) -> np.ndarray:
+    """Nodes of random height, ramped in over twice the standing height."""
+    return random.uniform(0.0, 0.45 * difficulty, (rows, len(x))) * ((x - LEVEL) / 2.0).clip(0.0, 1.0)
+
+
+def _slopes(random: np.random.RandomState, difficulty: float, x: np.ndarray, rows: int) -> np.ndarray:
+    """Ramps of six heights up, three level, six down, three level; lanes begin with up to a height more of level."""
+    place = (x - LEVEL - random.randint(3) * _CELL) % 18.0 * (x > LEVEL)
+    ramp = np.minimum(place, 15.0 - place).clip(0.0, 6.0)
+    return np.broadcast_to(0.3 * difficulty * ramp, (rows, len(x)))
+
+
+def _stairs(random: np.random.RandomState, difficulty: float, x: np.ndarray) -> np.ndarray:
+    """Four steps up, a landing of three heights, four down, another; treads of one; lanes are shifted by up to one."""
+    place = x - LEVEL - random.randint(16) * _GRAIN
+    steps = np.floor(place.clip(0.0)) % 14.0  # up at 0, 1, 2, 3; the fourth tread goes on as the landing
+    up = (steps + 1.0).clip(0.0, 4.0) - (steps - 6.0).clip(0.0, 4.0)
+    return (0.05 + 0.25 * difficulty) * up * (place >= 0.0)
+
+
+def _gaps(random: np.random.RandomState, difficulty: float, x: np.ndarray) -> np.ndarray:
+    """Trenches, 0.1 to 0.6 wide, across lands of 1.5 to 3."""
+    heights, at, width = np.zeros(len(x)), LEVEL, round((0.1 + 0.5 * difficulty) / _GRAIN) * _GRAIN
+    lands = np.round(random.uniform(1.5, 3.0, int(len(x) * _GRAIN)) / _GRAIN) * _GRAIN  # more than fit
+    for land in lands:
+        heights[(x >= at) & (x < at + width)] = -_TRENCH
+        at += width + land
+    return heights
+
+
+# Kind of ground -> heights, in standing heights, of a lane with its stream of random numbers, its difficulty from 0 to
+# 1 and its places along x.
+FIELDS = {"rough": _rough, "slopes": _slopes}
+STEPS = {"stairs": _stairs, "gaps": _gaps}
+KINDS = (*FIELDS, *STEPS)
+
+
+@dataclasses.dataclass(frozen=True)
+class Terrain(Arena):
+    """Lanes side by side; in the middle of lane i a body starts at `start(i)`.
+
+    Beside and beyond the lanes there is nothing; `height` goes on there at the edge's.
+
+    Attributes:
+        unit: m, the standing height of the body for which it is made: all lengths are multiples of it.
+        length: of the lanes ahead of the start, in units.
+        lanes: kind and difficulty of each, by the order of `KINDS`.
+        seed: of what is random in them; a lane is the same beside any others.
+    """
+
+    unit: float
+    length: float
+    lanes: tuple[tuple[str, float], ...]
+    seed: int = 0
+
+    def start(self, lane):
+        """Return y (...) of the middle of lanes (...), m; x of the start is 0."""
+        return (lane - len(self.lanes) // 2) * (WIDTH * self.unit)
+
+    def add_to(self, root: mjcf.RootElement, **contact) -> None:
+        """Add the height field `floor`, the boxes `floor_<number>`, and under trenches the plane `floor_bottom`."""
+        unit, nodes = self.unit, self._nodes
+        if self._fields:
+            middle = self.start(0.5 * (self._fields - 1))
+            halves = (0.5 * (nodes.shape[1] - 1) * _CELL, 0.5 * WIDTH * self._fields)
+            size = np.array((*halves, self._highest, _THICKNESS)) * unit
+            field.add(root, nodes, size, ((halves[0] - BACK) * unit, middle, 0.0), **contact)
+        count = 0
+        for lane, heights in enumerate(self._profiles, self._fields):
+            edges = np.flatnonzero(np.diff(heights, prepend=np.nan, append=np.nan))
+            for first, last in zip(edges[:-1], edges[1:], strict=True):
+                if heights[first] == -_TRENCH:
+                    continue
+                middle = (0.5 * (first + last) * _GRAIN - BACK, 0.0, heights[first] - 0.5 * _THICKNESS)
+                size = (0.5 * (last - first) * _GRAIN, 0.5 * WIDTH, 0.5 * _THICKNESS)
+                root.worldbody.add(
+                    "geom",
+                    name=f"floor_{count}",
+                    type="box",
+                    size=np.array(size) * unit,
+                    pos=np.array(middle) * unit + (0.0, self.start(lane), 0.0),
+                    conaffinity=1,
+                    **contact,
+                )
+                count += 1
+        if any(kind == "gaps" for kind, _ in self.lanes):
+            bottom = (0.0, 0.0, -_TRENCH * unit)
+            root.worldbody.add(
+                "geom", name="floor_bottom", type="plane", size=(0.0, 0.0, 1.0), pos=bottom, conaffinity=1, **contact
+            )
+
+    def height(self, x, y):
+        """Return the height (...) of the ground under points, as collisions meet it, m."""
+        numpy = x.__array_namespace__()
+        along, across = x / self.unit + BACK, y / self.unit + (len(self.lanes) // 2 + 0.5) * WIDTH
+        if not self._fields:
+            return self.unit * self._stepped(along, across)
+        heights = self._highest * field.height(self._nodes, along / _CELL, across / _CELL)
+        if self._fields < len(self.lanes):
+            heights = numpy.where(
+                across < self._fields * WIDTH, heights, self._stepped(along, across - self._fields * WIDTH)
+            )
+        return self.unit * heights
+
+    def _stepped(self, along, across):
+        """Heights (...) of stairs and trenches, in units, from the lanes' beginning and the first one's edge."""
+        numpy, (lanes, cells) = along.__array_namespace__(), self._profiles.shape
+        lane = numpy.floor(across / WIDTH).astype(int).clip(0, lanes - 1)
+        cell = numpy.floor(along / _GRAIN).astype(int).clip(0, cells - 1)
+        return numpy.asarray(self._profiles).ravel()[lane * cells + cell]
+
+    def torso_clearance(self, positions):
+        """Return the heights (...) of torsos over the highest ground within half a standing height about them, m."""
+        near = _NEAR * self.unit * np.array([(x, y) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)])
+        near = positions.__array_namespace__().asarray(near)
+        x, y = (positions[..., None, i] + near[:, i] for i in (0, 1))
+        return positions[..., 2] - self.height(x, y).max(axis=-1)
+
+    @property
+    def lists_contacts(self) -> bool:
+        """Return whether all is one height field: boxes are many."""
+        return self._fields == len(self.lanes)
+
+    @functools.cached_property
+    def _fields(self) -> int:
+        """How many lanes, the first ones, are a height field."""
+        return sum(kind in FIELDS for kind, _ in self.lanes)
+
+    @functools.cached_property
+    def _highest(self) -> float:
+        """The height of the height field's highest node, in units; never 0, which MuJoCo refuses."""
+        return max((heights.max() for heights in self._field_heights), default=0.0) or 1.0
+
+    @functools.cached_property
+    def _field_heights(self) -> list[np.ndarray]:
+        """Heights of the height field's nodes, in units, (rows, columns) for each lane."""
+        x, rows = np.arange(0.0, BACK + self.length + _CELL, _CELL) - BACK, round(WIDTH / _CELL)
+        return [
+            FIELDS[kind](self._random(lane), difficulty, x, rows)
+            for lane, (kind, difficulty) in enumerate(self.lanes[: self._fields])
+        ]
+
+    @functools.cached_property
+    def _nodes(self) -> np.ndarray:
+        """The height field's nodes (rows, columns) as shares of the highest; the last lane's far edge repeats a row."""
+        lanes = self._field_heights
+        return field.shares(np.concatenate([*lanes, lanes[-1][-1:]]) / self._highest) if lanes else np.zeros((0, 0))
+
+    @functools.cached_property
+    def _profiles(self) -> np.ndarray:
+        """Heights of stairs and trenches, in units, (lanes, cells)."""
+        x = np.arange(0.0, BACK + self.length, _GRAIN) - BACK
+        profiles = [
+            STEPS[kind](self._random(lane), difficulty, x)
+            for lane, (kind, difficulty) in enumerate(self.lanes[self._fields :], self._fields)
+        ]
+        return np.array(profiles).reshape(len(profiles), len(x))
+
+    def _random(self, lane: int) -> np.random.RandomState:
+        """The stream of random numbers of a lane, by its kind and by how many of that kind are before it."""
+        kind = self.lanes[lane][0]
+        before = sum(other == kind for other, _ in self.lanes[:lane])
+        return np.random.RandomState((self.seed, KINDS.index(kind), before))
+
+
+def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(DIFFICULTY,), seed: int = 0) -> Terrain:
+    """Return lanes that suit a body's size.
+
+    Args:
+        body: any.
+        kinds: how many lanes of each difficulty, by kind of ground.
+        length: of lanes ahead of the start, in standing heights.
+        levels: difficulties, from 0 to 1.
+        seed: of what is random in the ground.
+
+    Returns:
+        The lanes: by kind, in the order of `KINDS`, then by difficulty.
+    """
+    lanes = [(kind, level) for kind in KINDS if kind in kinds for level in levels for _ in range(kinds[kind])]
+    return Terrain(body.torso.standing_height, length, tuple(lanes), seed)
+
+
+def fitted(kind: str):
+    """Return the function that makes lanes of a kind suit a body."""
+    return lambda body: made(body, {kind: _LANES})

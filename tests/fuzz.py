@@ -1,0 +1,193 @@
+"""Damages files at random and reads them: specs, tracks and datasets; `make fuzz`, some minutes.
+
+`python tests/fuzz.py` prints, for each kind of file, how many damaged ones were read all the same,
+refused in one line, ended in a traceback, crashed, or took too long. Each is read in a process of its
+own that ends after some seconds, as HDF5 itself may loop for ever over one changed byte. Exit
+status 1 if anything but that happened. The same seed damages the same places. Linux and macOS only.
+"""
+
+import argparse
+import functools
+import json
+import os
+import pathlib
+import shutil
+import signal
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+import arc_suite
+from arc_suite import data, policies, style
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec_files import load_body
+
+LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
+ID = "arc_suite/test/fuzz-v0"
+SETTINGS = data.Settings(ROBOTS["tick"], "random", (), steps=5)
+QUIET = functools.partial(tqdm, disable=True)
+SPEC = pathlib.Path(__file__).parents[1] / "examples" / "spider.json"
+
+READ, REFUSED, TRACEBACK, CRASHED, TOO_LONG = OUTCOMES = ("read", "refused", "traceback", "crashed", "too long")
+_ODD = (None, True, -1, 0, 1e308, -0.0, 2**70, float("nan"), "", "queen", "x" * 10_000, [], {}, [[]], {"": {}})
+
+
+class Kind(NamedTuple):
+    """Files of one kind.
+
+    Attributes:
+        file: a sound one, relative to a folder in which `make` has left it.
+        make: leaves it in the working folder.
+        uses: all that reads what is in the working folder.
+        may_loop: whether a library that reads it is known to loop.
+    """
+
+    file: str
+    make: Callable[[], object]
+    uses: tuple[Callable[[], object], ...]
+    may_loop: bool = False
+
+
+def _make_tracks() -> None:
+    environment, policy = arc_suite.load("tick", "walk"), policies.policy("cpg", "tick")
+    style.save("tracks.npz", [style.record(environment, policy, seed=1, max_steps=5)])
+
+
+def _collect() -> None:
+    data.collect(ID, SETTINGS, episodes=2, progress=QUIET)
+
+
+def _read_spec() -> None:
+    arc_suite.load("spec.json", "walk", {"random": 0}).reset()
+    load_body("spec.json")
+
+
+def _continue() -> None:
+    shutil.rmtree("copy", ignore_errors=True)
+    shutil.copytree("datasets", "copy")
+    os.environ["MINARI_DATASETS_PATH"] = os.path.abspath("copy")
+    data.collect(ID, SETTINGS, episodes=3, progress=QUIET)
+
+
+_USES = (lambda: list(data.open(ID)), lambda: data.verify(ID, progress=QUIET), _continue)
+
+
+KINDS = {
+    "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),
+    "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),)),
+    "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _USES),
+    "episodes of a dataset": Kind(f"datasets/{ID}/data/main_data.hdf5", _collect, _USES, may_loop=True),
+}
+
+
+def damaged(sound: bytes, random: np.random.Generator) -> bytes:
+    """Return a file with a few bytes changed, cut out, doubled or put in; of JSON also with an odd value in it."""
+    if sound.startswith(b"{") and random.integers(2):
+        return _oddly_valued(sound, random)
+    # Half of the places lie anywhere, half near the beginning, where binary files describe themselves.
+    first = int(random.integers(len(sound)) if random.integers(2) else len(sound) ** random.uniform()) % len(sound)
+    last = first + int(random.integers(1, 9))
+    noise = random.bytes(last - first)
+    match random.integers(5):
+        case 0:
+            return sound[:first]
+        case 1:
+            return sound[:first] + sound[last:]
+        case 2:
+            return sound[:last] + sound[first:]
+        case 3:
+            return sound[:first] + noise + sound[first:]
+        case _:
+            return sound[:first] + noise + sound[last:]
+
+
+def _oddly_valued(sound: bytes, random: np.random.Generator) -> bytes:
+    tree = json.loads(sound)
+    places = list(_places(tree))
+    container, key = places[random.integers(len(places))]
+    if random.integers(5):
+        container[key] = _ODD[random.integers(len(_ODD))]
+    else:
+        del container[key]
+    return json.dumps(tree).encode()
+
+
+def _places(tree):
+    """Yield every container with every key or index in it."""
+    for key in range(len(tree)) if isinstance(tree, list) else list(tree):
+        yield tree, key
+        if isinstance(tree[key], list | dict):
+            yield from _places(tree[key])
+
+
+def outcome(*uses: Callable[[], object], limit: float = LIMIT) -> str:
+    """Return the worst that came of using a file, in a process of its own: one of `OUTCOMES`."""
+    child = os.fork()
+    if not child:
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process wherever it is, in a library too
+        signal.setitimer(signal.ITIMER_REAL, limit)
+        os._exit(max(OUTCOMES.index(_tried(use)) for use in uses))
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if status < 0:
+        return TOO_LONG if status == -signal.SIGALRM else CRASHED
+    return OUTCOMES[status]
+
+
+def _tried(use: Callable[[], object]) -> str:
+    try:
+        use()
+    except (ValueError, OSError) as error:
+        if "\n" not in str(error) and 0 < len(str(error)) < 2000:
+            return REFUSED
+        traceback.print_exc()
+        return TRACEBACK
+    except BaseException:
+        traceback.print_exc()
+        return TRACEBACK
+    return READ
+
+
+def fuzz(kind: Kind, cases: int, seed: int, label: str) -> Counter:
+    """Return how often each outcome came of reading a kind of file in the working folder, differently damaged."""
+    if outcome(kind.make) != READ or outcome(*kind.uses) != READ:
+        raise RuntimeError(f"{label}: cannot make or read a sound file")
+    path, outcomes = pathlib.Path(kind.file), Counter()
+    sound = path.read_bytes()
+    for case in tqdm(range(cases), desc=label, unit="file", leave=False, disable=None):
+        path.write_bytes(damaged(sound, np.random.default_rng((seed, case))))
+        result = outcome(*kind.uses)
+        outcomes[result] += 1
+        if result not in (READ, REFUSED):
+            print(f"{label}: {result}: --seed {seed}, case {case}", file=sys.stderr)
+    path.write_bytes(sound)
+    return outcomes
+
+
+def main() -> int:
+    """Print the table and return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=500, help="damaged files of each kind")
+    parser.add_argument("--seed", type=int, default=0)
+    arguments = parser.parse_args()
+    print(f"{'file':<24}" + "".join(f"{name:>11}" for name in OUTCOMES))
+    failed = False
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["MINARI_DATASETS_PATH"] = os.path.join(folder, "datasets")
+        os.chdir(folder)
+        for label, kind in KINDS.items():
+            found = fuzz(kind, arguments.cases, arguments.seed, label)
+            failed |= bool(found[TRACEBACK] or found[CRASHED] or (found[TOO_LONG] and not kind.may_loop))
+            print(f"{label:<24}" + "".join(f"{found[name]:>11}" for name in OUTCOMES), flush=True)
+            shutil.rmtree("datasets", ignore_errors=True)
+        os.chdir("/")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""The program that damages files tells one outcome from another, and repeats itself."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fuzz
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def raises(error):
+    def read():
+        raise error
+
+    return read
+
+
+@pytest.mark.parametrize(
+    ("read", "expected"),
+    [
+        (lambda: None, fuzz.READ),
+        (raises(ValueError("a.json: no body")), fuzz.REFUSED),
+        (raises(OSError("cannot read a.json: no such file")), fuzz.REFUSED),
+        (raises(ValueError("two\nlines")), fuzz.TRACEBACK),
+        (raises(ValueError("")), fuzz.TRACEBACK),
+        (raises(KeyError("name")), fuzz.TRACEBACK),
+        (lambda: os.kill(os.getpid(), signal.SIGKILL), fuzz.CRASHED),
+        (lambda: time.sleep(10.0), fuzz.TOO_LONG),
+    ],
+)
+def test_what_comes_of_reading_is_told(read, expected):
+    assert fuzz.outcome(read, limit=2.0 if expected is not fuzz.TOO_LONG else 0.1) == expected
+
+
+def test_files_are_damaged_again_in_the_same_way():
+    sound = fuzz.SPEC.read_bytes()
+    texts = [fuzz.damaged(sound, np.random.default_rng(seed)) for seed in range(200)]
+    assert texts == [fuzz.damaged(sound, np.random.default_rng(seed)) for seed in range(200)]
+    assert len(set(texts)) > 150 and sound not in texts
+    parsed = sum(isinstance(_parsed(text), dict) for text in texts)
+    assert 50 < parsed < 150  # odd values in JSON that is well-formed, and damage to its text
+
+
+def _parsed(text):
+    try:
+        return json.loads(text)
+    except ValueError:
+        return None
+
+
+@pytest.mark.slow
+def test_a_few_damaged_files_of_each_kind():
+    command = [sys.executable, ROOT / "tests" / "fuzz.py", "--cases=5", "--seed=1"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    rows = [line.rsplit(maxsplit=5) for line in done.stdout.splitlines()[1:]]
+    assert [name.strip() for name, *_ in rows] == list(fuzz.KINDS)
+    assert all(int(read) + int(refused) == 5 for _, read, refused, *_ in rows)
