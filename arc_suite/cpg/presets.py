@@ -35,6 +35,11 @@ class Preset(NamedTuple):
         bends: of the other joints, by name.
         crouch: angles held while settling, as `centre`; None for the centre. Legs drawn up catch a
             robot whom a reset with its feet in the ground has thrown.
+        torques: actions that are added whatever the error is, by joint and for each rank: amplitudes of
+            the cosines of the leg's phase and its multiples, then of their sines; a hip's positive
+            forwards. None for none.
+        steering: action of the hips per rad of yaw, times the cosine of the leg's phase; the same sign
+            left and right, so that a negative one turns back to where the robot started.
     """
 
     stiffness: float
@@ -49,6 +54,8 @@ class Preset(NamedTuple):
     centre: Mapping[str, ByRank]
     bends: Mapping[str, Bend]
     crouch: Mapping[str, ByRank] | None = None
+    torques: Mapping[str, tuple[tuple[float, ...], ...]] | None = None
+    steering: float = 0.0
 
 
 SPEEDS = ("slow", "medium", "fast")  # the published ones
