@@ -65,6 +65,10 @@ THIRD_PARTY = {
     "agents.networks": {"numpy", "jax"},
     "agents.off_policy": {"numpy", "jax"},
     "agents.soft_actor_critic": {"numpy", "jax", "optax"},
+    "agents.imitation": {"numpy", "jax", "optax"},
+    "agents.on_policy": {"numpy", "jax"},
+    "agents.proximal_policy": {"numpy", "jax", "optax"},
+    "agents.rows": set(),
     "style.metrics": {"numpy"},
 }
 
