@@ -27,11 +27,11 @@ from arc_suite.tuning.space import SPACES
 FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
-flags.DEFINE_integer("generations", 250, "Generations of the search; more make a finished one go on.", lower_bound=1)
 flags.DEFINE_string(
     "numbers", "law", "law: those of the paper's law, about `medium`; torques: of what is added to it, about `tuned`."
 )
 for name, least, most, what in (
+    ("generations", 1, None, "Generations of the search, more make a finished one go on"),
     ("episodes", 1, None, "Episodes by which a candidate is judged"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
     ("starts", 0, None, f"Starts, of which candidates are tried in the {HARD} hardest; 0 for none"),
@@ -45,12 +45,16 @@ flags.DEFINE_string(
 )
 
 
+def given(name: str) -> int:
+    """Return the value of a flag, or what is usual for the numbers that are searched."""
+    value = FLAGS[name].value
+    return getattr(SPACES[FLAGS.numbers], name) if value is None else value
+
+
 def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
-    kind = SPACES[FLAGS.numbers]
-    settings = {"robot": FLAGS.robot, "numbers": FLAGS.numbers, "seed": FLAGS.seed}
-    for name in ("episodes", "steps", "starts"):
-        settings[name] = getattr(kind, name) if FLAGS[name].value is None else FLAGS[name].value
+    settings = {name: FLAGS[name].value for name in ("robot", "numbers", "seed")}
+    settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
     settings |= dict(zip(("task", "task_kwargs"), task(), strict=True))
     with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
         try:
@@ -60,8 +64,9 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
         for generation in journal.generations:
             course.step(generation.fitness)
         done = len(journal.generations)
-        with progress(total=max(FLAGS.generations, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
-            for _ in range(done, FLAGS.generations):
+        wanted = given("generations")
+        with progress(total=max(wanted, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
+            for _ in range(done, wanted):
                 journal.append(course.step())
                 bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}")
                 bar.update()

@@ -25,8 +25,8 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 class Demonstrator:
     """A policy that walks one body by a preset, in one environment or in the rows of a batch.
 
-    The presets slow, medium, fast and tuned walk straight by a clock of their own, and take joint
-    angles and velocities and the torso's orientation alone from the observation. Those of
+    The presets slow, medium, fast, tuned and refined walk straight by a clock of their own, and take
+    joint angles and velocities and the torso's orientation alone from the observation. Those of
     `steering.MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
     of a batch by `begin` and `act`, as every policy does, and in one environment as a function of a
     `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
@@ -43,7 +43,8 @@ class Demonstrator:
         Args:
             robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast; for the four robots also tuned, which earns most of what
-                the law can earn in walk, or numbers of your own; steered or surefooted, which follow
+                the paper's law can earn in walk, and refined, which earns most of all, or numbers of
+                your own; steered or surefooted, which follow
                 the command of a task.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, which have presets

@@ -175,6 +175,7 @@ class Kind(NamedTuple):
     Attributes:
         space: of the numbers.
         preset: about which it searches.
+        generations: of the search.
         candidates: of a generation; None for as many as the number of numbers asks for.
         episodes: by which a candidate is judged.
         steps: control steps of each.
@@ -184,6 +185,7 @@ class Kind(NamedTuple):
 
     space: type[Space] | type[Torques]
     preset: str
+    generations: int
     candidates: int | None
     episodes: int
     steps: int
@@ -192,6 +194,6 @@ class Kind(NamedTuple):
 
 
 SPACES = {
-    "law": Kind(Space, "medium", candidates=None, episodes=2, steps=300, skipped=0, starts=1000),
-    "torques": Kind(Torques, "tuned", candidates=48, episodes=1, steps=180, skipped=20, starts=0),
+    "law": Kind(Space, "medium", generations=250, candidates=None, episodes=2, steps=300, skipped=0, starts=1000),
+    "torques": Kind(Torques, "tuned", generations=60, candidates=48, episodes=1, steps=180, skipped=20, starts=0),
 }
