@@ -11,6 +11,7 @@ from arc_suite import checks, registry
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks.contract import STEPS, Scene, Task
+from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
 
 _NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
@@ -46,6 +47,24 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         control_timestep=step,
     )
     return kind(scene, settings, _step_limit(time_limit, step)), model
+
+
+def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> Symmetry:
+    """Return the exact mirror maps of a task's observations and actions, left for right.
+
+    `symmetry(...).observation` maps observation vectors (..., size), `.action` actions (..., joints); see
+    `tasks.contract.Task.symmetry`.
+
+    Args:
+        domain_name: as in `load`.
+        task_name: as in `load`.
+        task_kwargs: as in `load`.
+
+    Raises:
+        ValueError: the body, the gait or the task has no mirror image, or see `load`; one line.
+        OSError: a file that cannot be read.
+    """
+    return prepared(domain_name, task_name, task_kwargs)[0].symmetry
 
 
 def _step_limit(time_limit, step: float) -> float:

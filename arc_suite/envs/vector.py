@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
+from arc_suite.envs import snapshots
 from arc_suite.envs.lock import Lock, one_thread_at_a_time
 from arc_suite.envs.scene import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
@@ -246,6 +247,32 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """
         self._check_open("rest")
         self._resting = self._rows(mask, "mask")
+
+    @one_thread_at_a_time
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return, as arrays by name, all that the rows go on from; `restore` of another such environment takes it.
+
+        Raises:
+            ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("take a snapshot")
+        if self._memory is None:
+            raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
+        return snapshots.taken(self)
+
+    @one_thread_at_a_time
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on, to the bit, from the snapshot of an environment with the same rows and the same task.
+
+        Raises:
+            ValueError: an array is missing or does not fit; one line. The environment is to be thrown away then.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("restore")
+        if self._memory is None:
+            self._begin(np.ones(self.num_envs, bool), self._observation)
+        snapshots.put(self, arrays)
 
     @one_thread_at_a_time
     def render(self, rows: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:

@@ -1,16 +1,30 @@
 """Evaluation of policies: the protocol, and figures over episodes."""
 
-from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, expert_return, rollout, run
-from arc_suite.evaluation.statistics import Summary, interquartile_mean, iqm_and_interval, summary
+from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, episodes_in_rows, expert_return, rollout, run
+from arc_suite.evaluation.statistics import (
+    Curve,
+    Summary,
+    curve,
+    interquartile_mean,
+    iqm_and_interval,
+    performance_profile,
+    probability_of_improvement,
+    summary,
+)
 
 __all__ = [
     "EPISODES",
+    "Curve",
     "Episode",
     "Summary",
+    "curve",
     "episodes",
+    "episodes_in_rows",
     "expert_return",
     "interquartile_mean",
     "iqm_and_interval",
+    "performance_profile",
+    "probability_of_improvement",
     "rollout",
     "run",
     "summary",

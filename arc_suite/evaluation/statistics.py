@@ -1,4 +1,8 @@
-"""Figures over episodes: interquartile means and their bootstrap intervals."""
+"""Figures over episodes and runs, with stratified bootstrap intervals.
+
+Interquartile means, probabilities of improvement, performance profiles and learning curves are those of Agarwal
+et al., "Deep reinforcement learning at the edge of the statistical precipice", 2021.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,6 +11,7 @@ import numpy as np
 
 RESAMPLES = 10_000  # of the bootstrap
 CONFIDENCE = 0.95
+_TAILS = (50.0 * (1.0 - CONFIDENCE), 50.0 * (1.0 + CONFIDENCE))  # percentiles at the ends of an interval
 
 
 class Summary(NamedTuple):
@@ -70,7 +75,98 @@ def iqm_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[
     random = np.random.default_rng(seed)
     strata = [np.asarray(values, dtype=float) for values in strata]
     resamples = np.concatenate([random.choice(values, (RESAMPLES, values.size)) for values in strata], axis=-1)
-    tail = 50.0 * (1.0 - CONFIDENCE)
+    return float(interquartile_mean(np.concatenate(strata))), _interval(interquartile_mean(resamples))
+
+
+class Curve(NamedTuple):
+    """Interquartile means along training, with pointwise bootstrap intervals.
+
+    Attributes:
+        iqm: (points,)
+        low: (points,) lower end of the 95 % interval.
+        high: (points,) upper end.
+    """
+
+    iqm: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float, tuple[float, float]]:
+    """Return the probability that a run of X earns more than one of Y, with its stratified bootstrap interval.
+
+    It is the mean over strata of P(x > y) + P(x = y) / 2, of the Mann-Whitney statistic (Agarwal et al., 2021).
+
+    Args:
+        strata_x: scores of X by stratum, such as of each robot; one for each run.
+        strata_y: of Y, in the same strata.
+        seed: of the resampling.
+
+    Returns:
+        The probability, and the ends of the interval.
+
+    Raises:
+        ValueError: the strata are not as many; one line.
+    """
+    if len(strata_x) != len(strata_y):
+        raise ValueError(f"strata: expected as many of X as of Y, got {len(strata_x)} and {len(strata_y)}")
+    random = np.random.default_rng(seed)
+    pairs = [(np.asarray(x, float), np.asarray(y, float)) for x, y in zip(strata_x, strata_y, strict=True)]
+    resamples = np.mean(
+        [_better(random.choice(x, (RESAMPLES, x.size)), random.choice(y, (RESAMPLES, y.size))) for x, y in pairs],
+        axis=0,
+    )
+    return float(np.mean([_better(x, y) for x, y in pairs])), _interval(resamples)
+
+
+def performance_profile(strata, thresholds, seed: int = 0) -> Curve:
+    """Return the share of runs that score above each threshold, with pointwise stratified bootstrap intervals.
+
+    Strata count equally, whatever their number of runs (Agarwal et al., 2021); `iqm` holds the shares.
+
+    Args:
+        strata: scores by stratum, one for each run.
+        thresholds: (points,)
+        seed: of the resampling.
+    """
+    random, thresholds = np.random.default_rng(seed), np.asarray(thresholds, float)
+    strata = [np.asarray(scores, float) for scores in strata]
+
+    def shares(of_strata):
+        return np.mean([[(s > t).mean(axis=-1) for t in thresholds] for s in of_strata], axis=0)
+
+    resampled = shares([random.choice(scores, (RESAMPLES, scores.size)) for scores in strata])
+    low, high = np.percentile(resampled, _TAILS, axis=-1, method="nearest")
+    return Curve(shares(strata), low, high)
+
+
+def curve(strata, seed: int = 0) -> Curve:
+    """Return the interquartile mean over runs at each point of training.
+
+    Resamples draw whole runs, the same at all points, from each stratum as many as it has.
+
+    Args:
+        strata: scores (runs, points) by stratum, such as the returns of each robot at each evaluation.
+        seed: of the resampling.
+    """
+    random = np.random.default_rng(seed)
+    strata = [np.asarray(scores, float) for scores in strata]
+    chosen = [random.integers(len(scores), size=(RESAMPLES, len(scores))) for scores in strata]
+    ends = []
+    for point in range(strata[0].shape[1]):  # one at a time, as all resamples of all points would fill the memory
+        resamples = [scores[rows, point] for scores, rows in zip(strata, chosen, strict=True)]
+        ends.append(_interval(interquartile_mean(np.concatenate(resamples, axis=-1))))
+    low, high = np.array(ends).reshape(-1, 2).T
+    return Curve(interquartile_mean(np.concatenate(strata).T), low, high)
+
+
+def _better(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """P(x > y) + P(x = y) / 2 of all pairs of two samples, over the last axis."""
+    x, y = x[..., :, None], y[..., None, :]
+    return (np.greater(x, y) + 0.5 * np.equal(x, y)).mean(axis=(-2, -1))
+
+
+def _interval(resamples: np.ndarray) -> tuple[float, float]:
     # Nearest ranks, as interpolation between infinite values has no result.
-    low, high = np.percentile(interquartile_mean(resamples), [tail, 100.0 - tail], method="nearest")
-    return float(interquartile_mean(np.concatenate(strata))), (float(low), float(high))
+    low, high = np.percentile(resamples, _TAILS, method="nearest")
+    return float(low), float(high)

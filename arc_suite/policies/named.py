@@ -1,17 +1,21 @@
 """Policies by name: some need no training; any other is found on Python's path."""
 
 import itertools
+import os
 import pkgutil
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.cpg.presets import TUNINGS
+from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
+from arc_suite.robots.spec_files import body_to_json
 
 _CHUNK = 256  # control steps that are drawn at once
 
@@ -42,8 +46,8 @@ def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
 POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
-    f"One of {', '.join(POLICIES)}, or module:attribute, which makes a policy from a robot's name, or from the Body "
-    "of what is no robot of the suite."
+    f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or module:attribute, which makes a "
+    "policy from a robot's name, or from the Body of what is no robot of the suite."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
 
@@ -60,7 +64,8 @@ def policy(
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
-            episode's seed; or `module:attribute`, a function on Python's path that makes a function
+            episode's seed; the path of a run's folder, or of a policy file (.npz), see `network`;
+            or `module:attribute`, a function on Python's path that makes a function
             from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
         presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
@@ -71,13 +76,16 @@ def policy(
     Raises:
         ValueError: an unknown name, or a value out of range; one line that names it and the nearest
             valid one.
+        OSError: a file that cannot be read; one line.
     """
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
         checks.name(preset, preset_names(), "preset")
     checks.number("noise", noise, 0.0)
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
-    if isinstance(name, str) and ":" in name:
+    if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
+        made = _from_file(Path(name), body)
+    elif isinstance(name, str) and ":" in name:
         made = _from_path(name, body, rows)
     else:
         made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, rows)
@@ -93,6 +101,20 @@ def _noise(body: Body, deviation: float, rows: int) -> Policy:
             yield from random.normal(0.0, deviation, (_CHUNK, joints))
 
     return Script(draw, rows, joints)
+
+
+def _is_path(name: str) -> bool:
+    return name not in POLICIES and (name.endswith(network.EXTENSION) or os.sep in name or Path(name).is_dir())
+
+
+def _from_file(path: Path, body: Body) -> Policy:
+    made = network.load(path)
+    if made.robot != body.name and made.robot != body_to_json(body):
+        name = "another body" if made.robot.startswith("{") else made.robot
+        raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
+    if made.joints != len(body.joint_names):
+        raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
+    return made
 
 
 def _from_path(path: str, body: Body, rows: int) -> Policy:

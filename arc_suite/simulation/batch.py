@@ -2,7 +2,7 @@
 
 import copy
 import types
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import mujoco.batch
@@ -112,17 +112,29 @@ class Batch:
         self.data.qpos[rows] = qpos
         self._simulations.forward(rows)
 
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return copies of the simulations' state and of `data`, from which `restore` goes on to the bit."""
+        fields = {name: array.copy() for name, array in vars(self.data).items()}
+        return {"state": self._simulations.state.copy(), **fields}
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `snapshot` returned.
+
+        Raises:
+            KeyError, ValueError: an array is missing or does not fit.
+        """
+        self._simulations.state[...] = arrays["state"]
+        for name, bound in vars(self.data).items():
+            _fill(bound, arrays[name])
+
     def __getstate__(self):
         simulations = self._simulations
-        fields = {name: array.copy() for name, array in vars(self.data).items()}
-        return simulations.model, simulations.nsim, simulations.nthread, fields, simulations.state.copy()
+        return simulations.model, simulations.nsim, simulations.nthread, list(vars(self.data)), self.snapshot()
 
     def __setstate__(self, state):
-        model, rows, threads, fields, stored = state
-        self.__init__(model, rows, threads, fields)
-        self._simulations.state[...] = stored
-        for name, array in fields.items():
-            _fill(getattr(self.data, name), array)
+        *arguments, arrays = state
+        self.__init__(*arguments)
+        self.restore(arrays)
 
     def _check_process(self) -> None:
         if self._forks != forks.count:

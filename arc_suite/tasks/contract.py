@@ -34,9 +34,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
+from arc_suite.tasks import mirrors
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.clock import Clock
+from arc_suite.tasks.mirrors import Mirror, Symmetry
 from arc_suite.tasks.readings import Layout, Readings
 from arc_suite.tasks.terms import Parameters
 
@@ -150,6 +153,30 @@ class Task(ABC):
     def target_velocity(self) -> float | None:
         """The velocity along world x that is asked for all the time, m/s; None where it changes or is not."""
         return None
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """How the blocks of the observation are mirrored across the x-z plane, by name.
+
+        Raises:
+            ValueError: what is asked for is not the same on both sides, or the task does not tell; one line.
+        """
+        raise ValueError(f"task {self.name}: does not tell how its observation is mirrored")
+
+    @functools.cached_property
+    def symmetry(self) -> Symmetry:
+        """The mirror maps of observations and actions.
+
+        A walk and its mirror image, from the mirrored start by the mirrored actions, earn the same, the
+        clock of the gait half a cycle later where left and right take turns. On ground that is not level
+        the image walks on mirrored ground.
+
+        Raises:
+            ValueError: the body is not its own mirror image, or see `mirrors`; one line.
+        """
+        action = mirrors.joints(mirror.image(self.scene.body))
+        blocks = self.mirrors
+        return Symmetry(mirrors.joined(blocks[name] for name in self.blocks), action)
 
     def first(self) -> Any:
         """Return the carry with which a new stream of episodes begins."""

@@ -16,10 +16,11 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
+from arc_suite.tasks import mirrors, terms, walk
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks import terms, walk
 from arc_suite.tasks.contract import Start
 from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.mirrors import PLANAR, Mirror
 from arc_suite.tasks.readings import Readings, component
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
@@ -82,6 +83,11 @@ class Steer(walk.Walk):
     def blocks(self) -> Mapping[str, int]:
         """Walk's, and the command beside the motion that is to follow it."""
         return {**super().blocks, "command": 6}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """Walk's; what goes left goes right, and turns the other way."""
+        return {**super().mirrors, "command": mirrors.joined([PLANAR, PLANAR])}
 
     @functools.cached_property
     def units(self) -> np.ndarray:

@@ -48,3 +48,78 @@ def test_summary_of_what_is_undefined_or_infinite():
     assert infinite.mean == infinite.iqm == infinite.interval[1] == np.inf
     assert infinite.interval[0] == 3.0
     assert np.isnan(infinite.deviation)
+
+
+def test_probability_of_improvement():
+    """Of pairs of runs of the same stratum, a tie counting half; strata count equally."""
+    estimate, interval = evaluation.probability_of_improvement([[1.0, 2.0, 3.0]], [[0.0, 2.0]])
+    assert estimate == pytest.approx((3 + 1 + 0.5 + 0) / 6)
+    assert 0.0 <= interval[0] < estimate < interval[1] <= 1.0
+    estimate, interval = evaluation.probability_of_improvement([[1.0] * 3, [0.0]], [[0.0] * 5, [1.0]])
+    assert (estimate, interval) == (0.5, (0.5, 0.5))
+    with pytest.raises(ValueError, match=r"^strata: expected as many of X as of Y, got 1 and 2$"):
+        evaluation.probability_of_improvement([[1.0]], [[1.0], [2.0]])
+
+
+def test_performance_profile():
+    profile = evaluation.performance_profile([[1.0, 2.0], [3.0, 4.0, 5.0, 6.0]], [0.0, 1.0, 3.0, 5.5, 6.0])
+    np.testing.assert_allclose(profile.iqm, [1.0, 0.75, 0.375, 0.125, 0.0])
+    assert (profile.low <= profile.iqm).all() and (profile.iqm <= profile.high).all()
+    assert profile.low[0] == profile.high[0] == 1.0
+
+
+def test_curve():
+    """Points of a run stay together: runs that lie apart by a constant give bands of one width."""
+    course = np.linspace(0.0, 100.0, 7)
+    runs = course + np.arange(8.0)[:, None]
+    curve = evaluation.curve([runs])
+    np.testing.assert_allclose(curve.iqm, course + 3.5)
+    np.testing.assert_allclose(curve.high - curve.low, (curve.high - curve.low)[0])
+    assert (curve.low < curve.iqm).all() and (curve.iqm < curve.high).all()
+    for point, values in enumerate(runs.T):
+        assert evaluation.iqm_and_interval([values])[0] == curve.iqm[point]
+
+
+def test_a_curve_of_one_run_has_no_band():
+    curve = evaluation.curve([[[1.0, 2.0, 3.0]], [[3.0, 4.0, 5.0]]])
+    np.testing.assert_allclose([curve.iqm, curve.low, curve.high], [[2.0, 3.0, 4.0]] * 3)
+
+
+class TestBesideRliable:
+    """rliable (Agarwal et al., 2021) is an oracle here and no dependency."""
+
+    scores = np.random.default_rng(3).normal(2000.0, 300.0, (2, 8, 4)) + [0.0, 200.0, 500.0, 900.0]
+    x, y = scores[0], scores[1]  # (runs, robots)
+
+    @pytest.fixture
+    def rliable(self):
+        pytest.importorskip("rliable", reason="an oracle: make check-agents")
+        from rliable import library, metrics
+
+        return library, metrics
+
+    def test_interquartile_mean(self, rliable):
+        library, metrics = rliable
+        estimate, interval = evaluation.iqm_and_interval(list(self.x.T))
+        expected, ends = library.get_interval_estimates(
+            {"x": self.x}, lambda scores: np.array([metrics.aggregate_iqm(scores)]), reps=5000
+        )
+        assert estimate == pytest.approx(expected["x"][0])
+        np.testing.assert_allclose(interval, ends["x"][:, 0], rtol=0.01)
+
+    def test_probability_of_improvement(self, rliable):
+        library, metrics = rliable
+        estimate, interval = evaluation.probability_of_improvement(list(self.x.T), list(self.y.T))
+        expected, ends = library.get_interval_estimates(
+            {"x,y": (self.x, self.y)}, metrics.probability_of_improvement, reps=1000
+        )
+        assert estimate == pytest.approx(expected["x,y"])
+        np.testing.assert_allclose(interval, np.ravel(ends["x,y"]), atol=0.03)
+
+    def test_performance_profile(self, rliable):
+        library, _ = rliable
+        thresholds = np.linspace(1000.0, 4000.0, 13)
+        profile = evaluation.performance_profile(list(self.x.T), thresholds)
+        expected, ends = library.create_performance_profile({"x": self.x}, thresholds, reps=2000)
+        np.testing.assert_allclose(profile.iqm, expected["x"])
+        np.testing.assert_allclose([profile.low, profile.high], ends["x"], atol=0.04)

@@ -31,6 +31,7 @@ ROOMS = (
     ("data",),
     ("style",),
     ("tuning",),
+    ("agents",),  # who learns
     ("cli",),  # programs
     ("doctor", "__main__"),  # that Python starts by name
 )
@@ -44,6 +45,7 @@ THIRD_PARTY = {
     "versions": {"packaging"},
     "robots": set(),
     "robots.generator": {"numpy"},
+    "robots.mirror": {"numpy"},
     "arenas": {"numpy", "dm_control"},
     "arenas.arena": {"dm_control"},
     "models": {"numpy", "mujoco", "dm_control"},
@@ -56,7 +58,17 @@ THIRD_PARTY = {
     "cpg.presets": set(),
     "registration": {"gymnasium"},
     "policies": {"numpy", "dm_env"},
+    "policies.network": {"numpy"},
+    "policies.onnx_file": {"numpy", "onnx"},
     "evaluation.statistics": {"numpy"},
+    "agents": {"numpy", "gymnasium", "tqdm"},
+    "agents.networks": {"numpy", "jax"},
+    "agents.off_policy": {"numpy", "jax"},
+    "agents.soft_actor_critic": {"numpy", "jax", "optax"},
+    "agents.imitation": {"numpy", "jax", "optax"},
+    "agents.on_policy": {"numpy", "jax"},
+    "agents.proximal_policy": {"numpy", "jax", "optax"},
+    "agents.rows": set(),
     "style.metrics": {"numpy"},
 }
 
@@ -68,11 +80,16 @@ INSIDE = {
     "robots.bastion": {"robots.spec"},
     "robots.tick": {"robots.spec"},
     "robots.leaper": {"robots.spec"},
+    "robots.mirror": {"robots.spec"},
     "arenas.arena": set(),
     "tasks.clock": set(),
     "tasks.readings": {"arenas"},
     "tasks.terms": {"tasks.readings"},
-    "tasks.contract": {"arenas", "robots.spec", "tasks.clock", "tasks.readings", "tasks.terms"},
+    "tasks.mirrors": {"robots.mirror"},
+    "tasks.contract": {
+        *("arenas", "robots.mirror", "robots.spec"),
+        *("tasks.clock", "tasks.mirrors", "tasks.readings", "tasks.terms"),
+    },
     "cpg.law": set(),
     "cpg.presets": {"robots.gaits"},
     "evaluation.statistics": set(),
@@ -162,6 +179,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     """Whoever drives tasks gets them from the registry; registration and demonstrators know walk's rows of numbers."""
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
+    contract |= {"tasks.mirrors"}
     particular = texts - contract
     assert particular == {"tasks.walk", "tasks.steer", "tasks.ground"}
     for name in modules():
@@ -170,7 +188,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
 
 
 def test_import_is_light():
-    heavy = ("torch", "stable_baselines3", "shimmy", "matplotlib", "imageio")
+    heavy = ("torch", "jax", "stable_baselines3", "shimmy", "matplotlib", "imageio")
     code = f"import sys, arc_suite; print([m for m in {heavy} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"

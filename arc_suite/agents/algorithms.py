@@ -1,0 +1,184 @@
+"""Algorithms by name: rows of numbers over what learns. Nothing here needs JAX."""
+
+import dataclasses
+import importlib
+import json
+import pkgutil
+from collections.abc import Iterable
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from arc_suite import checks
+from arc_suite.agents.rows import Imitation, ProximalPolicy
+
+
+class Algorithm(NamedTuple):
+    """An algorithm.
+
+    Attributes:
+        learner: the module that learns, by its full name; see `arc_suite.agents`.
+        row: its numbers, a frozen dataclass.
+        summary: what it is, in a line.
+        evaluate_every: environment steps between evaluations.
+        steps: environment steps of a run, if it is not told otherwise.
+    """
+
+    learner: str
+    row: Any
+    summary: str
+    evaluate_every: int = 10_000
+    steps: int = 1_000_000
+
+    @property
+    def module(self) -> ModuleType:
+        """The module that learns.
+
+        Raises:
+            ValueError: something that it needs is not installed; one line.
+        """
+        try:
+            return importlib.import_module(self.learner)
+        except ImportError as error:
+            raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
+
+    def with_row(self, changes: dict[str, Any]) -> "Algorithm":
+        """Return the algorithm with some numbers of its row changed.
+
+        Raises:
+            ValueError: no such number, or one of another kind; one line.
+        """
+        fields = {field.name: getattr(self.row, field.name) for field in dataclasses.fields(self.row)}
+        for name, value in changes.items():
+            kind = type(fields[checks.name(name, fields, "number of the row")])
+            kinds = (int, float) if kind is float else kind
+            if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
+                raise ValueError(f"row {name}: expected {kind.__name__} like {fields[name]!r}, got {value!r}")
+        return self._replace(row=dataclasses.replace(self.row, **changes))
+
+
+@dataclasses.dataclass(frozen=True)
+class SoftActorCritic:
+    """The numbers of a soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018).
+
+    Defaults are what the published code of the ARC-RL paper has for SAC.
+
+    Attributes:
+        hidden: units of each of the two hidden layers, of policy and critics.
+        learning_rate: of Adam, for policy, critics and temperature.
+        discount: of a control step.
+        averaging: share of a critic that its target takes over in each update.
+        batch: transitions of an update from each source of data.
+        capacity: latest online transitions that are kept.
+        dropout: share of units that the critics drop.
+        prior: what prior data are: "none"; "fenced", in one buffer with online data, never overwritten; or
+            "beside", a batch of their own in every update.
+        random_steps: the policy acts once the buffer has more transitions than this; before, actions are uniform.
+        phase_every: environment steps between stabilisation phases.
+        phase_updates: the most updates of critics alone in a phase; 0 for no phases.
+        early_stop: what ends a phase before: "none", "published" or "sign_safe"; see `stopping`.
+        held_out: share of the online transitions by which phases are judged.
+        scored_batches: the most batches from each source by which they are judged at a time.
+        check_every: updates between two looks at them.
+        patience: updates without improvement after which a phase ends.
+        improvement: relative improvement that counts.
+    """
+
+    hidden: int = 256
+    learning_rate: float = 3e-4
+    discount: float = 0.99
+    averaging: float = 0.005
+    batch: int = 256
+    capacity: int = 1_000_000
+    dropout: float = 0.0
+    prior: str = "none"
+    random_steps: int = 5000
+    phase_every: int = 10_000
+    phase_updates: int = 0
+    early_stop: str = "none"
+    held_out: float = 0.1
+    scored_batches: int = 16
+    check_every: int = 1000
+    patience: int = 10_000
+    improvement: float = 0.001
+
+    def __post_init__(self):
+        """Check the numbers.
+
+        Raises:
+            ValueError: one that does not fit; one line.
+        """
+        for name, low in (("hidden", 1), ("batch", 1), ("capacity", 1), ("random_steps", 0), ("phase_every", 1)):
+            checks.integer(name, getattr(self, name), low)
+        for name, low in (("phase_updates", 0), ("scored_batches", 1), ("check_every", 1), ("patience", 1)):
+            checks.integer(name, getattr(self, name), low)
+        for name in ("learning_rate", "discount", "averaging", "held_out", "improvement"):
+            checks.number(name, getattr(self, name), 0.0, 1.0)
+        checks.number("dropout", self.dropout, 0.0, 0.9)
+        checks.name(self.prior, ("none", "fenced", "beside"), "prior")
+        checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
+
+
+_SAC = SoftActorCritic()
+_SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
+_OFF_POLICY = "arc_suite.agents.off_policy"
+
+# The paper's six, as its published code runs them, and two that are not the paper's: docs/agents.md.
+ALGORITHMS = {
+    "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
+    "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
+    "sope_eo": Algorithm(
+        _OFF_POLICY, dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"
+    ),
+    "sacfd": Algorithm(
+        _OFF_POLICY, dataclasses.replace(_SAC, prior="fenced"), "SAC with prior data in its buffer, never overwritten"
+    ),
+    "speq_o2o": Algorithm(
+        _OFF_POLICY, dataclasses.replace(_SPEQ, prior="beside"), "SPEQ with a batch of prior data in every update"
+    ),
+    "sope": Algorithm(
+        _OFF_POLICY,
+        dataclasses.replace(_SPEQ, prior="beside", early_stop="published"),
+        "SPEQ-O2O with phases that stop early",
+    ),
+    "ppo": Algorithm(
+        "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
+    ),
+    "imitation": Algorithm(
+        "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
+    ),
+}
+
+
+def algorithm(name: str) -> Algorithm:
+    """Return the algorithm of a name, or of `module:attribute`, an `Algorithm` on Python's path.
+
+    Raises:
+        ValueError: there is none; one line.
+    """
+    if isinstance(name, str) and ":" in name:
+        try:
+            found = pkgutil.resolve_name(name)
+        except (ImportError, ValueError, AttributeError) as error:
+            raise ValueError(f"algorithm {name!r}: {error}") from None
+        if not isinstance(found, Algorithm):
+            raise ValueError(f"algorithm {name!r}: expected an Algorithm, got {type(found).__name__}")
+        return found
+    return ALGORITHMS[checks.name(name, ALGORITHMS, "algorithm")]
+
+
+def changes(texts: Iterable[str]) -> dict[str, Any]:
+    """Return the numbers that texts name=value change; values are JSON where they parse, else text.
+
+    Raises:
+        ValueError: a text without a value; one line.
+    """
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals):
+            raise ValueError(f"row {text}: expected name=value")
+        try:
+            found[name] = json.loads(value)
+        except ValueError:
+            found[name] = value
+    return found

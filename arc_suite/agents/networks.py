@@ -1,0 +1,145 @@
+"""Networks as plain pytrees of JAX: a network is a tuple of layers, a layer a dictionary of arrays.
+
+A layer has `weight` (inputs, outputs) and `bias` (outputs,), and `scale` and `offset` (outputs,) where a
+layer norm follows. Numbers are drawn by NumPy, so that they depend on a seed alone.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from arc_suite.policies.network import Layer
+
+EPSILON = 1e-5  # of a layer norm
+
+ACTIVATIONS = {"relu": jax.nn.relu, "elu": jax.nn.elu}
+
+
+def xavier(random: np.random.Generator, inputs: int, outputs: int, gain: float = 1.0) -> np.ndarray:
+    """Draw a weight (inputs, outputs), uniform within gain sqrt(6 / (inputs + outputs)) (Glorot and Bengio, 2010)."""
+    bound = gain * math.sqrt(6.0 / (inputs + outputs))
+    return random.uniform(-bound, bound, (inputs, outputs)).astype(np.float32)
+
+
+def orthogonal(random: np.random.Generator, inputs: int, outputs: int, gain: float = 1.0) -> np.ndarray:
+    """Draw a weight (inputs, outputs) whose shorter side is orthonormal, times gain (Saxe et al., 2014)."""
+    q, r = np.linalg.qr(random.standard_normal((max(inputs, outputs), min(inputs, outputs))))
+    q = q * np.sign(np.diagonal(r))
+    return (gain * (q if inputs >= outputs else q.T)).astype(np.float32)
+
+
+INITIAL = {"xavier": xavier, "orthogonal": orthogonal}
+
+
+def layer(weight: np.ndarray, layer_norm: bool = False) -> dict[str, np.ndarray]:
+    """Return a layer of a weight (inputs, outputs), with biases 0."""
+    outputs = weight.shape[1]
+    norm = {"scale": np.ones(outputs, np.float32), "offset": np.zeros(outputs, np.float32)} if layer_norm else {}
+    return {"weight": weight, "bias": np.zeros(outputs, np.float32), **norm}
+
+
+def mlp(
+    random: np.random.Generator,
+    sizes: Sequence[int],
+    initial: str = "xavier",
+    layer_norm: bool = False,
+    gain: float = 1.0,
+    last_gain: float = 1.0,
+) -> tuple[dict[str, np.ndarray], ...]:
+    """Draw a multilayer perceptron.
+
+    Args:
+        random: to draw from.
+        sizes: of the input, the hidden layers and the output.
+        initial: of the weights, a name of `INITIAL`.
+        layer_norm: whether hidden layers have one.
+        gain: of hidden layers.
+        last_gain: of the output.
+    """
+    draw = INITIAL[initial]
+    *pairs, last = zip(sizes[:-1], sizes[1:], strict=True)
+    hidden = [layer(draw(random, *pair, gain), layer_norm) for pair in pairs]
+    return *hidden, layer(draw(random, *last, last_gain))
+
+
+def linear(layer: Mapping, x):
+    """Return weight and bias applied to x (..., inputs)."""
+    return x @ layer["weight"] + layer["bias"]
+
+
+def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0):
+    """Return what hidden layers make of x (..., inputs): linear, dropout, layer norm if it has one, activation.
+
+    Args:
+        layers: of the network.
+        x: (..., inputs)
+        activation: a name of `ACTIVATIONS`.
+        kept: booleans (layers, ..., outputs), the units that dropout keeps; None for no dropout.
+        dropout: share of the units that it drops.
+    """
+    for index, each in enumerate(layers):
+        x = linear(each, x)
+        if kept is not None:
+            x = dropped(x, kept[index], dropout)
+        x = activated(each, x, activation)
+    return x
+
+
+def dropped(x, kept, dropout: float):
+    """Return x with 0 where units are not kept, and the others scaled by what dropout takes away."""
+    return jnp.where(kept, x * (1.0 / (1.0 - dropout)), 0.0)
+
+
+def activated(layer: Mapping, x, activation: str):
+    """Return x (..., outputs) after a layer's norm, if it has one, and an activation."""
+    if "scale" in layer:
+        x = x - x.mean(axis=-1, keepdims=True)
+        x = x * jax.lax.rsqrt((x * x).mean(axis=-1, keepdims=True) + EPSILON) * layer["scale"] + layer["offset"]
+    return ACTIVATIONS[activation](x)
+
+
+def forward(layers: Sequence[Mapping], x, activation: str = "relu"):
+    """Return the output of a multilayer perceptron for x (..., inputs)."""
+    return linear(layers[-1], hidden(layers[:-1], x, activation))
+
+
+def exported(layers: Sequence[Mapping], activation: str = "relu") -> tuple[Layer, ...]:
+    """Return a multilayer perceptron as layers of a policy file, its last layer linear."""
+    result = []
+    for each in layers:
+        numbers = {name: np.asarray(array, np.float32) for name, array in each.items()}
+        result.append(Layer("linear", (numbers["weight"], numbers["bias"])))
+        if each is not layers[-1]:
+            if "scale" in numbers:
+                result.append(Layer("layer_norm", (numbers["scale"], numbers["offset"])))
+            result.append(Layer(activation))
+    return tuple(result)
+
+
+def named(prefix: str, tree) -> dict[str, np.ndarray]:
+    """Return the arrays of a pytree by name, prefix/path/to/array: part of a checkpoint."""
+    leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
+    return {f"{prefix}{_text(path)}": np.asarray(leaf) for path, leaf in leaves}
+
+
+def restored(prefix: str, template, arrays: Mapping[str, np.ndarray]):
+    """Return a pytree like the template with the arrays that `named` gave.
+
+    Raises:
+        KeyError, ValueError: an array is missing or has another shape.
+    """
+    leaves, structure = jax.tree_util.tree_flatten_with_path(template)
+    values = []
+    for path, leaf in leaves:
+        value, like = arrays[f"{prefix}{_text(path)}"], np.asarray(leaf)
+        if (value.shape, value.dtype) != (like.shape, like.dtype):
+            raise ValueError(f"{prefix}{_text(path)}: expected {like.dtype} {like.shape}")
+        values.append(jnp.asarray(value))
+    return jax.tree_util.tree_unflatten(structure, values)
+
+
+def _text(path) -> str:
+    return "/" + jax.tree_util.keystr(path, simple=True, separator="/")

@@ -1,0 +1,143 @@
+"""Transitions in files that are mapped into memory: the latest ones of a run, and prior data.
+
+An observation is stored once: the next one of a transition is that of the transition after it, but for
+those that end an episode, which lie in a file of their own. So a million transitions of Queen take 0.9 GB,
+which the system may write back and read again as it likes. Files are of full size from the start, so that a
+disk that is too small is found out at once.
+"""
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import files
+
+_ENDS = 256  # final observations by which their file grows
+
+
+class Transitions(NamedTuple):
+    """Transitions, with leading axes; float32.
+
+    Attributes:
+        observations: (..., size)
+        actions: (..., joints)
+        rewards: (...)
+        goes_on: (...) 0 where the episode was terminated, else 1: a time limit terminates nothing.
+        next_observations: (..., size)
+    """
+
+    observations: np.ndarray
+    actions: np.ndarray
+    rewards: np.ndarray
+    goes_on: np.ndarray
+    next_observations: np.ndarray
+
+
+class Replay:
+    """The latest transitions of a stream of episodes, in files of a folder.
+
+    Nothing is overwritten that could be sampled `slack` transitions ago, so that a run goes on from
+    a checkpoint that is not older.
+
+    Attributes:
+        total: transitions added since the start.
+        ends: episodes that ended since the start.
+    """
+
+    def __init__(self, folder: Path, capacity: int, size: int, joints: int, slack: int = 0, mode: str = "r+"):
+        """Map the files, made if need be.
+
+        Args:
+            folder: of the files.
+            capacity: transitions that can be sampled.
+            size: of an observation.
+            joints: of an action.
+            slack: further transitions that are kept.
+            mode: "r+", or "r" for files that are there and are read alone.
+
+        Raises:
+            OSError: the disk is full, or the like; one line.
+        """
+        self._folder, self._capacity, self._size, self._mode = files.folder(folder), capacity, size, mode
+        self._slots = capacity + slack + 1  # one more for the observation that comes next
+        self._observations = self._mapped("observations", np.float32, (self._slots, size))
+        self._actions = self._mapped("actions", np.float32, (self._slots, joints))
+        self._rewards = self._mapped("rewards", np.float32, (self._slots,))
+        self._goes_on = self._mapped("goes_on", np.float32, (self._slots,))
+        self._end = self._mapped("ends", np.int32, (self._slots,))  # which of the final observations is next, or -1
+        self._final = self._mapped("final_observations", np.float32, (_ENDS, size))
+        self.total = self.ends = 0
+
+    def __len__(self) -> int:
+        """Return how many transitions can be sampled."""
+        return min(self.total, self._capacity)
+
+    def add(self, observation, action, reward: float, terminated: bool, next_observation, is_last: bool) -> None:
+        """Add a transition; if it is not the last of its episode, the next one starts from its next observation."""
+        slot = self.total % self._slots
+        self._observations[slot], self._actions[slot], self._rewards[slot] = observation, action, reward
+        self._goes_on[slot], self._end[slot] = not terminated, -1
+        if is_last:
+            self._make_room(self.ends + 1)
+            self._final[self.ends], self._end[slot] = next_observation, self.ends
+            self.ends += 1
+        else:
+            self._observations[(slot + 1) % self._slots] = next_observation
+        self.total += 1
+
+    def at(self, indices: np.ndarray) -> Transitions:
+        """Return copies of transitions by index, from the oldest that can be sampled on: 0 to `len` - 1."""
+        slots = (self.total - len(self) + indices) % self._slots
+        nexts, ends = self._observations[(slots + 1) % self._slots], self._end[slots]
+        last = ends >= 0
+        nexts[last] = self._final[ends[last]]
+        numbers = (array[slots] for array in (self._observations, self._actions, self._rewards, self._goes_on))
+        return Transitions(*numbers, nexts)
+
+    def restore(self, total: int, ends: int) -> None:
+        """Go on from where there were so many transitions, `slack` ago at most, and so many ends of episodes."""
+        self.total, self.ends = total, ends
+        self._make_room(ends)
+
+    def _make_room(self, ends: int) -> None:
+        rows = len(self._final)
+        while rows < ends:
+            rows *= 2
+        if rows > len(self._final):
+            self._final = self._mapped("final_observations", np.float32, (rows, self._size))
+
+    def _mapped(self, name: str, dtype, shape: tuple[int, ...]) -> np.ndarray:
+        path, size = self._folder / name, int(np.prod(shape)) * np.dtype(dtype).itemsize
+        try:
+            with path.open("rb" if self._mode == "r" else "a+b") as file:
+                if self._mode == "r":
+                    pass
+                elif hasattr(os, "posix_fallocate"):
+                    os.posix_fallocate(file.fileno(), 0, size)
+                elif os.fstat(file.fileno()).st_size < size:
+                    file.truncate(size)
+        except OSError as error:
+            raise OSError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from None
+        return np.memmap(path, dtype, self._mode, shape=shape)
+
+
+class Fenced:
+    """Two sources of transitions as one, the first of which is never overwritten."""
+
+    def __init__(self, first: Replay, second: Replay):
+        """Take the sources."""
+        self._first, self._second = first, second
+
+    def __len__(self) -> int:
+        """Return how many transitions can be sampled."""
+        return len(self._first) + len(self._second)
+
+    def at(self, indices: np.ndarray) -> Transitions:
+        """Return copies of transitions by index, those of the first source before those of the second."""
+        count = len(self._first)
+        of_first = indices < count
+        parts = self._first.at(indices[of_first]), self._second.at(indices[~of_first] - count)
+        places = np.argsort(np.concatenate([np.flatnonzero(of_first), np.flatnonzero(~of_first)]))
+        return Transitions(*(np.concatenate(pair)[places] for pair in zip(*parts, strict=True)))

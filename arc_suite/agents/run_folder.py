@@ -1,0 +1,190 @@
+"""The folder of a run: plain files, whole whatever happens, from which the same run goes on.
+
+    config.json         all that the run depends on
+    evaluations.csv     a line for each episode of each evaluation
+    training.csv        what the learner says of itself
+    times.csv           seconds, which are never the same twice
+    checkpoint.npz      what the learner goes on from, and how long the tables were then
+    policy.npz          the policy of the latest evaluation
+
+Tables only grow; on going on they are cut back to where they were at the checkpoint.
+"""
+
+import contextlib
+import fcntl
+import json
+import os
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from arc_suite import files
+
+CONFIG, CHECKPOINT = "config.json", "checkpoint.npz"
+TABLES = ("evaluations", "training", "times")
+
+_PROGRESS = "progress"  # the text in a checkpoint that is not the learner's
+# What damage makes NumPy and zipfile raise.
+_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+
+
+class RunFolder:
+    """An open folder of a run; `opened` opens it.
+
+    Attributes:
+        path: of the folder.
+        arrays: of the learner at the checkpoint; None before the first.
+        progress: what `save` was given beside them, plain values.
+    """
+
+    def __init__(self, path: Path, arrays: dict[str, np.ndarray] | None, progress: dict[str, Any]):
+        """Take what was read, and cut the tables back."""
+        self.path, self.arrays, self.progress = path, arrays, progress
+        lengths = progress.get("tables", {})
+        self._files = {name: (path / f"{name}.csv").open("ab", buffering=0) for name in TABLES}
+        self._columns = {}
+        for name, file in self._files.items():
+            if file.tell() < lengths.get(name, 0):
+                raise ValueError(
+                    f"{path / name}.csv: shorter than at the checkpoint; delete {CHECKPOINT} to start over"
+                )
+            file.truncate(lengths.get(name, 0))
+            first = (path / f"{name}.csv").read_text().partition("\n")[0]
+            self._columns[name] = first.split(",") if first else None
+
+    def append(self, table: str, row: Mapping[str, float]) -> None:
+        """Add a line to a table, whose first line names the columns.
+
+        Raises:
+            OSError: the disk is full, or the like.
+        """
+        if self._columns[table] is None:
+            self._columns[table] = list(row)
+            self._write(table, ",".join(row))
+        if list(row) != self._columns[table]:
+            raise ValueError(f"{self.path / table}.csv: expected columns {self._columns[table]}, got {list(row)}")
+        self._write(table, ",".join(_cell(value) for value in row.values()))
+
+    def save(self, arrays: Mapping[str, np.ndarray], progress: Mapping[str, Any]) -> None:
+        """Replace the checkpoint.
+
+        Raises:
+            OSError: the disk is full, or the like; the checkpoint before stays.
+        """
+        lengths = {name: os.fstat(file.fileno()).st_size for name, file in self._files.items()}
+        text = json.dumps({**progress, "tables": lengths})
+        with files.writing(self.path / CHECKPOINT) as temporary:
+            np.savez(temporary, **{_PROGRESS: np.array(text)}, **arrays)
+
+    def close(self) -> None:
+        """Close the tables."""
+        for file in self._files.values():
+            file.close()
+
+    def _write(self, table: str, line: str) -> None:
+        self._files[table].write(f"{line}\n".encode())
+
+
+@contextlib.contextmanager
+def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFolder]:
+    """Open the folder of a run, or make one.
+
+    Args:
+        path: of the folder.
+        config: all that the run depends on, plain values.
+
+    Raises:
+        ValueError: the folder belongs to another run, is none of a run, is damaged, or another process
+            writes to it; one line.
+        OSError: it cannot be read or written; one line.
+    """
+    path = files.folder(path)
+    with contextlib.ExitStack() as stack:
+        descriptor = os.open(path, os.O_RDONLY)
+        stack.callback(os.close, descriptor)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ValueError(f"{path}: another process goes on with this run") from None
+        _check(path, json.loads(json.dumps(config)))
+        folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
+        stack.callback(folder.close)
+        yield folder
+
+
+def config_of(path: str | os.PathLike) -> dict[str, Any]:
+    """Return the configuration of a run from its folder.
+
+    Raises:
+        ValueError: no folder of a run; one line.
+    """
+    try:
+        config = json.loads((Path(path) / CONFIG).read_text())
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: no folder of a run: {' '.join(str(error).split())}") from None
+    if not isinstance(config, dict):
+        raise ValueError(f"{path}: no folder of a run")
+    return config
+
+
+def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
+    """Return a table of a run's folder: columns by name; whatever of a line is being written is left out.
+
+    Raises:
+        ValueError: the folder has no such table, or a damaged one; one line.
+    """
+    path = Path(path) / f"{name}.csv"
+    try:
+        text = path.read_text()
+        header, *lines = text[: text.rfind("\n") + 1].splitlines()
+        columns = np.array([line.split(",") for line in lines], float).reshape(len(lines), -1).T
+        return dict(zip(header.split(","), columns, strict=True)) if lines else {}
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: no table of a run: {' '.join(str(error).split())}") from None
+
+
+def _check(path: Path, config: dict[str, Any]) -> None:
+    """Compare the configuration with the folder's, or write it into a new one."""
+    if not (path / CONFIG).exists():
+        others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
+        if others:
+            raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
+        with files.writing_json(path / CONFIG) as file:
+            file.update(config)
+        return
+    for name, was, wanted in _differences(config_of(path), config):
+        raise ValueError(
+            f"{path}: of another run, whose {name} is {was!r}, and not {wanted!r}; write to another folder"
+        )
+
+
+def _differences(was: Mapping, wanted: Mapping, above: str = "") -> Iterator[tuple[str, Any, Any]]:
+    for name in dict.fromkeys((*wanted, *was)):
+        here, there = wanted.get(name), was.get(name)
+        if isinstance(here, dict) and isinstance(there, dict):
+            yield from _differences(there, here, f"{above}{name}.")
+        elif here != there:
+            yield f"{above}{name}", there, here
+
+
+def _checkpoint(path: Path) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:
+    if not path.exists():
+        return None, {}
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        progress = json.loads(str(arrays.pop(_PROGRESS)))
+        if not isinstance(progress, dict):
+            raise ValueError("expected an object")
+        return arrays, progress
+    except _DAMAGES as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ValueError(f"{path} is damaged: {reason}; delete it to start the run over") from None
+
+
+def _cell(value) -> str:
+    return repr(value.item() if isinstance(value, np.generic) else value)

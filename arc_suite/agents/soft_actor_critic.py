@@ -1,0 +1,209 @@
+"""Soft actor-critic (Haarnoja et al., 2018) as pure functions of plain pytrees.
+
+One update runs in this order, as in the published code of the ARC-RL paper: the target with the
+temperature of the update before and an action of the present policy; the gradient of the critics' loss;
+the policy's loss on the same observations with critics that have not moved yet, and its gradient; then
+the steps of temperature, critics and policy, and last the targets. The policy ascends the mean of the
+critics, not their minimum. Dropout, before the layer norm, is at work in the targets and in the policy's
+loss too.
+
+Noise and dropout masks are inputs, so that an update is a function of what it is given.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from arc_suite.agents import networks
+from arc_suite.agents.algorithms import SoftActorCritic
+from arc_suite.agents.replay import Transitions
+from arc_suite.policies.network import Layer
+
+NUMBERS = ("hidden", "learning_rate", "discount", "averaging", "dropout")  # of a row, that an update depends on
+CRITICS = 2
+HIDDEN_LAYERS = 2
+LOG_STD = (-20.0, 2.0)  # bounds of the logarithm of the policy's standard deviation
+
+_TINY = 1e-6  # keeps the logarithm of the density finite where tanh saturates
+_LOG_TWO_PI = math.log(2.0 * math.pi)
+
+
+class State(NamedTuple):
+    """What an update changes.
+
+    Attributes:
+        policy: `trunk`, the hidden layers; `mean` and `log_std`, layers of their own on top.
+        critics: networks of observation and action beside each other, to a value.
+        targets: like the critics.
+        log_alpha: logarithm of the temperature.
+        moments: of Adam by what it moves: policy, critics, log_alpha.
+    """
+
+    policy: Mapping[str, Any]
+    critics: tuple
+    targets: tuple
+    log_alpha: Any
+    moments: Mapping[str, Any]
+
+
+class Noise(NamedTuple):
+    """What is random in an update.
+
+    Attributes:
+        next_action: (batch, joints) standard normal, of the action in the target.
+        action: (batch, joints) likewise, of the action in the policy's loss; None where that is left out.
+        kept: (uses, critics, hidden layers, batch, hidden) booleans, the units that dropout keeps; uses are
+            the targets, the critics' loss and the policy's loss, if there is one; None without dropout.
+    """
+
+    next_action: Any
+    action: Any
+    kept: Any
+
+
+def begin(row: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> State:
+    """Draw the networks for observations of a size and actions of so many joints."""
+    hidden = [row.hidden] * HIDDEN_LAYERS
+    *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True)
+    log_std = networks.layer(networks.xavier(random, row.hidden, joints))
+    policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
+    critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
+    adam, log_alpha = optimiser(row), np.zeros((), np.float32)
+    moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
+    return jax.tree.map(jnp.array, State(policy, critics, critics, log_alpha, moments))
+
+
+def optimiser(row: SoftActorCritic) -> optax.GradientTransformation:
+    """Return Adam, (0.9, 0.999), 1e-8."""
+    return optax.adam(row.learning_rate)
+
+
+def noise(row: SoftActorCritic, random: np.random.Generator, batch: int, joints: int, with_policy: bool) -> Noise:
+    """Draw what is random in an update of a batch, with the policy's loss or of critics alone."""
+    next_action = random.standard_normal((batch, joints), np.float32)
+    action = random.standard_normal((batch, joints), np.float32) if with_policy else None
+    shape = (3 if with_policy else 2, CRITICS, HIDDEN_LAYERS, batch, row.hidden)
+    return Noise(next_action, action, kept(random, shape, row.dropout) if row.dropout else None)
+
+
+def kept(random: np.random.Generator, shape: tuple[int, ...], dropout: float) -> np.ndarray:
+    """Draw booleans of a shape, each False with the probability `dropout`, on its own.
+
+    What is drawn are the gaps between those that are False, which have a geometric distribution: where
+    few units are dropped, that takes a fraction of the time.
+    """
+    mask = np.ones(math.prod(shape), bool)
+    expected, at = mask.size * dropout, -1
+    while at < mask.size:
+        gaps = random.geometric(dropout, int(expected + 4.0 * math.sqrt(expected)) + 8)
+        places = at + np.cumsum(gaps)
+        mask[places[places < mask.size]] = False
+        at = places[-1]
+    return mask.reshape(shape)
+
+
+def distribution(policy, observations):
+    """Return mean and logarithm of the standard deviation, (..., joints) each, of the normal under the tanh."""
+    x = networks.hidden(policy["trunk"], observations)
+    return networks.linear(policy["mean"], x), jnp.clip(networks.linear(policy["log_std"], x), *LOG_STD)
+
+
+def sample(mean, log_std, noise):
+    """Return actions (..., joints) for standard normal noise, and the logarithm of their density (...)."""
+    action = jnp.tanh(mean + jnp.exp(log_std) * noise)
+    density = -0.5 * noise * noise - log_std - 0.5 * _LOG_TWO_PI - jnp.log(1.0 - action * action + _TINY)
+    return action, density.sum(axis=-1)
+
+
+def values(critics, observations, actions, kept=None, dropout: float = 0.0):
+    """Return the values of actions, (...) of each critic.
+
+    The first layer's products with observations and with actions are apart, so that those with
+    observations serve two losses and need no gradient of the inputs.
+    """
+    size, results = observations.shape[-1], []
+    for index, (first, *others, last) in enumerate(critics):
+        split = first["weight"][:size], first["weight"][size:]
+        masks = None if kept is None else kept[index]
+        x = observations @ split[0] + actions @ split[1] + first["bias"]
+        if masks is not None:
+            x = networks.dropped(x, masks[0], dropout)
+        x = networks.activated(first, x, "relu")
+        x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], dropout)
+        results.append(networks.linear(last, x)[..., 0])
+    return results
+
+
+def targets(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise, following=None):
+    """Return what the critics are to say of a batch, (batch,); `following` as in `update`."""
+    following = distribution(state.policy, batch.next_observations) if following is None else following
+    action, density = sample(*following, noise.next_action)
+    kept = None if noise.kept is None else noise.kept[0]
+    least = jnp.minimum(*values(state.targets, batch.next_observations, action, kept, row.dropout))
+    return batch.rewards + row.discount * batch.goes_on * (least - jnp.exp(state.log_alpha) * density)
+
+
+def critics_loss(row: SoftActorCritic, critics, batch: Transitions, wanted, kept):
+    """Return the sum over the critics of the mean squared error, and the mean of their values."""
+    found = values(critics, batch.observations, batch.actions, kept, row.dropout)
+    return sum(jnp.mean((value - wanted) ** 2) for value in found), sum(found).mean() / CRITICS
+
+
+def policy_loss(row: SoftActorCritic, policy, state: State, observations, noise, kept):
+    """Return the mean of alpha log pi - mean of the critics, and the mean of log pi."""
+    action, density = sample(*distribution(policy, observations), noise)
+    value = sum(values(state.critics, observations, action, kept, row.dropout)) / CRITICS
+    return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
+
+
+def update(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise, following=None) -> tuple[State, dict]:
+    """Return the state after one update, and its figures, scalars by name.
+
+    Args:
+        row: numbers.
+        state: before.
+        batch: transitions, with one leading axis.
+        noise: what is random; without `action`, critics alone learn.
+        following: the policy's `distribution` of the next observations, where it has been computed before.
+    """
+    masks = (None, None, None) if noise.kept is None else noise.kept
+    wanted = targets(row, state, batch, noise, following)
+    critic_gradient = jax.value_and_grad(critics_loss, argnums=1, has_aux=True)
+    (critic_loss, value), gradient = critic_gradient(row, state.critics, batch, wanted, masks[1])
+    critics, moments = _moved(row, "critics", state.critics, gradient, state.moments)
+    figures = {"critic_loss": critic_loss, "q": value}
+    if noise.action is not None:
+        policy_gradient = jax.value_and_grad(policy_loss, argnums=1, has_aux=True)
+        (loss, density), gradient = policy_gradient(
+            row, state.policy, state, batch.observations, noise.action, masks[2]
+        )
+        joints = batch.actions.shape[-1]
+        log_alpha, moments = _moved(row, "log_alpha", state.log_alpha, joints - density, moments)
+        policy, moments = _moved(row, "policy", state.policy, gradient, moments)
+        state = state._replace(policy=policy, log_alpha=log_alpha)
+        figures |= {"policy_loss": loss, "entropy": -density, "alpha": jnp.exp(log_alpha)}
+    averaged = jax.tree.map(
+        lambda target, critic: (1.0 - row.averaging) * target + row.averaging * critic, state.targets, critics
+    )
+    return state._replace(critics=critics, targets=averaged, moments=moments), figures
+
+
+def held_out_loss(row: SoftActorCritic, state: State, observations, noise, kept):
+    """Return the policy's loss on observations (batch, size): the signal that ends phases."""
+    return policy_loss(row, state.policy, state, observations, noise, kept)[0]
+
+
+def exported(state: State) -> tuple[Layer, ...]:
+    """Return the deterministic policy, the tanh of the mean, as layers of a policy file."""
+    return *networks.exported((*state.policy["trunk"], state.policy["mean"])), Layer("tanh")
+
+
+def _moved(row: SoftActorCritic, name: str, parameters, gradient, moments):
+    """Parameters after a step of Adam, and all moments."""
+    steps, moved = optimiser(row).update(gradient, moments[name])
+    return optax.apply_updates(parameters, steps), {**moments, name: moved}

@@ -1,0 +1,187 @@
+"""Policies that are networks: layers of numbers, evaluated by NumPy, whoever trained them.
+
+A policy file is an archive of arrays with one JSON text, which tells for what the policy was made:
+
+    robot, task, task_kwargs, blocks    as in `arc_suite.load`; the blocks in the order of the input
+    layers                              the kind of every layer, by which its arrays are named
+
+It holds no pickle and no code, so that files of others are data.
+"""
+
+import json
+import os
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from arc_suite import checks, files
+
+EXTENSION = ".npz"
+FILE = f"policy{EXTENSION}"  # in the folder of a run
+
+EPSILON = 1e-5  # of a layer norm, as in PyTorch
+
+# What may be wrong with a file.
+_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, MemoryError, zipfile.BadZipFile)
+_MAX_BYTES = 1 << 28
+
+
+class Layer(NamedTuple):
+    """A layer of a network.
+
+    Attributes:
+        kind: a name of `KINDS`.
+        arrays: what it computes with, float32.
+    """
+
+    kind: str
+    arrays: tuple[np.ndarray, ...] = ()
+
+
+def _linear(x, weight, bias):
+    # Not a product of matrices: BLAS rounds by the number of rows and threads, and a row is to do the same alone.
+    return np.einsum("ri,io->ro", x, weight) + bias
+
+
+def _layer_norm(x, scale, offset):
+    x = x - x.mean(axis=-1, keepdims=True)
+    return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(EPSILON)) * scale + offset
+
+
+class Kind(NamedTuple):
+    """What a layer computes: a function of rows (rows, n) float32 and of a number of arrays."""
+
+    function: Callable
+    arrays: int = 0
+
+
+# Arrays are weight (n, m) and bias (m,); scale and offset (n,); mean and factor (n,) and limit () of inputs, which
+# become (x - mean) * factor within +-limit.
+KINDS = {
+    "linear": Kind(_linear, 2),
+    "layer_norm": Kind(_layer_norm, 2),
+    "normalise": Kind(lambda x, mean, factor, limit: ((x - mean) * factor).clip(-limit, limit), 3),
+    "relu": Kind(lambda x: np.maximum(x, np.float32(0.0))),
+    "elu": Kind(lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, np.float32(0.0))))),
+    "tanh": Kind(np.tanh),
+    "clip": Kind(lambda x: x.clip(np.float32(-1.0), np.float32(1.0))),
+}
+
+
+def forward(layers: Sequence[Layer], x: np.ndarray) -> np.ndarray:
+    """Return what layers make of rows (rows, n), float32; every row's bits are those that it would have alone."""
+    for layer in layers:
+        x = KINDS[layer.kind].function(x, *layer.arrays)
+    return x
+
+
+class Network(NamedTuple):
+    """A deterministic policy, and what it was made for.
+
+    Attributes:
+        layers: from the flat observation (rows, size) to actions (rows, joints).
+        robot: name of a robot, or the JSON text of a body.
+        task: name of the task.
+        task_kwargs: its settings, as in `arc_suite.load`.
+        blocks: size of every block of the observation by name, in the order of the flat one.
+    """
+
+    layers: tuple[Layer, ...]
+    robot: str
+    task: str
+    task_kwargs: Mapping[str, Any]
+    blocks: Mapping[str, int]
+
+    @property
+    def size(self) -> int:
+        """Of a flat observation."""
+        return sum(self.blocks.values())
+
+    @property
+    def joints(self) -> int:
+        """Of an action."""
+        return self.actions(np.zeros((1, self.size), np.float32)).shape[1]
+
+    def actions(self, observations: np.ndarray) -> np.ndarray:
+        """Return actions (rows, joints) float32 for flat observations (rows, size)."""
+        return forward(self.layers, observations.astype(np.float32, copy=False))
+
+    # The protocol of acting.
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start episodes: nothing to do, as the policy remembers nothing."""
+
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
+        """Return the actions of a control step.
+
+        Raises:
+            ValueError: blocks that are not those it was made for; one line.
+        """
+        sizes = {name: block.shape[-1] for name, block in observation.items()}
+        if sizes != dict(self.blocks):
+            raise ValueError(f"policy of {self.task}: expected observation blocks {dict(self.blocks)}, got {sizes}")
+        flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
+        return self.actions(flat).astype(float)
+
+
+def save(path: str | os.PathLike, network: Network) -> None:
+    """Write a policy file, atomically.
+
+    Raises:
+        OSError: it cannot be written; one line.
+    """
+    known = network._asdict() | {"layers": [layer.kind for layer in network.layers]}
+    arrays = {
+        f"{index}.{place}": array
+        for index, layer in enumerate(network.layers)
+        for place, array in enumerate(layer.arrays)
+    }
+    with files.writing(path) as temporary:
+        np.savez(temporary, policy=np.array(json.dumps(known)), **arrays)
+
+
+def load(path: str | os.PathLike) -> Network:
+    """Read a policy file, or that of a run's folder.
+
+    Raises:
+        ValueError: a damaged file; one line.
+        OSError: it cannot be read; one line.
+    """
+    path = Path(path)
+    path = path / FILE if path.is_dir() else path
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise ValueError(f"expected at most {_MAX_BYTES} bytes")
+        with np.load(path, allow_pickle=False) as stored:
+            known = json.loads(str(stored["policy"]))
+            arrays = {name: stored[name] for name in stored.files}
+        network = Network(
+            tuple(_layer(kind, index, arrays) for index, kind in enumerate(known["layers"])),
+            **{name: _typed(name, known[name], kind) for name, kind in _KINDS_OF_FIELDS.items()},
+        )
+        if network.joints < 1:  # finds out whether the shapes fit
+            raise ValueError("expected actions")
+        return network
+    except FileNotFoundError:
+        raise OSError(f"cannot read {path}: no such file") from None
+    except _DAMAGES as error:
+        raise ValueError(f"{path}: no policy, or a damaged one: {' '.join(str(error).split())[:200]}") from None
+
+
+_KINDS_OF_FIELDS = {"robot": str, "task": str, "task_kwargs": dict, "blocks": dict}
+
+
+def _typed(name: str, value: Any, kind: type) -> Any:
+    if not isinstance(value, kind):
+        raise TypeError(f"expected {name} to be a {kind.__name__}")
+    return value
+
+
+def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray]) -> Layer:
+    found = tuple(arrays[f"{index}.{place}"] for place in range(KINDS[checks.name(kind, KINDS, "layer")].arrays))
+    if any(array.dtype != np.float32 for array in found):
+        raise ValueError(f"layer {index}: expected float32")
+    return Layer(kind, found)

@@ -1,0 +1,108 @@
+"""Policies as ONNX, which game engines and onnxruntime run: all layers of a network, its normaliser among them.
+
+The input `observations` is (rows, size) float32, flat: the task's blocks one after the other. The output
+`actions` is (rows, joints) in [-1, 1]. What else a game needs to know is in the metadata, JSON by name; see
+`metadata`.
+"""
+
+import json
+import os
+
+import numpy as np
+
+from arc_suite import files
+from arc_suite.envs.scene import prepared
+from arc_suite.policies.network import EPSILON, Layer, Network
+from arc_suite.registry import body_of
+
+OPSET = 17  # the first with LayerNormalization
+IR_VERSION = 8  # of the same time, so that older runtimes read it
+
+INPUT, OUTPUT = "observations", "actions"
+
+
+def metadata(network: Network) -> dict:
+    """Return what a file says of a policy, by name.
+
+    robot, task, task_kwargs    what it was made for
+    blocks                      size of every block of the observation by name, in order
+    control_timestep            s between two actions
+    substeps                    of the simulation between them
+    joints                      names, in the order of the actions
+    gears                       N m that an action of 1 is, by joint
+    gait_clock                  how the block of that name follows from time; only where there is one
+    """
+    task, model = prepared(body_of(network.robot), network.task, network.task_kwargs)
+    step = task.scene.control_timestep
+    known = {
+        "robot": network.robot,
+        "task": network.task,
+        "task_kwargs": dict(network.task_kwargs),
+        "blocks": dict(network.blocks),
+        "control_timestep": step,
+        "substeps": round(step / model.opt.timestep),
+        "joints": list(task.scene.body.joint_names),
+        "gears": model.actuator_gear[:, 0].tolist(),
+    }
+    if "gait_clock" in network.blocks and task.parameters is not None:
+        frequency = task.parameters.gait_frequency
+        known["gait_clock"] = {
+            "frequency": frequency,
+            "rule": "sine and cosine of 2 pi frequency t, t = control_timestep x control steps since the start",
+        }
+    return known
+
+
+def save(path: str | os.PathLike, network: Network) -> None:
+    """Write a policy as ONNX, atomically.
+
+    Raises:
+        ValueError: the package onnx is not installed; one line.
+        OSError: the file cannot be written; one line.
+    """
+    try:
+        import onnx
+        from onnx import TensorProto, helper, numpy_helper
+    except ImportError as error:
+        raise ValueError(f"ONNX needs the package onnx: pip install 'arc_suite[onnx]' ({error})") from None
+    operators = [operator for layer in network.layers for operator in _operators(layer)]
+    nodes, constants, present = [], [], INPUT
+    for index, (operator, arrays, attributes) in enumerate(operators):
+        names = [f"{index}.{place}" for place in range(len(arrays))]
+        constants += [numpy_helper.from_array(array, name) for array, name in zip(arrays, names, strict=True)]
+        result = OUTPUT if index == len(operators) - 1 else f"after_{index}"
+        nodes.append(helper.make_node(operator, [present, *names], [result], **attributes))
+        present = result
+    graph = helper.make_graph(
+        nodes,
+        "policy",
+        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["rows", network.size])],
+        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["rows", network.joints])],
+        constants,
+    )
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
+    model.producer_name = "arc_suite"
+    texts = {name: value if isinstance(value, str) else json.dumps(value) for name, value in metadata(network).items()}
+    helper.set_model_props(model, texts)
+    onnx.checker.check_model(model)
+    with files.writing(path) as temporary:
+        temporary.write_bytes(model.SerializeToString())
+
+
+def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
+    """The operators of a layer: names, constants beside the input, attributes."""
+    arrays = [np.ascontiguousarray(array, np.float32) for array in layer.arrays]
+    one = np.float32(1.0)
+    return {
+        "linear": lambda: [("Gemm", arrays, {})],
+        "layer_norm": lambda: [("LayerNormalization", arrays, {"axis": -1, "epsilon": EPSILON})],
+        "normalise": lambda: [
+            ("Sub", arrays[:1], {}),
+            ("Mul", arrays[1:2], {}),
+            ("Clip", [-arrays[2].reshape(()), arrays[2].reshape(())], {}),
+        ],
+        "relu": lambda: [("Relu", [], {})],
+        "elu": lambda: [("Elu", [], {"alpha": 1.0})],
+        "tanh": lambda: [("Tanh", [], {})],
+        "clip": lambda: [("Clip", [np.array(-one), np.array(one)], {})],
+    }[layer.kind]()

@@ -1,0 +1,140 @@
+"""The first updates of every row, beside an independent computation in float64 with gradients by hand."""
+
+import numpy as np
+import pytest
+from soft_actor_critic_by_hand import ByHand
+
+jax = pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+
+import jax.numpy as jnp
+
+from arc_suite.agents import algorithms, off_policy
+from arc_suite.agents import soft_actor_critic as sac
+from arc_suite.agents.algorithms import SoftActorCritic
+from arc_suite.agents.replay import Transitions
+
+ROWS = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.row, SoftActorCritic)]
+STEPS = 3
+
+
+def by_hand(layers, heads=1):
+    """A network of ours as one of the computation by hand, in float64."""
+    hidden = layers[:-heads]
+    plain = {"w": [each["weight"] for each in layers], "b": [each["bias"] for each in layers]}
+    plain |= {"g": [each["scale"] for each in hidden], "h": [each["offset"] for each in hidden]}
+    return {name: [np.asarray(array, float) for array in arrays] for name, arrays in plain.items()}
+
+
+def of_policy(policy):
+    return by_hand([*policy["trunk"], policy["mean"], policy["log_std"]], heads=2)
+
+
+@pytest.fixture
+def recorded(monkeypatch):
+    """What the learner's updates are given."""
+    calls, update = [], off_policy._update
+
+    def recording(row, state, sums, batch, noise, following):
+        copies = [None if part is None else np.array(part) for part in (*batch, *noise)]
+        calls.append(copies)
+        return update(row, state, sums, batch, noise, following)
+
+    monkeypatch.setattr(off_policy, "_update", recording)
+    return calls
+
+
+def differences(ours, reference):
+    """Absolute differences of all numbers of two networks."""
+    pairs = ((a, b) for k in reference for a, b in zip(ours[k], reference[k], strict=True))
+    return np.concatenate([np.abs(a - b).ravel() for a, b in pairs])
+
+
+def of_state(state, reference):
+    """Absolute differences of all networks of a learner from those by hand."""
+    pairs = [(of_policy(state.policy), reference.policy)]
+    pairs += [(by_hand(ours), theirs) for ours, theirs in zip(state.critics, reference.critics, strict=True)]
+    pairs += [(by_hand(ours), theirs) for ours, theirs in zip(state.targets, reference.targets, strict=True)]
+    return np.concatenate([differences(*pair) for pair in pairs])
+
+
+def cast(parts, kind):
+    """Numbers in another precision; booleans, and what is None, stay."""
+    return [part if part is None or part.dtype == bool else part.astype(kind) for part in parts]
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_first_three_updates(name, learner, recorded):
+    """Of a phase too, where the row has any; it follows the update of the third step.
+
+    In double precision the text of an update gives the same numbers. In single precision, in which it learns,
+    Adam's first steps are as long where a gradient is rounding error as elsewhere, so that some numbers in a
+    hundred thousand move otherwise.
+    """
+    definition = algorithms.algorithm(name)
+    row = definition.row
+    phases = {"phase_every": STEPS, "phase_updates": STEPS} if row.phase_updates else {}
+    agent = learner(definition.with_row(phases))
+    first = jax.tree.map(np.asarray, agent._state)
+    reference = ByHand(of_policy(first.policy), [by_hand(critic) for critic in first.critics], row.dropout)
+    for _ in range(1 + bool(phases)):
+        agent.advance(STEPS)
+    assert agent.step == STEPS
+    assert len(recorded) == STEPS * (1 + bool(phases))
+    assert len(recorded[0][2]) == (512 if row.prior == "beside" else 256)
+
+    with jax.enable_x64(True):
+        state = jax.tree.map(lambda a: jnp.asarray(a, float if a.dtype.kind == "f" else None), first)
+        for index, parts in enumerate(recorded):
+            *batch, next_noise, noise, kept = cast(parts, float)
+            assert (noise is None) == (index >= STEPS)
+            assert (kept is None) == (row.dropout == 0.0)
+            state, ours = sac.update(row, state, Transitions(*batch), sac.Noise(next_noise, noise, kept))
+            reference.update(*batch, next_noise, noise, kept)
+            assert float(ours["critic_loss"]) == pytest.approx(reference.critic_loss, rel=1e-9)
+            if noise is not None:
+                assert float(ours["policy_loss"]) == pytest.approx(reference.policy_loss, rel=1e-9)
+        assert of_state(state, reference).max() < 1e-6
+        assert float(state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-12)
+    learnt = of_state(agent._state, reference)
+    assert np.quantile(learnt, 0.9) < 1e-5
+    assert learnt.max() < 2.0 * len(recorded) * row.learning_rate
+    assert float(agent._state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-6)
+
+
+def test_losses_in_single_precision(learner, recorded):
+    """Of one update, from the same numbers."""
+    row = algorithms.ALGORITHMS["speq"].row
+    agent = learner(algorithms.ALGORITHMS["speq"])
+    first = jax.tree.map(np.asarray, agent._state)
+    agent.advance(1)
+    reference = ByHand(of_policy(first.policy), [by_hand(critic) for critic in first.critics], row.dropout)
+    reference.update(*cast(recorded[0], float))
+    figures = {name: float(value) for name, value in agent._sums.items()}
+    assert figures["critic_loss"] == pytest.approx(reference.critic_loss, rel=1e-5)
+    assert figures["policy_loss"] == pytest.approx(reference.policy_loss, rel=1e-5)
+
+
+def test_what_an_update_leaves_out_shows(learner, recorded):
+    """Each choice of the published code that others make otherwise moves the numbers by more than the tolerance."""
+    row = algorithms.ALGORITHMS["speq"].row
+    agent = learner(algorithms.ALGORITHMS["speq"])
+    first = jax.tree.map(np.asarray, agent._state)
+    agent.advance(2)
+    with jax.enable_x64(True):
+        state = jax.tree.map(lambda a: jnp.asarray(a, float if a.dtype.kind == "f" else None), first)
+        *batch, next_noise, noise, kept = cast(recorded[1], float)
+        batch, noise = Transitions(*batch), sac.Noise(next_noise, noise, kept)
+
+        def after(batch=batch, noise=noise, state=state, row=row):
+            flat = jax.tree.leaves(sac.update(row, state, batch, noise)[0][:4])
+            return np.concatenate([np.ravel(leaf) for leaf in flat])
+
+        moved_critics = sac.update(row, state, batch, noise._replace(action=None))[0].critics
+        usual = after()
+        for other in (
+            after(batch=batch._replace(goes_on=0.0 * batch.goes_on)),
+            after(noise=noise._replace(kept=np.ones_like(kept))),
+            after(state=state._replace(log_alpha=state.log_alpha + 0.01)),
+            after(state=state._replace(critics=moved_critics)),
+        ):
+            assert np.abs(other - usual).max() > 1e-4

@@ -1,0 +1,96 @@
+"""Transitions in files: what is sampled is what was added, also after the ring has come round."""
+
+import numpy as np
+import pytest
+
+from arc_suite.agents.replay import Fenced, Replay
+
+SIZE, JOINTS = 3, 2
+
+
+def fill(replay, episodes, start=0):
+    """Add episodes of lengths, the observation of whose step t is start + t everywhere; return what was added."""
+    added = []
+    for length, terminated in episodes:
+        for step in range(length):
+            last = step == length - 1
+            here, following = np.full(SIZE, start), np.full(SIZE, start + 1)
+            replay.add(here, np.full(JOINTS, -start), 10.0 * start, terminated and last, following, last)
+            added.append((start, 0.0 if terminated and last else 1.0))
+            start += 1
+        start += 1  # the observation after the last action
+    return added
+
+
+def check(source, added):
+    batch = source.at(np.arange(len(source)))
+    for index, (step, goes_on) in enumerate(added[-len(source) :]):
+        assert (batch.observations[index] == step).all()
+        assert (batch.next_observations[index] == step + 1).all()
+        assert (batch.actions[index] == -step).all()
+        assert (batch.rewards[index], batch.goes_on[index]) == (10.0 * step, goes_on)
+
+
+EPISODES = [(5, True), (1, False), (7, False), (1, True), (4, True)]
+
+
+@pytest.mark.parametrize("capacity", [1, 2, 6, 17, 18, 40])
+def test_what_was_added(tmp_path, capacity):
+    replay = Replay(tmp_path, capacity, SIZE, JOINTS, slack=3)
+    added = fill(replay, EPISODES)
+    assert len(replay) == min(capacity, len(added))
+    check(replay, added)
+
+
+def test_many_ends(tmp_path):
+    """More final observations than their file holds at first."""
+    replay = Replay(tmp_path, 1000, SIZE, JOINTS)
+    check(replay, fill(replay, [(2, True)] * 700))
+
+
+def test_goes_on_from_where_it_was(tmp_path):
+    """What was added after a checkpoint is overwritten by the same, and sampled from before it is what it was."""
+    replay = Replay(tmp_path, 10, SIZE, JOINTS, slack=6)
+    added = fill(replay, [(9, True)] * 3)
+    total, ends = replay.total, replay.ends
+    fill(replay, [(6, True)], start=1000)
+    again = Replay(tmp_path, 10, SIZE, JOINTS, slack=6)
+    again.restore(total, ends)
+    check(again, added)
+
+
+def test_files_are_read_alone(tmp_path):
+    replay = Replay(tmp_path, 20, SIZE, JOINTS)
+    added = fill(replay, EPISODES)
+    prior = Replay(tmp_path, len(added), SIZE, JOINTS, mode="r")
+    prior.restore(replay.total, replay.ends)
+    check(prior, added)
+    with pytest.raises(ValueError, match="read-only"):
+        fill(prior, EPISODES)
+
+
+def test_a_fence(tmp_path):
+    """Two sources as one: the first keeps all it has, however often the second comes round."""
+    prior, online = (Replay(tmp_path / name, 4, SIZE, JOINTS) for name in ("prior", "online"))
+    first, second = fill(prior, [(4, True)]), fill(online, [(30, False)], start=100)
+    both = Fenced(prior, online)
+    assert len(both) == 8
+    indices = np.array([7, 0, 5, 3, 0, 4, 6])
+    steps = [step for step, _ in (*first[-4:], *second[-4:])]
+    batch = both.at(indices)
+    assert batch.observations[:, 0].tolist() == [steps[index] for index in indices]
+    assert batch.next_observations[:, 0].tolist() == [steps[index] + 1 for index in indices]
+
+
+def test_a_million_transitions_of_queen_take_less_than_a_gigabyte(tmp_path):
+    Replay(tmp_path, 1000, 199, 18)
+    assert sum(path.stat().st_size for path in tmp_path.iterdir()) < 1000 * 930 + 256 * 199 * 4
+
+
+def test_a_full_disk_is_one_line(tmp_path, monkeypatch):
+    def full(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.posix_fallocate", full)
+    with pytest.raises(OSError, match=rf"^cannot write {tmp_path}/observations: no space left on device$"):
+        Replay(tmp_path, 10, SIZE, JOINTS)

@@ -1,0 +1,125 @@
+"""Folders of runs: whole whatever happens, and refused in one line where they do not fit."""
+
+import os
+
+import numpy as np
+import pytest
+
+from arc_suite.agents import run_folder
+from arc_suite.agents.run_folder import opened
+
+CONFIG = {"robot": "tick", "row": {"hidden": 4, "batch": 8}, "seed": 0, "versions": {"numpy": "2"}}
+ARRAYS = {"state/weight": np.arange(6.0, dtype=np.float32).reshape(2, 3), "count": np.array([3, 4])}
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A folder with a checkpoint after two lines of a table, and a third line after that."""
+    with opened(tmp_path / "run", CONFIG) as folder:
+        folder.append("training", {"step": 1, "loss": 0.5})
+        folder.append("training", {"step": 2, "loss": np.float32(0.25)})
+        folder.save(ARRAYS, {"evaluated": 2})
+        folder.append("training", {"step": 3, "loss": 0.125})
+    return tmp_path / "run"
+
+
+def one_line(path, match, config=CONFIG, error=ValueError):
+    before = {each.name: each.read_bytes() for each in path.iterdir()}
+    with pytest.raises(error, match=match) as caught, opened(path, config):
+        pass
+    assert "\n" not in str(caught.value)
+    assert {each.name: each.read_bytes() for each in path.iterdir()} == before, "nothing is lost"
+
+
+def test_goes_on_from_the_checkpoint(path):
+    with opened(path, CONFIG) as folder:
+        assert folder.progress["evaluated"] == 2
+        assert all(np.array_equal(folder.arrays[name], array) for name, array in ARRAYS.items())
+        assert (path / "training.csv").read_text() == "step,loss\n1,0.5\n2,0.25\n"
+        folder.append("training", {"step": 3, "loss": 0.5})
+    assert (path / "training.csv").read_text() == "step,loss\n1,0.5\n2,0.25\n3,0.5\n"
+
+
+def test_without_a_checkpoint_it_starts_over(path):
+    (path / "checkpoint.npz").unlink()
+    with opened(path, CONFIG) as folder:
+        assert folder.arrays is None
+        assert (path / "training.csv").read_text() == ""
+
+
+def test_tables_are_read_also_while_a_line_is_written(path):
+    with (path / "training.csv").open("a") as file:
+        file.write("4,0.06")
+    assert {name: column.tolist() for name, column in run_folder.table(path, "training").items()} == {
+        "step": [1.0, 2.0, 3.0],
+        "loss": [0.5, 0.25, 0.125],
+    }
+
+
+@pytest.mark.parametrize(
+    ("changed", "named"),
+    [
+        ({"seed": 1}, r"whose seed is 0, and not 1; write to another folder$"),
+        ({"row": {"hidden": 4, "batch": 9}}, r"whose row\.batch is 8, and not 9;"),
+        ({"versions": {"numpy": "3"}}, r"whose versions\.numpy is '2', and not '3';"),
+        ({"prior": "a"}, r"whose prior is None, and not 'a';"),
+    ],
+)
+def test_another_run(path, changed, named):
+    one_line(path, named, CONFIG | changed)
+
+
+def test_a_folder_of_something_else(tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    one_line(tmp_path, r"no folder of a run, and not empty: it holds thesis\.tex$")
+
+
+@pytest.mark.parametrize("kept", [0, 10, 200, -30])
+def test_a_damaged_checkpoint(path, kept):
+    data = (path / "checkpoint.npz").read_bytes()
+    (path / "checkpoint.npz").write_bytes(data[:kept])
+    one_line(path, r"checkpoint\.npz is damaged: .*; delete it to start the run over$")
+
+
+def test_a_flipped_bit(path):
+    data = bytearray((path / "checkpoint.npz").read_bytes())
+    data[data.index(np.float32(5.0).tobytes())] ^= 1
+    (path / "checkpoint.npz").write_bytes(data)
+    one_line(path, r"checkpoint\.npz is damaged: ")
+
+
+def test_a_checkpoint_with_a_pickle(path):
+    np.savez(path / "checkpoint.npz", progress=np.array({"evaluated": 2}, object))
+    one_line(path, r"checkpoint\.npz is damaged: Object arrays cannot be loaded")
+
+
+def test_a_table_that_has_lost_lines(path):
+    (path / "training.csv").write_text("step,loss\n")
+    one_line(path, r"training\.csv: shorter than at the checkpoint; delete checkpoint\.npz to start over$")
+
+
+def test_a_run_has_one_process(path):
+    with opened(path, CONFIG):
+        one_line(path, r"run: another process goes on with this run$")
+
+
+def test_a_full_disk_keeps_the_checkpoint(path, monkeypatch):
+    def full(*arguments, **keywords):
+        raise OSError(28, "No space left on device")
+
+    before = (path / "checkpoint.npz").read_bytes()
+    with opened(path, CONFIG) as folder:
+        monkeypatch.setattr(np, "savez", full)
+        with pytest.raises(OSError, match="No space left"):
+            folder.save({"count": np.zeros(3)}, {})
+    assert (path / "checkpoint.npz").read_bytes() == before
+    assert sorted(each.name for each in path.iterdir()) == sorted(
+        ["checkpoint.npz", "config.json", *(f"{table}.csv" for table in run_folder.TABLES)]
+    )
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_cannot_be_written(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OSError, match=r"cannot make folder"), opened(tmp_path / "run", CONFIG):
+        pass

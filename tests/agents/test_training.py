@@ -1,0 +1,217 @@
+"""Training: a tiny run of every row, broken off anywhere and resumed to the bit, and what goes wrong in one line."""
+
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+
+from conftest import SHORT, small
+
+import arc_suite
+from arc_suite import evaluation, policies
+from arc_suite.agents import algorithms, off_policy, run_folder
+from arc_suite.agents.learner import Diverged
+from arc_suite.agents.run_folder import RunFolder
+from arc_suite.agents.training import Run, train
+from arc_suite.robots import ROBOTS
+
+ROWS = [name for name, each in algorithms.ALGORITHMS.items() if each.learner == "arc_suite.agents.off_policy"]
+STEPS, EVERY = 250, 100
+
+
+def silent(*arguments, **keywords):
+    """A progress bar that shows nothing."""
+    from tqdm import tqdm
+
+    return tqdm(*arguments, **keywords, disable=True)
+
+
+@pytest.fixture
+def tiny(prior):
+    """A function that makes a tiny run of an algorithm."""
+
+    def make(name, **changes):
+        definition = small(name)
+        fields = {"definition": definition, "steps": STEPS, "evaluate_every": EVERY, "task_kwargs": SHORT}
+        fields["prior"] = None if definition.row.prior == "none" else prior
+        return Run(ROBOTS["tick"], name, **(fields | changes))
+
+    return make
+
+
+def contents(folder):
+    """Everything of a run that must not depend on how often it was broken off."""
+    files = {path.name: path.read_bytes() for path in (*folder.glob("*.csv"), folder / "config.json")}
+    del files["times.csv"]
+    arrays = {}
+    for name in ("checkpoint.npz", "policy.npz"):
+        with np.load(folder / name) as stored:
+            arrays |= {f"{name}/{key}": stored[key].tobytes() for key in stored.files if key != "progress"}
+    for path in (folder / "replay").iterdir():
+        arrays[path.name] = path.read_bytes()
+    return files | arrays
+
+
+class BrokenOff(Exception):
+    """Stands for a kill."""
+
+
+BREAKS = 4
+LEFT = [np.inf]  # calls until the next
+
+
+def fragile(method):
+    """A method of `RunFolder` in which a run is broken off, before or after it has done its work."""
+
+    def broken(self, *arguments):
+        LEFT[0] -= 1
+        if LEFT[0] > 0 or LEFT[0] % 2:
+            method(self, *arguments)
+        if LEFT[0] <= 0:
+            raise BrokenOff
+
+    return broken
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_tiny_run(name, tiny, tmp_path, monkeypatch):
+    """It writes what it should, and goes on to the same bits wherever it is broken off."""
+    run = tiny(name)
+    assert train(run, tmp_path / "whole", progress=silent)
+    whole = contents(tmp_path / "whole")
+    table = run_folder.table(tmp_path / "whole", "evaluations")
+    assert table["step"].tolist() == sorted([*range(EVERY, STEPS, EVERY), STEPS] * 10)
+    assert table["seed"].tolist() == [*range(10)] * 3
+    if run.definition.row.phase_updates:
+        assert run_folder.table(tmp_path / "whole", "training")["phase_updates"].sum() >= 80
+
+    random = np.random.default_rng(sum(name.encode()))
+    for method in ("append", "save"):
+        monkeypatch.setattr(RunFolder, method, fragile(getattr(RunFolder, method)))
+    for _ in range(BREAKS):
+        LEFT[:] = [random.integers(25)]
+        with pytest.raises(BrokenOff):
+            train(run, tmp_path / "broken", progress=silent)
+    LEFT[:] = [np.inf]
+    assert train(run, tmp_path / "broken", progress=silent)
+    resumed = contents(tmp_path / "broken")
+    assert resumed.keys() == whole.keys()
+    assert [key for key in whole if whole[key] != resumed[key]] == []
+
+
+PROGRAM = """
+import sys
+sys.path[:0] = sys.argv[2:]
+from conftest import SHORT, small
+from test_training import EVERY, STEPS, silent
+from arc_suite.agents.training import Run, train
+from arc_suite.robots import ROBOTS
+run = Run(ROBOTS["tick"], "sope_eo", small("sope_eo"), steps=3 * STEPS, evaluate_every=EVERY, task_kwargs=SHORT)
+train(run, sys.argv[1], progress=silent)
+"""
+
+
+def in_a_process(folder, cache):
+    here = pathlib.Path(__file__).parent
+    command = [sys.executable, "-c", PROGRAM, str(folder), str(here), str(here.parent / "fixtures")]
+    cached = {"JAX_COMPILATION_CACHE_DIR": str(cache), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
+    return subprocess.Popen(command, env=os.environ | cached)
+
+
+@pytest.mark.slow
+def test_killed(tmp_path, kills=4, seed=0):
+    """By SIGKILL, at random moments of training."""
+    assert in_a_process(tmp_path / "whole", tmp_path / "cache").wait() == 0
+    random = np.random.default_rng(seed)
+    killed = 0
+    while killed < kills:
+        folder = tmp_path / f"killed-{seed}"
+        process = in_a_process(folder, tmp_path / "cache")
+        before = (folder / "checkpoint.npz").stat().st_mtime_ns if (folder / "checkpoint.npz").exists() else 0
+        while process.poll() is None:
+            saved = (folder / "checkpoint.npz").stat().st_mtime_ns if (folder / "checkpoint.npz").exists() else 0
+            if saved > before:
+                break
+            time.sleep(0.005)
+        time.sleep(random.uniform(0.0, 0.3))
+        process.send_signal(signal.SIGKILL)
+        if process.wait() == 0:
+            break
+        killed += 1
+    assert killed
+    assert in_a_process(folder, tmp_path / "cache").wait() == 0
+    whole, resumed = contents(tmp_path / "whole"), contents(folder)
+    assert [key for key in whole if whole[key] != resumed.get(key)] == []
+
+
+def test_the_policy_of_a_run_earns_what_its_table_says(tiny, tmp_path):
+    """By the protocol, on single environments, to the bit."""
+    run = tiny("sac")
+    train(run, tmp_path / "run", progress=silent)
+    table = run_folder.table(tmp_path / "run", "evaluations")
+    environment = arc_suite.load("tick", "walk", run.task_kwargs)
+    policy = policies.policy(str(tmp_path / "run"), "tick")
+    for index, episode in enumerate(evaluation.episodes(environment, policy, range(3))):
+        row = len(table["step"]) - 10 + index
+        assert (table["return"][row], table["length"][row]) == (episode.total, episode.length)
+
+
+def test_config_tells_all_that_a_run_depends_on(tiny, tmp_path):
+    train(tiny("sac"), tmp_path / "run", minutes=0.0, progress=silent)
+    config = json.loads((tmp_path / "run" / "config.json").read_text())
+    assert config["row"]["batch"] == 8 and config["task_kwargs"] == {"time_limit": 2.0}
+    assert {"arc_suite", "mujoco", "numpy", "jax", "jaxlib", "optax"} <= config["versions"].keys()
+    assert len(config["model_sha256"]) == len(config["body_sha256"]) == 64
+
+
+def test_stops_after_minutes_and_goes_on(tiny, tmp_path):
+    run = tiny("sac", steps=100)
+    assert not train(run, tmp_path / "run", minutes=0.0, progress=silent)
+    assert train(run, tmp_path / "run", progress=silent)
+    assert train(run, tmp_path / "run", minutes=0.0, progress=silent), "nothing is left to do"
+
+
+def test_another_seed_is_another_run(tiny, tmp_path):
+    train(tiny("sac", steps=50), tmp_path / "run", progress=silent)
+    with pytest.raises(ValueError, match=r"run: of another run, whose seed is 0, and not 1; write to another folder$"):
+        train(tiny("sac", steps=50, seed=1), tmp_path / "run", progress=silent)
+    train(tiny("sac", steps=50, seed=1), tmp_path / "other", progress=silent)
+    assert contents(tmp_path / "run") != contents(tmp_path / "other")
+
+
+def test_a_learner_that_diverges_stops_with_one_line_and_its_last_checkpoint(tiny, tmp_path, monkeypatch):
+    run = tiny("sac", steps=200)
+    update, calls = off_policy._update, []
+
+    def poisoned(row, state, *rest):
+        calls.append(1)
+        state, sums = update(row, state, *rest)
+        if len(calls) == 150:
+            state = state._replace(log_alpha=state.log_alpha * np.nan)
+        return state, sums
+
+    monkeypatch.setattr(off_policy, "_update", poisoned)
+    with pytest.raises(Diverged, match=r"^the learner diverged: .* at step 1[5-9]\d") as caught:
+        train(run, tmp_path / "run", progress=silent)
+    assert "\n" not in str(caught.value)
+    with np.load(tmp_path / "run" / "checkpoint.npz") as stored:
+        assert stored["count"][0] == 100
+        assert all(np.isfinite(stored[name]).all() for name in stored.files if name.startswith("state"))
+    monkeypatch.setattr(off_policy, "_update", update)
+    assert train(run, tmp_path / "run", progress=silent), "the checkpoint is good"
+
+
+def test_a_checkpoint_of_something_else(tiny, tmp_path):
+    run = tiny("sac", steps=100)
+    assert not train(run, tmp_path / "run", minutes=0.0, progress=silent)
+    np.savez(tmp_path / "run" / "checkpoint.npz", progress=np.array("{}"), count=np.zeros(2))
+    with pytest.raises(ValueError, match=r"checkpoint\.npz is damaged: .*; delete it to start the run over$"):
+        train(run, tmp_path / "run", progress=silent)

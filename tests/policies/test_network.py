@@ -1,0 +1,155 @@
+"""Policies in files: what a network computes, alone and among others, and files that are none."""
+
+import json
+
+import numpy as np
+import pytest
+
+import arc_suite
+from arc_suite import evaluation, policies
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import network
+from arc_suite.policies.network import Layer, Network
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec_files import body_to_json
+
+random = np.random.default_rng(0)
+
+
+def numbers(*shape):
+    return random.normal(size=shape).astype(np.float32)
+
+
+def made(robot="tick", task="walk", hidden=32):
+    """A policy of all kinds of layers, for a robot."""
+    environment = arc_suite.load(ROBOTS.get(robot) or robot, task)
+    blocks = dict(environment.task.definition.blocks)
+    size, joints = sum(blocks.values()), environment.action_spec().shape[0]
+    layers = (
+        Layer("normalise", (numbers(size), np.abs(numbers(size)), np.float32(5.0))),
+        Layer("linear", (0.2 * numbers(size, hidden), numbers(hidden))),
+        Layer("layer_norm", (numbers(hidden), numbers(hidden))),
+        Layer("relu"),
+        Layer("linear", (0.2 * numbers(hidden, hidden), numbers(hidden))),
+        Layer("elu"),
+        Layer("linear", (0.1 * numbers(hidden, joints), numbers(joints))),
+        Layer("tanh"),
+        Layer("clip"),
+    )
+    name = robot if isinstance(robot, str) else body_to_json(robot)
+    return Network(layers, name, task, {}, blocks)
+
+
+@pytest.fixture
+def saved(tmp_path):
+    network.save(tmp_path / "policy.npz", made())
+    return tmp_path
+
+
+def test_what_layers_compute():
+    x = numbers(7, 5)
+    weight, bias, scale, offset = numbers(5, 4), numbers(4), numbers(4), numbers(4)
+    mean, factor, limit = numbers(5), numbers(5), np.float32(0.7)
+    x64 = x.astype(float)
+    linear = x64 @ weight + bias
+    centred = linear - linear.mean(axis=1, keepdims=True)
+    normal = centred / np.sqrt(linear.var(axis=1, keepdims=True) + 1e-5) * scale + offset
+    cases = [
+        ([Layer("linear", (weight, bias))], linear),
+        ([Layer("linear", (weight, bias)), Layer("layer_norm", (scale, offset))], normal),
+        ([Layer("normalise", (mean, factor, limit))], ((x64 - mean) * factor).clip(-limit, limit)),
+        ([Layer("relu")], np.where(x > 0.0, x64, 0.0)),
+        ([Layer("elu")], np.where(x > 0.0, x64, np.exp(x64) - 1.0)),
+        ([Layer("tanh")], np.tanh(x64)),
+        ([Layer("clip")], x64.clip(-1.0, 1.0)),
+    ]
+    for layers, expected in cases:
+        found = network.forward(layers, x)
+        assert found.dtype == np.float32
+        np.testing.assert_allclose(found, expected, atol=2e-6)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 10, 64, 65])
+def test_a_row_does_the_same_alone(rows):
+    policy = made(hidden=256)
+    observations = numbers(rows, policy.size)
+    alone = np.concatenate([policy.actions(observations[row : row + 1]) for row in range(rows)])
+    assert np.array_equal(policy.actions(observations), alone)
+
+
+def test_comes_back_from_a_file_to_the_bit(saved):
+    policy, again = made(), network.load(saved / "policy.npz")
+    assert again[1:] == policy[1:]
+    assert [layer.kind for layer in again.layers] == [layer.kind for layer in policy.layers]
+    assert again.joints == 18 and again.size == 199
+
+
+@pytest.mark.parametrize("name", ["", "policy.npz"])
+def test_is_a_policy_of_every_program(saved, name, monkeypatch):
+    """By the folder of a run, or the file; in rows and alone it does the same."""
+    policy = policies.policy(str(saved / name), "tick")
+    rows = VectorEnv("tick", "walk", 3, 1, "Disabled")
+    assert evaluation.episodes_in_rows(rows, policy, range(3)) == evaluation.episodes(
+        arc_suite.load("tick", "walk"), policy, range(3)
+    )
+    monkeypatch.chdir(saved.parent)
+    assert policies.policy(saved.name, "tick").robot == "tick"
+
+
+def test_of_another_body(saved):
+    with pytest.raises(ValueError, match=r"^policy .*: made for tick, and not for queen$"):
+        policies.policy(str(saved), "queen")
+    body = generator.random_body(3)
+    network.save(saved / "policy.npz", made(body))
+    assert policies.policy(str(saved), body).joints == len(body.joint_names)
+    with pytest.raises(ValueError, match=r"^policy .*: made for another body, and not for tick$"):
+        policies.policy(str(saved), "tick")
+
+
+def test_of_another_task(saved):
+    policy = policies.policy(str(saved), "tick")
+    with pytest.raises(ValueError, match=r"^policy of walk: expected observation blocks \{.*\}, got \{.*command"):
+        evaluation.run(arc_suite.load("tick", "steer"), policy, 0)
+
+
+def test_no_file_is_one_line(tmp_path):
+    with pytest.raises(OSError, match=r"^cannot read .*policy\.npz: no such file$"):
+        policies.policy(str(tmp_path), "tick")
+    with pytest.raises(ValueError, match=r"^unknown policy 'run'"):
+        policies.policy("run", "tick")
+
+
+@pytest.mark.parametrize("kept", [0, 30, 1000, -20])
+def test_damaged_files(saved, kept):
+    file = saved / "policy.npz"
+    file.write_bytes(file.read_bytes()[:kept])
+    with pytest.raises(ValueError, match=r"policy\.npz: no policy, or a damaged one: ") as caught:
+        policies.policy(str(file), "tick")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        ({"layers": ["linear", "sigmoid"]}, "unknown layer 'sigmoid'"),
+        ({"layers": ["relu"]}, r"policy\.npz: moves 199 joints, and tick has 18$"),
+        ({"layers": [*["relu"] * 9, "linear"]}, "a damaged one: '9.0'"),
+        ({"blocks": {"posture": 3}}, "broadcast"),
+        ({"blocks": 3}, "expected blocks to be a dict"),
+        ({"robot": None}, "expected robot to be a str"),
+    ],
+)
+def test_files_made_in_bad_faith(saved, change, line):
+    file = saved / "policy.npz"
+    with np.load(file) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    known = json.loads(str(arrays.pop("policy"))) | change
+    np.savez(file, policy=np.array(json.dumps(known)), **arrays)
+    with pytest.raises(ValueError, match=line):
+        policies.policy(str(file), "tick")
+
+
+def test_a_pickle_is_refused(saved):
+    np.savez(saved / "policy.npz", policy=np.array({"layers": []}, object))
+    with pytest.raises(ValueError, match="Object arrays cannot be loaded"):
+        policies.policy(str(saved), "tick")

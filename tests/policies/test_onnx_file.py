@@ -1,0 +1,71 @@
+"""Policies as ONNX, run by onnxruntime: the same actions, all along an episode."""
+
+import json
+
+import numpy as np
+import pytest
+from test_network import made
+
+import arc_suite
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.policies import alone, onnx_file
+
+pytest.importorskip("onnx", reason="of the extra onnx: make check-agents")
+runtime = pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
+
+
+def session(path):
+    options = runtime.SessionOptions()
+    options.intra_op_num_threads = 1
+    return runtime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+
+
+@pytest.mark.parametrize(("robot", "task"), [("queen", "walk"), ("tick", "steer")])
+def test_equal_over_an_episode(robot, task, tmp_path):
+    policy = made(robot, task, hidden=256)
+    onnx_file.save(tmp_path / "policy.onnx", policy)
+    assert (tmp_path / "policy.onnx").stat().st_size <= 600_000
+    run, act, greatest, steps = session(tmp_path / "policy.onnx"), alone(policy), 0.0, 0
+    environment = arc_suite.load(robot, task)
+    timestep = environment.reset(0)
+    while not timestep.last():
+        flat = np.concatenate([timestep.observation[name] for name in policy.blocks]).astype(np.float32)
+        (actions,) = run.run(["actions"], {"observations": flat[None]})
+        expected = act(timestep)
+        greatest, steps = max(greatest, np.abs(actions[0] - expected).max()), steps + 1
+        timestep = environment.step(expected)
+    assert steps > 10
+    assert greatest < 1e-5
+
+
+def test_any_number_of_rows(tmp_path):
+    policy = made()
+    onnx_file.save(tmp_path / "policy.onnx", policy)
+    run = session(tmp_path / "policy.onnx")
+    for rows in (1, 5, 64):
+        observations = np.random.default_rng(rows).normal(size=(rows, policy.size)).astype(np.float32)
+        (actions,) = run.run(None, {"observations": observations})
+        np.testing.assert_allclose(actions, policy.actions(observations), atol=1e-5)
+
+
+def test_metadata_tell_what_a_game_needs(tmp_path):
+    policy = made("leaper")
+    onnx_file.save(tmp_path / "policy.onnx", policy)
+    texts = session(tmp_path / "policy.onnx").get_modelmeta().custom_metadata_map
+    assert (texts["robot"], texts["task"]) == ("leaper", "walk")
+    environment = arc_suite.load("leaper", "walk")
+    timestep = environment.reset(0)
+    blocks = json.loads(texts["blocks"])
+    assert list(blocks.items()) == [(name, block.size) for name, block in timestep.observation.items()]
+    step = float(texts["control_timestep"])
+    assert step == environment.control_timestep()
+    assert int(texts["substeps"]) == SUBSTEPS
+    body = environment.task.body
+    assert json.loads(texts["joints"]) == list(body.joint_names)
+    assert json.loads(texts["gears"]) == environment.physics.model.actuator_gear[:, 0].tolist()
+    # The clock's rule is that of the observation.
+    frequency = json.loads(texts["gait_clock"])["frequency"]
+    for count in range(1, 60):
+        timestep = environment.step(np.zeros(12))
+        phase = 2.0 * np.pi * frequency * count * step
+        assert np.allclose(timestep.observation["gait_clock"], [np.sin(phase), np.cos(phase)], atol=1e-9)
