@@ -2,13 +2,14 @@
 
 import copy
 import types
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import mujoco.batch
 import numpy as np
 
 from arc_suite.simulation import forks, timers
+from arc_suite.simulation.model import change
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
@@ -41,8 +42,8 @@ class Batch:
         self._forks = forks.count
         self._simulations = mujoco.batch.Batch(model, rows, threads)
         forks.keep(self._simulations)
-        self._silent = copy.copy(model)
-        self._silent.opt.disableflags |= _SENSOR
+        self._own = None  # a model of its own for each row, once one has been changed
+        self._silent = _silent(model)
         # What is bound is filled by every call, so it must be bound before the first.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
@@ -75,11 +76,18 @@ class Batch:
             try:
                 simulations.step(rows, nstep - 1)
             finally:
-                simulations.set_models(None)
+                simulations.set_models(self._own)
             simulations.step(rows)
         return simulations.warning[..., 1].any(axis=-1)
 
-    def reset(self, rows: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, mocap_pos: np.ndarray | None = None) -> None:
+    def reset(
+        self,
+        rows: np.ndarray,
+        qpos: np.ndarray,
+        qvel: np.ndarray,
+        mocap_pos: np.ndarray | None = None,
+        models: Sequence[Mapping[str, np.ndarray]] | None = None,
+    ) -> None:
         """Restart some rows, as dm_control's `reset_context` does.
 
         Args:
@@ -87,12 +95,18 @@ class Batch:
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
             mocap_pos: (restarted, nmocap, 3) positions of the arena's movable bodies; None for the model's.
+            models: (restarted,) fields of the model by name that differ in a row until its next reset,
+                the same names at every reset; None for none.
 
         Raises:
             ForkError: made before a fork.
         """
         self._check_process()
+        self._simulations.set_models(None)
         self._simulations.reset(rows)  # runs mj_forward, from whose result the solver starts next
+        if models is not None:
+            self._change(rows, models)
+        self._simulations.set_models(self._own)
         self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
         if mocap_pos is not None:
             self._simulations.bind("mocap_pos")[rows] = mocap_pos
@@ -112,14 +126,26 @@ class Batch:
         self.data.qpos[rows] = qpos
         self._simulations.forward(rows)
 
+    def _change(self, rows: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
+        if self._own is None:
+            model = self._simulations.model
+            self._own, self._silent = ([copy.copy(each) for _ in rows] for each in (model, self._silent))
+        scratch = mujoco.MjData(self._simulations.model)
+        for row, fields in zip(np.flatnonzero(rows), models, strict=True):
+            change(self._own[row], fields, scratch)
+            change(self._silent[row], fields, scratch)
+
     def __getstate__(self):
         simulations = self._simulations
         fields = {name: array.copy() for name, array in vars(self.data).items()}
-        return simulations.model, simulations.nsim, simulations.nthread, fields, simulations.state.copy()
+        return simulations.model, simulations.nsim, simulations.nthread, fields, simulations.state.copy(), self._own
 
     def __setstate__(self, state):
-        model, rows, threads, fields, stored = state
+        model, rows, threads, fields, stored, own = state
         self.__init__(model, rows, threads, fields)
+        if own is not None:
+            self._own, self._silent = own, [_silent(each) for each in own]
+            self._simulations.set_models(own)
         self._simulations.state[...] = stored
         for name, array in fields.items():
             _fill(getattr(self.data, name), array)
@@ -127,6 +153,13 @@ class Batch:
     def _check_process(self) -> None:
         if self._forks != forks.count:
             forks.refuse("vector environment")
+
+
+def _silent(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy of a model that computes no sensors."""
+    model = copy.copy(model)
+    model.opt.disableflags |= _SENSOR
+    return model
 
 
 def _fill(array: np.ndarray, values: np.ndarray) -> None:
