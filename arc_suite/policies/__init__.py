@@ -1,6 +1,18 @@
 """Policies: one protocol of acting, and policies by name."""
 
 from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, policy
-from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
 
-__all__ = ["HELP", "POLICIES", "PRESET_HELP", "Individuals", "Mixture", "Policy", "Script", "Sum", "alone", "policy"]
+__all__ = [
+    "HELP",
+    "POLICIES",
+    "PRESET_HELP",
+    "Individuals",
+    "Mixture",
+    "Policy",
+    "Positioned",
+    "Script",
+    "Sum",
+    "alone",
+    "policy",
+]

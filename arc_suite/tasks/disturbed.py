@@ -1,5 +1,6 @@
 """Named rows of modifiers: tasks that are others, disturbed."""
 
+from arc_suite.tasks.ground import Rough
 from arc_suite.tasks.steer import Steer
 
 
@@ -15,3 +16,10 @@ class Limp(Steer):
 
     name = "limp"
     modifiers = {"limp": True}
+
+
+class Roam(Rough):
+    """Walking over rough ground under kicks."""
+
+    name = "roam"
+    modifiers = {"kicks": 1.5}
