@@ -274,7 +274,8 @@ class Modified(Task):
 
     def progress(self, memory) -> dict:
         """Return the other task's figures, and whether the body `fell`, 0 or 1."""
-        return {"fell": memory.terminated * 1.0} | self.task.progress(memory)
+        figures = self.task.progress(memory)
+        return figures if "fell" in figures else figures | {"fell": memory.terminated * 1.0}
 
     def carry(self, memory) -> Any:
         """Return the other task's."""
