@@ -355,7 +355,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         self._streams_begin &= ~rows
         mocap = None if mocap[0] is None else np.stack(mocap)
-        self.batch.reset(rows, np.stack(qpos), np.stack(qvel), mocap, models if models[0] else None)
+        self.batch.reset(rows, np.stack(qpos), np.stack(qvel), mocap, models)
         memory, readings = _mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(rows))
         lifted = task.lift(memory, readings)
         if lifted is not None:

@@ -43,6 +43,7 @@ class Batch:
         self._simulations = mujoco.batch.Batch(model, rows, threads)
         forks.keep(self._simulations)
         self._own = None  # a model of its own for each row, once one has been changed
+        self._changed = {}  # fields that ever were, as compiled
         self._silent = _silent(model)
         # What is bound is filled by every call, so it must be bound before the first.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
@@ -86,7 +87,7 @@ class Batch:
         qpos: np.ndarray,
         qvel: np.ndarray,
         mocap_pos: np.ndarray | None = None,
-        models: Sequence[Mapping[str, np.ndarray]] | None = None,
+        models: Sequence[Mapping[str, np.ndarray]] = (),
     ) -> None:
         """Restart some rows, as dm_control's `reset_context` does.
 
@@ -95,8 +96,7 @@ class Batch:
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
             mocap_pos: (restarted, nmocap, 3) positions of the arena's movable bodies; None for the model's.
-            models: (restarted,) fields of the model by name that differ in a row until its next reset,
-                the same names at every reset; None for none.
+            models: (restarted,) fields of the model by name that differ in a row until its next reset; empty for none.
 
         Raises:
             ForkError: made before a fork.
@@ -104,8 +104,8 @@ class Batch:
         self._check_process()
         self._simulations.set_models(None)
         self._simulations.reset(rows)  # runs mj_forward, from whose result the solver starts next
-        if models is not None:
-            self._change(rows, models)
+        if self._own is not None or any(models):
+            self._change(rows, models or [{}] * len(qpos))
         self._simulations.set_models(self._own)
         self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
         if mocap_pos is not None:
@@ -127,24 +127,27 @@ class Batch:
         self._simulations.forward(rows)
 
     def _change(self, rows: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
+        model = self._simulations.model
         if self._own is None:
-            model = self._simulations.model
             self._own, self._silent = ([copy.copy(each) for _ in rows] for each in (model, self._silent))
-        scratch = mujoco.MjData(self._simulations.model)
+        self._changed |= {name: getattr(model, name) for fields in models for name in fields}
+        scratch = mujoco.MjData(model)
         for row, fields in zip(np.flatnonzero(rows), models, strict=True):
-            change(self._own[row], fields, scratch)
-            change(self._silent[row], fields, scratch)
+            for own in (self._own[row], self._silent[row]):
+                change(own, self._changed | fields, scratch)
 
     def __getstate__(self):
         simulations = self._simulations
         fields = {name: array.copy() for name, array in vars(self.data).items()}
-        return simulations.model, simulations.nsim, simulations.nthread, fields, simulations.state.copy(), self._own
+        own = self._own, list(self._changed)
+        return simulations.model, simulations.nsim, simulations.nthread, fields, simulations.state.copy(), own
 
     def __setstate__(self, state):
-        model, rows, threads, fields, stored, own = state
+        model, rows, threads, fields, stored, (own, changed) = state
         self.__init__(model, rows, threads, fields)
         if own is not None:
             self._own, self._silent = own, [_silent(each) for each in own]
+            self._changed = {name: getattr(model, name) for name in changed}
             self._simulations.set_models(own)
         self._simulations.state[...] = stored
         for name, array in fields.items():

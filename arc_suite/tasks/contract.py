@@ -77,7 +77,7 @@ class Start(NamedTuple):
         qvel: (nv,) velocities.
         memory: a NamedTuple of numbers and arrays, replaced from step to step and never written in place.
         mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
-        model: fields of `MjModel` that differ in this episode, by name; the same names in every episode.
+        model: fields of `MjModel` that differ in this episode, by name.
     """
 
     qpos: np.ndarray

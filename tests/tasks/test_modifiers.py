@@ -40,7 +40,7 @@ every_case_and_task = pytest.mark.parametrize(
     ("case", "task_name"),
     [
         pytest.param(case, task, marks=() if (case, task) in (("all", "walk"), ("all", "steer")) else pytest.mark.slow)
-        for case, task in itertools.product(CASES, TASKS)
+        for case, task in [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)]
     ],
 )
 every_body = pytest.mark.parametrize("body", BODIES)
@@ -104,7 +104,7 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "task_name", "threads"),
-    [*((case, "steer", 2) for case in EACH), *itertools.product(["all"], TASKS, [1, 3])],
+    [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", task, 3) for task in TASKS)],
 )
 @every_body
 def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
