@@ -40,13 +40,10 @@ def main() -> None:
     walkers = bodies(_ROBOT)
     task_name, task_kwargs = task()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
-    players = {
-        name: (
-            arc_suite.load(body, task_name, task_kwargs),
-            policies.policy(FLAGS.policy, body, FLAGS.preset),
-        )
-        for name, body in walkers.items()
-    }
+    players = {}
+    for name, body in walkers.items():
+        environment = arc_suite.load(body, task_name, task_kwargs)
+        players[name] = environment, policies.policy(FLAGS.policy, body, FLAGS.preset, task=environment.task.definition)
     # The paper's demonstrators walked by the published numbers; with others there is nothing to compare with.
     experts = {name: None if task_kwargs else evaluation.expert_return(task_name, name) for name in walkers}
     with files.writing_json(FLAGS.json) as file:

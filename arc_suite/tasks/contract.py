@@ -27,6 +27,7 @@ import collections
 import dataclasses
 import functools
 import itertools
+import types
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
@@ -45,6 +46,9 @@ from arc_suite.tasks.terms import Parameters
 
 STEPS = 1000  # control steps of an episode
 
+# Fields of `MjModel` that an episode can have its own values of: masses and frictions.
+CHANGEABLE = ("body_mass", "body_inertia", "pair_friction", "geom_friction")
+
 _CLEAR = 0.01  # of the standing height, by which a lift brings feet clear of the ground
 
 
@@ -57,6 +61,7 @@ class Scene(NamedTuple):
         layout: of the body in the simulation's arrays.
         standing: (nq,) the pose in which it stands: torso position and quaternion, joint angles.
         control_timestep: s between two actions.
+        model: the fields of `MjModel` that `CHANGEABLE` names, as compiled.
     """
 
     body: Body
@@ -64,6 +69,7 @@ class Scene(NamedTuple):
     layout: Layout
     standing: np.ndarray
     control_timestep: float
+    model: Mapping[str, np.ndarray]
 
 
 class Start(NamedTuple):
@@ -74,12 +80,14 @@ class Start(NamedTuple):
         qvel: (nv,) velocities.
         memory: a NamedTuple of numbers and arrays, replaced from step to step and never written in place.
         mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
+        model: fields of `MjModel` that differ in this episode, by name.
     """
 
     qpos: np.ndarray
     qvel: np.ndarray
     memory: Any
     mocap_pos: np.ndarray | None = None
+    model: Mapping[str, np.ndarray] = types.MappingProxyType({})
 
 
 class Inputs(NamedTuple):
@@ -108,6 +116,8 @@ class Task(ABC):
         commands: what may be set from outside while an episode runs, such as by a player's stick:
             size by name of a field of the memory; NaN stands for what the task itself would do.
         own_arena: whether it takes place in an arena of its own, and in no other.
+        modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
+        actions: what an action asks of a motor: "torque" or "position".
     """
 
     scene: Scene
@@ -119,6 +129,8 @@ class Task(ABC):
     reads: ClassVar[tuple[str, ...]] = reading.FIELDS
     commands: ClassVar[Mapping[str, int]] = {}
     own_arena: ClassVar[bool] = False
+    modifiers: ClassVar[Mapping[str, Any]] = {}
+    actions: ClassVar[str] = "torque"
 
     @classmethod
     @abstractmethod

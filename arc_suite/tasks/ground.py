@@ -15,7 +15,7 @@ from arc_suite import checks
 from arc_suite.arenas import Arena, terrain
 from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import steer, walk
+from arc_suite.tasks import modifiers, steer, walk
 from arc_suite.tasks.contract import STEPS, Start
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.terms import Parameters
@@ -113,7 +113,7 @@ class Lanes(steer.Steer):
     def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return steer's settings, with those of `Ground`."""
         for name in overrides:
-            checks.name(name, (*Ground._fields, *walk.NAMES), f"setting of {cls.name}")
+            checks.name(name, (*Ground._fields, *walk.NAMES), f"setting of {cls.name}", near=modifiers.NAMES)
         own = Ground()._asdict() | {name: value for name, value in overrides.items() if name in Ground._fields}
         ground = Ground(
             checks.number("difficulty", own["difficulty"], 0.0, 1.0),

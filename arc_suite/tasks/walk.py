@@ -9,7 +9,7 @@ import numpy as np
 from arc_suite import checks, robots
 from arc_suite.robots import gaits, mirror
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import mirrors, terms
+from arc_suite.tasks import mirrors, modifiers, terms
 from arc_suite.tasks.clock import TWO_PI, Clock
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.fitting import fitted_noise, fitted_settings
@@ -147,7 +147,7 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
     row = robots.row(SETTINGS, body, "walk")
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
     for name in overrides:
-        checks.name(name, NAMES, "setting of walk")
+        checks.name(name, NAMES, "setting of walk", near=modifiers.NAMES)
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)

@@ -93,7 +93,9 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
     level = terrain.made(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
     returns = []
     for arena in (level, "flat"):
-        rows = VectorEnv(ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0})  # none is lifted
+        rows = VectorEnv(
+            ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0}
+        )  # none is lifted
         policy = policies.policy("cpg", robot, "tuned", rows=6)
         observations, rewards, total = rows.reset(seed=0)[0], np.zeros(6), 0.0
         policy.begin(range(6), range(6))
