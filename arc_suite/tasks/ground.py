@@ -17,6 +17,7 @@ from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import modifiers, steer, walk
 from arc_suite.tasks.contract import STEPS, Start
+from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.terms import Parameters
 
@@ -138,6 +139,12 @@ class Lanes(steer.Steer):
     def blocks(self) -> Mapping[str, int]:
         """Steer's, and the height scan."""
         return {**super().blocks, "scan": SCAN.shape[1]}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """Steer's; what is seen on the left is seen on the right, as on mirrored ground."""
+        places = np.arange(SCAN.shape[1]).reshape(len(AHEAD), len(ASIDE))[:, ::-1].ravel()
+        return {**super().mirrors, "scan": Mirror(places, np.ones(len(places), np.int8))}
 
     @functools.cached_property
     def reach(self) -> float:

@@ -129,6 +129,7 @@ class Modified(Task):
     clock = property(lambda self: self.task.clock)
     parameters = property(lambda self: self.task.parameters)
     target_velocity = property(lambda self: self.task.target_velocity)
+    mirrors = property(lambda self: self.task.mirrors)
 
     @classmethod
     def fitted(cls, body, overrides):

@@ -303,3 +303,8 @@ def test_models_of_rows_and_of_one_environment_are_one():
     assert arena == prepared(body, "stairs")[0].scene.arena and hash(arena) == hash(
         prepared(body, "stairs")[0].scene.arena
     )
+
+
+def test_the_scan_in_a_mirror():
+    mirror = prepared("queen", "rough")[0].mirrors["scan"]
+    assert_array_equal(mirror(SCAN), SCAN * [[1.0], [-1.0]])

@@ -110,3 +110,10 @@ def test_a_task_that_does_not_tell_is_refused():
 
     with gaitless.registered(), pytest.raises(ValueError, match=r"^task stay: does not tell how its observation is "):
         arc_suite.symmetry("tick", "stay")
+
+
+@pytest.mark.parametrize(("robot", "task"), arc_suite.ALL_TASKS)
+def test_every_task_has_a_mirror(robot, task):
+    observation, _ = arc_suite.symmetry(robot, task)
+    size = arc_suite.load(robot, task).task.definition.size
+    assert_array_equal(np.sort(observation.sources), np.arange(size))
