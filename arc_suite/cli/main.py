@@ -8,7 +8,7 @@ from pathlib import Path
 from arc_suite import checks
 from arc_suite.cli import program
 
-PROGRAMS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg", "census", "doctor")
+PROGRAMS = ("build_model", "check", "render", "animate", "evaluate", "style", "collect", "tune_cpg", "census", "doctor")
 
 _USAGE = """\
 arc-suite PROGRAM [flags]

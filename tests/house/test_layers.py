@@ -31,6 +31,7 @@ ROOMS = (
     ("data",),
     ("style",),
     ("tuning",),
+    ("export",),  # to take away
     ("cli",),  # programs
     ("doctor", "__main__"),  # that Python starts by name
 )
@@ -58,6 +59,10 @@ THIRD_PARTY = {
     "policies": {"numpy", "dm_env"},
     "evaluation.statistics": {"numpy"},
     "style.metrics": {"numpy"},
+    "export": {"numpy", "mujoco"},
+    "export.gltf": {"numpy"},
+    "export.shapes": {"numpy"},
+    "export.motions": {"numpy"},
 }
 
 # Modules of the suite that these may import, and no others.
@@ -77,6 +82,8 @@ INSIDE = {
     "cpg.presets": {"robots.gaits"},
     "evaluation.statistics": set(),
     "style.metrics": {"rotations", "style.tracks"},
+    "export.gltf": set(),
+    "export.shapes": set(),
 }
 
 
