@@ -3,16 +3,17 @@
 glTF's y axis points up and its z axis ahead: its (x, y, z) are our (y, z, x), a proper rotation.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
-import mujoco
 import numpy as np
 
-from arc_suite import models, rotations
+from arc_suite import rotations
 from arc_suite.export import shapes
 from arc_suite.export.clips import Clip
 from arc_suite.export.gltf import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
+from arc_suite.export.parts import Material, Part
+from arc_suite.export.parts import parts as described
 from arc_suite.export.shapes import Mesh
 from arc_suite.robots.spec import Body
 
@@ -21,29 +22,6 @@ ROOT_MOTIONS = {"both": (True, False), "moving": (True,), "in_place": (False,)}
 
 _AXES = (1, 2, 0)  # of ours, that are glTF's x, y and z
 _TOLERANCE = 0.004  # of the standing height, by which a face may cut into what is round
-_SHAPES = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name for name in shapes.KINDS}
-
-
-class _Part(NamedTuple):
-    """A rigid body: a node of the file.
-
-    Attributes:
-        name: of the body.
-        parent: index of the part above; None for the torso.
-        place: (3,) in the frame of the part above, m; of the torso, of the standing one.
-        quaternion: (4,) likewise, w first.
-        joint: index of its joint; None for the torso and for what is rigid on the part above.
-        axis: (3,) of the joint.
-        meshes: by name of the material, in the part's frame.
-    """
-
-    name: str
-    parent: int | None
-    place: np.ndarray
-    quaternion: np.ndarray
-    joint: int | None
-    axis: np.ndarray | None
-    meshes: Mapping[str, Mesh]
 
 
 def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str = "both", generator: str = "") -> bytes:
@@ -61,9 +39,9 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         root_motion: moving, in_place, or both, two animations of each clip that moves.
         generator: what the file says that it was made by.
     """
-    document, model = Document(generator), _decorated(body)
-    parts = _parts(model, body)
-    materials = _materials(document, model)
+    document, (parts, looks) = Document(generator), described(body)
+    meshes = [_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
+    materials = {name: document.add("materials", _material(name, look)) for name, look in looks.items()}
     root = document.add("nodes", {"name": "root"})
     nodes = [document.add("nodes", _node(part)) for part in parts]
     children: dict[int, list[int]] = {}
@@ -73,13 +51,12 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         document.json["nodes"][node]["children"] = below
     scene = [root]
     if rig == "skin":
-        scene.append(_skinned(document, body, parts, [root, *nodes], materials))
+        scene.append(_skinned(document, body.name, parts, meshes, [root, *nodes], materials))
     else:
-        for part, node in zip(parts, nodes, strict=True):
-            if part.meshes:
-                primitives = [_primitive(document, mesh, materials[name]) for name, mesh in part.meshes.items()]
-                mesh = document.add("meshes", {"name": part.name, "primitives": primitives})
-                document.json["nodes"][node]["mesh"] = mesh
+        for part, own, node in zip(parts, meshes, nodes, strict=True):
+            primitives = [_primitive(document, mesh, materials[name]) for name, mesh in own.items()]
+            mesh = document.add("meshes", {"name": part.name, "primitives": primitives})
+            document.json["nodes"][node]["mesh"] = mesh
     document.json |= {"scene": document.add("scenes", {"name": body.name, "nodes": scene})}
     for clip in clips:
         _animations(document, clip, parts, root, nodes, ROOT_MOTIONS[root_motion])
@@ -122,63 +99,28 @@ def _named(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
     return {f"{clip.name}{'' if moves else '_in_place'}{end}": moves for moves in moving}
 
 
-def _decorated(body: Body) -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_string(models.assemble(body, decorated=True).to_xml_string())
-
-
-def _parts(model: mujoco.MjModel, body: Body) -> list[_Part]:
-    ids = [model.body(name).id for name in body.part_names]
-    tolerance = _TOLERANCE * body.torso.standing_height
-    parts = []
-    for index in ids:
-        hinged = (
-            model.body_jntnum[index] == 1 and model.jnt_type[model.body_jntadr[index]] == mujoco.mjtJoint.mjJNT_HINGE
-        )
-        joint = int(model.body_jntadr[index]) if hinged else None
-        parent = int(model.body_parentid[index])
-        parts.append(
-            _Part(
-                name=model.body(index).name,
-                parent=ids.index(parent) if parent else None,
-                place=model.body_pos[index],
-                quaternion=model.body_quat[index],
-                joint=None if joint is None else int(model.jnt_qposadr[joint]) - 7,
-                axis=None if joint is None else model.jnt_axis[joint],
-                meshes=_meshes(model, index, tolerance),
-            )
-        )
-    return parts
-
-
-def _meshes(model: mujoco.MjModel, index: int, tolerance: float) -> dict[str, Mesh]:
-    """The shapes of a body, those of a material as one."""
+def _meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
+    """The shapes of a part by material, those of one as one mesh in the part's frame."""
     meshes: dict[str, list[Mesh]] = {}
-    for geom in range(model.body_geomadr[index], model.body_geomadr[index] + model.body_geomnum[index]):
-        rotation = rotations.matrix(model.geom_quat[geom])
-        mesh = shapes.shape(_SHAPES[int(model.geom_type[geom])], model.geom_size[geom], tolerance)
-        material = model.material(model.geom_matid[geom]).name
-        meshes.setdefault(material, []).append(mesh.moved(model.geom_pos[geom], rotation))
+    for shape in part.shapes:
+        mesh = shapes.shape(shape.kind, shape.size, tolerance)
+        meshes.setdefault(shape.material, []).append(mesh.moved(shape.place, rotations.matrix(shape.quaternion)))
     return {material: shapes.joined(several) for material, several in meshes.items()}
 
 
-def _materials(document: Document, model: mujoco.MjModel) -> dict[str, int]:
-    """Add the materials that geoms of bodies have, and return their indices by name."""
-    used = sorted({int(model.geom_matid[geom]) for geom in range(model.ngeom) if model.geom_bodyid[geom]})
-    indices = {}
-    for index in used:
-        name, colour = model.material(index).name, _linear(model.mat_rgba[index, :3])
-        material = {
-            "name": name,
-            "pbrMetallicRoughness": {
-                "baseColorFactor": [*colour.tolist(), 1.0],
-                "metallicFactor": 0.0,
-                "roughnessFactor": 1.0 - float(model.mat_shininess[index]),
-            },
-        }
-        if model.mat_emission[index] > 0.0:
-            material["emissiveFactor"] = (model.mat_emission[index] * colour).tolist()
-        indices[name] = document.add("materials", material)
-    return indices
+def _material(name: str, material: Material) -> dict:
+    colour = _linear(material.colour)
+    properties = {
+        "name": name,
+        "pbrMetallicRoughness": {
+            "baseColorFactor": [*colour.tolist(), 1.0],
+            "metallicFactor": 0.0,
+            "roughnessFactor": material.roughness,
+        },
+    }
+    if material.emission > 0.0:
+        properties["emissiveFactor"] = (material.emission * colour).tolist()
+    return properties
 
 
 def _linear(colour: np.ndarray) -> np.ndarray:
@@ -187,14 +129,14 @@ def _linear(colour: np.ndarray) -> np.ndarray:
     return linear.astype(float).round(6)
 
 
-def _node(part: _Part) -> dict:
+def _node(part: Part) -> dict:
     node: dict[str, Any] = {"name": part.name, "translation": _float32(part.place[list(_AXES)]).tolist()}
     if part.quaternion[0] < 1.0:
         node["rotation"] = _turn(part.quaternion).tolist()
     return node
 
 
-def _skinned(document: Document, body: Body, parts, joints: list[int], materials) -> int:
+def _skinned(document: Document, name: str, parts, meshes, joints: list[int], materials) -> int:
     """Add the mesh with its skin, and return its node."""
     places, turns = [np.zeros(3)], [np.eye(3)]  # of root and parts in the standing pose
     for part in parts:
@@ -202,18 +144,18 @@ def _skinned(document: Document, body: Body, parts, joints: list[int], materials
         places.append(places[above] + turns[above] @ part.place)
         turns.append(turns[above] @ rotations.matrix(part.quaternion))
     by_material: dict[str, list[tuple[int, Mesh]]] = {}
-    for joint, part in enumerate(parts, start=1):
-        for name, mesh in part.meshes.items():
-            by_material.setdefault(name, []).append((joint, mesh.moved(places[joint], turns[joint])))
+    for joint, own in enumerate(meshes, start=1):
+        for material, mesh in own.items():
+            by_material.setdefault(material, []).append((joint, mesh.moved(places[joint], turns[joint])))
     kind = np.uint8 if len(joints) <= 256 else np.dtype("<u2")
     primitives = []
-    for name, several in by_material.items():
+    for material, several in by_material.items():
         counts = [len(mesh.points) for _, mesh in several]
         bound = np.zeros((sum(counts), 4), kind)
         bound[:, 0] = np.repeat([joint for joint, _ in several], counts)
         weights = np.zeros((sum(counts), 4), np.uint8)
         weights[:, 0] = 255
-        primitive = _primitive(document, shapes.joined([mesh for _, mesh in several]), materials[name])
+        primitive = _primitive(document, shapes.joined([mesh for _, mesh in several]), materials[material])
         primitive["attributes"] |= {
             "JOINTS_0": document.accessor(bound, ARRAY_BUFFER),
             "WEIGHTS_0": document.accessor(weights, ARRAY_BUFFER, normalized=True),
@@ -224,13 +166,13 @@ def _skinned(document: Document, body: Body, parts, joints: list[int], materials
         own = turn[np.ix_(_AXES, _AXES)].T
         inverse[:3, :3], inverse[:3, 3] = own, -own @ place[list(_AXES)]
     skin = {
-        "name": body.name,
+        "name": name,
         "joints": joints,
         "skeleton": joints[0],
         "inverseBindMatrices": document.accessor(_float32(inverses)),
     }
-    mesh = document.add("meshes", {"name": body.name, "primitives": primitives})
-    return document.add("nodes", {"name": body.name, "mesh": mesh, "skin": document.add("skins", skin)})
+    mesh = document.add("meshes", {"name": name, "primitives": primitives})
+    return document.add("nodes", {"name": name, "mesh": mesh, "skin": document.add("skins", skin)})
 
 
 def _primitive(document: Document, mesh: Mesh, material: int) -> dict:
@@ -283,7 +225,7 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
         )
 
 
-def _hinged(part: _Part, angles: np.ndarray) -> np.ndarray:
+def _hinged(part: Part, angles: np.ndarray) -> np.ndarray:
     """Return the orientations (frames, 4) of a part on the one above, at angles (frames,) of its joint."""
     turn = np.concatenate([np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None] * part.axis], axis=-1)
     return rotations.product(part.quaternion, turn)

@@ -19,7 +19,7 @@ OPEN = np.radians(2.0)  # a seam that is none
 MOST_CYCLES = 12  # of a loop
 
 _RETURNED = 0.3  # of the largest distance between two poses: a cycle later the distance is less
-_SPEED = 10.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
+_SPEED = 100.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
 _STRIDE = 5  # substeps: every so many poses are compared in the search for the cycle
 
 
