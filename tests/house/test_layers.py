@@ -31,6 +31,7 @@ ROOMS = (
     ("data",),
     ("style",),
     ("tuning",),
+    ("export",),  # to take away
     ("agents",),  # who learns
     ("cli",),  # programs
     ("doctor", "__main__"),  # that Python starts by name
@@ -70,6 +71,10 @@ THIRD_PARTY = {
     "agents.proximal_policy": {"numpy", "jax", "optax"},
     "agents.rows": set(),
     "style.metrics": {"numpy"},
+    "export": {"numpy", "mujoco"},
+    "export.gltf": {"numpy"},
+    "export.shapes": {"numpy"},
+    "export.motions": {"numpy"},
 }
 
 # Modules of the suite that these may import, and no others.
@@ -96,6 +101,8 @@ INSIDE = {
     "cpg.presets": {"robots.gaits"},
     "evaluation.statistics": set(),
     "style.metrics": {"rotations", "style.tracks"},
+    "export.gltf": set(),
+    "export.shapes": set(),
 }
 
 
