@@ -212,13 +212,9 @@ class Lanes(steer.Steer):
         return beyond | (abs(y - memory.lane) > OFF_LANE * unit)
 
     def progress(self, memory: Memory) -> dict:
-        """Return `distance`, a share of what was asked for; steer's figures; whether a foot `sank`, and the `level`."""
-        return {
-            "distance": self.distance(memory),
-            **super().progress(memory),
-            "sank": self.sunk(memory) * 1.0,
-            "level": memory.level * 1.0,
-        }
+        """Return `distance`, as a share; steer's figures; whether a foot `sank`; and the `level` of a curriculum."""
+        figures = {"distance": self.distance(memory), **super().progress(memory), "sank": self.sunk(memory) * 1.0}
+        return figures | ({"level": memory.level * 1.0} if self.settings.ground.curriculum else {})
 
     def distance(self, memory: Memory):
         """Return the way along the lane (...) as a share of that at the target velocity.
