@@ -72,7 +72,7 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
     assert "return_over_expert" not in report
     plain = evaluate("--robot=queen", "--policy=random", "--episodes=1").stdout.splitlines()[2].split()
     assert plain[-1] == f"{RETURNS['queen'].paper:.0f}"
-    assert plain[1] != rows[0][1]
+    assert plain[3] != rows[0][3]
 
 
 def test_json_is_refused_before_the_work_starts():
