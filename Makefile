@@ -5,6 +5,7 @@
 # make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
+# make check-agents  learners, ONNX and statistics beside their oracles, in the environment of check-jax
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make census  walks 500 random bodies and tells which do
 # make soak    two million steps: memory, threads and files stay what they are
@@ -16,7 +17,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-clients check-jax bench census soak fuzz mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients check-jax check-agents bench census soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -75,6 +76,13 @@ check-jax: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,jax]'
 	$(VENV)/bin/python -m pytest tests/tasks/test_jax.py
+
+# pandas before 3, as what rliable needs does not know it yet.
+check-agents: VENV := .venv-jax
+check-agents: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[test,agents,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
+	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

@@ -103,8 +103,13 @@ def _noise(body: Body, deviation: float, rows: int) -> Policy:
     return Script(draw, rows, joints)
 
 
+def is_file(name: str) -> bool:
+    """Return whether a policy's name is that of a folder of a run that is there."""
+    return name not in POLICIES and (Path(name) / network.FILE).is_file()
+
+
 def _is_path(name: str) -> bool:
-    return name not in POLICIES and (name.endswith(network.EXTENSION) or os.sep in name or Path(name).is_dir())
+    return is_file(name) or name.endswith(network.EXTENSION) or (os.sep in name and ":" not in name)
 
 
 def _from_file(path: Path, body: Body) -> Policy:
