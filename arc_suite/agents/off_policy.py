@@ -1,8 +1,9 @@
 """Learns by soft actor-critic from a buffer: the algorithms of the ARC-RL paper, which differ in their rows alone.
 
-A step acts, stores the transition and makes one update. Where the row has stabilisation phases, one follows
-the update of every `phase_every`-th step: updates of the critics alone, on the buffer as it stands. With early
-stopping, a share of the buffer is held out of the phase and tells when to stop.
+A step acts, stores the transition and makes an update, or several, of which the last moves the policy too. Where
+the row has stabilisation phases, one follows the update of every `phase_every`-th step: updates of the critics
+alone, on the buffer as it stands. With early stopping, a share of the buffer is held out of the phase and tells when
+to stop.
 """
 
 import functools
@@ -164,6 +165,10 @@ class OffPolicy:
         if is_last:
             self._earned = {"present": 0.0, "latest": self._earned["present"]}
         count["steps"] += 1
+        spent = _zeros(_OF_CRITICS)
+        for _ in range(row.updates_per_step - 1):
+            self._state, spent = _update(self._core, self._state, spent, *self._drawn(with_policy=False))
+            count["updates"] += 1
         self._state, self._sums = _update(self._core, self._state, self._sums, *self._drawn(with_policy=True))
         count["updates"] += 1
         count["summed"] += 1
