@@ -65,7 +65,7 @@ check-sb3: setup.cfg
 	$(VENV)/bin/python -m pip install -q '$(TORCH)'
 	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
-	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py
+	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py tests/policies/test_sb3_file.py
 
 check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)

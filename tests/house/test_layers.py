@@ -59,6 +59,7 @@ THIRD_PARTY = {
     "policies": {"numpy", "dm_env"},
     "policies.network": {"numpy"},
     "policies.onnx_file": {"numpy", "onnx"},
+    "policies.sb3_file": {"numpy", "torch", "stable_baselines3"},
     "evaluation.statistics": {"numpy"},
     "agents": {"numpy", "gymnasium", "tqdm"},
     "agents.networks": {"numpy", "jax"},
