@@ -4,6 +4,8 @@
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
 # make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
+# make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
+# make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics beside their oracles, in the environment of check-jax
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
@@ -17,7 +19,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-clients check-jax check-agents bench census soak fuzz mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients check-glb check-blender check-godot check-jax check-agents bench census soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -71,6 +73,26 @@ check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) tools/check_clients.py
 
+ENGINES := out/engines
+
+check-glb: $(INSTALLED)
+	mkdir -p .node-glb
+	cp tests/engines/package.json tests/engines/package-lock.json .node-glb/
+	npm ci --prefix .node-glb --no-audit --no-fund --silent
+	$(PYTHON) tests/engines/make_files.py $(ENGINES)
+	NODE_PATH=.node-glb/node_modules node tests/engines/validate.js $(ENGINES)
+
+# Blender's wheels are each for one version of Python: of 5.0, 3.11.
+check-blender: $(INSTALLED)
+	tools/ensure_venv.sh .venv-blender
+	.venv-blender/bin/python -m pip install -q bpy==5.0.1
+	$(PYTHON) tests/engines/make_files.py $(ENGINES) few
+	.venv-blender/bin/python tests/engines/blender.py $(ENGINES)
+
+check-godot: $(INSTALLED)
+	$(PYTHON) tests/engines/make_files.py $(ENGINES) few
+	$(PYTHON) tests/engines/godot.py $(ENGINES)
+
 check-jax: VENV := .venv-jax
 check-jax: setup.cfg
 	tools/ensure_venv.sh $(VENV)
@@ -103,4 +125,4 @@ golden: $(INSTALLED)
 	$(PYTHON) tests/golden.py
 
 clean:
-	rm -rf .venv .venv-* out build *.egg-info
+	rm -rf .venv .venv-* .node-* out build *.egg-info

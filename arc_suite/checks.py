@@ -12,8 +12,14 @@ import numpy as np
 _LARGEST_SEED = 2**32 - 1  # that a RandomState takes
 
 
-def name(value, valid: Iterable[str], kind: str) -> str:
+def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> str:
     """Return the value if it is a valid name.
+
+    Args:
+        value: the name.
+        valid: all names there are.
+        kind: what they name, with which an error begins.
+        near: names that are valid in its place but are taken out before; an error may mean them too.
 
     Raises:
         ValueError: it is not; the message names it, a valid name that is near, and all there are.
@@ -21,6 +27,7 @@ def name(value, valid: Iterable[str], kind: str) -> str:
     valid = list(valid)
     if value in valid:
         return value
+    valid += near
     close = difflib.get_close_matches(str(value), valid, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     raise ValueError(f"unknown {kind} {value!r}{hint} (there are: {', '.join(valid)})")
@@ -89,6 +96,28 @@ def boolean(what: str, value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{what}: expected true or false, got {value!r}")
     return bool(value)
+
+
+def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
+    """Return two numbers, the lower first, between which something is drawn; one number stands for both.
+
+    Args:
+        what: name of the value, with which an error begins.
+        value: a number, or a list or tuple of two.
+        low: least that they may be.
+        high: most that they may be.
+
+    Raises:
+        ValueError: it is neither, or out of range; one line.
+    """
+    try:
+        first, last = value if isinstance(value, tuple | list) else (value, value)
+        first = number(what, first, low, high)
+        return first, number(what, last, first, high)
+    except ValueError:
+        raise ValueError(
+            f"{what}: expected a number from {low:g} to {high:g}, or two of them, the lower first, got {value!r}"
+        ) from None
 
 
 def array(what: str, value: Any, size: int) -> np.ndarray:

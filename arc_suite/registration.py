@@ -7,7 +7,7 @@ import gymnasium
 
 from arc_suite import registry
 from arc_suite.arenas import ARENAS
-from arc_suite.cpg.demonstrator import pattern
+from arc_suite.cpg.demonstrator import ahead, pattern
 from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
 from arc_suite.models.looks import LOOKS
 from arc_suite.models.looks.look import Look
@@ -106,7 +106,7 @@ def _check_tuning(body: Body, tuning: Mapping[str, Preset]) -> None:
         raise ValueError(f"tuning: {body.name} has no {' and no '.join(missing)}")
     for name, preset in tuning.items():
         try:
-            pattern(body, preset)
+            pattern(body, preset), ahead(body, preset)
         except ValueError as error:
             raise ValueError(f"tuning {name!r}: {error}") from None
 

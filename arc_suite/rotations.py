@@ -30,6 +30,20 @@ def turned(quaternion, angle):
     return numpy.stack(parts, axis=-1)
 
 
+def product(first, second):
+    """Return the rotations (..., 4) that turn as `second` does and then as `first` does."""
+    numpy = second.__array_namespace__()
+    a, b, c, d = (first[..., i] for i in range(4))
+    w, x, y, z = (second[..., i] for i in range(4))
+    parts = (
+        a * w - b * x - c * y - d * z,
+        a * x + b * w + c * z - d * y,
+        a * y - b * z + c * w + d * x,
+        a * z + b * y - c * x + d * w,
+    )
+    return numpy.stack(parts, axis=-1)
+
+
 def matrix(quaternion):
     """Return rotation matrices (..., 3, 3) from a body's frame to the world."""
     w, x, y, z = (quaternion[..., i] for i in range(4))

@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from arc_suite import checks
+from arc_suite.agents.rows import Imitation, ProximalPolicy
 
 
 class Algorithm(NamedTuple):
@@ -19,12 +20,14 @@ class Algorithm(NamedTuple):
         row: its numbers, a frozen dataclass.
         summary: what it is, in a line.
         evaluate_every: environment steps between evaluations.
+        steps: environment steps of a run, if it is not told otherwise.
     """
 
     learner: str
     row: Any
     summary: str
     evaluate_every: int = 10_000
+    steps: int = 1_000_000
 
     @property
     def module(self) -> ModuleType:
@@ -127,7 +130,7 @@ _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 _OFF_POLICY = "arc_suite.agents.off_policy"
 
-# The paper's six, as its published code runs them: docs/agents.md.
+# The paper's six, as its published code runs them, and three that are not the paper's: docs/agents.md.
 ALGORITHMS = {
     "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
     "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
@@ -150,6 +153,12 @@ ALGORITHMS = {
         _OFF_POLICY,
         dataclasses.replace(_SAC, dropout=0.01, updates_per_step=20),
         "SAC with 20 updates of critics with dropout in every step",
+    ),
+    "ppo": Algorithm(
+        "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
+    ),
+    "imitation": Algorithm(
+        "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
     ),
 }
 

@@ -92,3 +92,15 @@ class Learner(Protocol):
 def generator(seed: int, purpose: str, count: int) -> np.random.Generator:
     """Return the generator of random numbers for one purpose of a run, such as its 1000th update."""
     return np.random.default_rng((seed, zlib.crc32(purpose.encode()), count))
+
+
+def environment_arrays(environment: VectorEnv) -> dict[str, np.ndarray]:
+    """Return the snapshot of an environment, named as part of `Learner.arrays`."""
+    return {f"{ENVIRONMENT}{name}": array for name, array in environment.snapshot().items()}
+
+
+def restore_environment(environment: VectorEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Let an environment go on from `environment_arrays`, and return its observations (rows, size)."""
+    snapshot = {name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)}
+    environment.restore(snapshot)
+    return snapshot["observation"]

@@ -17,7 +17,7 @@ import numpy as np
 from arc_suite.agents import networks, priors
 from arc_suite.agents import soft_actor_critic as sac
 from arc_suite.agents.algorithms import SoftActorCritic
-from arc_suite.agents.learner import ENVIRONMENT, Diverged, Stage, generator
+from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.replay import Fenced, Replay, Transitions
 from arc_suite.agents.stopping import Patience
 
@@ -132,7 +132,7 @@ class OffPolicy:
             "earned": np.array(list(self._earned.values())),
             "replay": np.array([self._replay.total, self._replay.ends]),
             "phase": np.array(phase or (), float),
-            **{f"{ENVIRONMENT}{name}": array for name, array in self._environment.snapshot().items()},
+            **environment_arrays(self._environment),
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -146,11 +146,7 @@ class OffPolicy:
             updates, held_out, best, waited = arrays["phase"]
             self._phase = Phase(int(updates), int(held_out), Patience(float(best), int(waited)))
             self._prepare_phase()
-        snapshot = {
-            name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)
-        }
-        self._environment.restore(snapshot)
-        self._observation = snapshot["observation"][0]
+        self._observation = restore_environment(self._environment, arrays)[0]
 
     def _step(self) -> None:
         """Act, store the transition, update, and begin a phase if it is time."""

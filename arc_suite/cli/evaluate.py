@@ -1,4 +1,4 @@
-"""Judge a policy: return and length of its episodes, and the task's own figures.
+"""Judge a policy: the task's own figures, then return and length of its episodes.
 
 Walk's figures are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
 return stands beside that of the paper's demonstrator, where the task is the paper's. IQM is the
@@ -8,6 +8,8 @@ interquartile mean of the return, with a stratified bootstrap interval.
   arc-suite evaluate --spec examples/spider.json
   arc-suite evaluate --robot queen --set target_velocity=0.4
 """
+
+from collections.abc import Mapping
 
 from absl import flags
 
@@ -26,13 +28,19 @@ flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for eac
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")
 
-_WIDTHS = (16, 26, 12, 9)  # of the columns that every task has
+_WIDTHS = (18, 26, 9, 12)  # of the columns that every task has
 
 
-def line(first: str, *cells: str) -> str:
-    """Return a line of the table: the columns that every task has, then the task's own figures."""
-    widths = (*_WIDTHS, *(16 for _ in cells[len(_WIDTHS) :]))
-    return f"{first:<12}" + "".join(f" {cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+def line(first: str, figures: Mapping[str, str], *cells: str) -> str:
+    """Return a line of the table.
+
+    Args:
+        first: what is in its first column.
+        figures: the task's own by name, which matter first.
+        *cells: of the columns that every task has.
+    """
+    own = [f"{cell:>{max(len(name), 6)}}" for name, cell in figures.items()]
+    return " ".join([f"{first:<12}", *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))])
 
 
 def main() -> None:
@@ -40,13 +48,10 @@ def main() -> None:
     walkers = bodies(_ROBOT)
     task_name, task_kwargs = task()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
-    players = {
-        name: (
-            arc_suite.load(body, task_name, task_kwargs),
-            policies.policy(FLAGS.policy, body, FLAGS.preset),
-        )
-        for name, body in walkers.items()
-    }
+    players = {}
+    for name, body in walkers.items():
+        environment = arc_suite.load(body, task_name, task_kwargs)
+        players[name] = environment, policies.policy(FLAGS.policy, body, FLAGS.preset, task=environment.task.definition)
     # The paper's demonstrators walked by the published numbers; with others there is nothing to compare with.
     experts = {name: None if task_kwargs else evaluation.expert_return(task_name, name) for name in walkers}
     with files.writing_json(FLAGS.json) as file:
@@ -54,7 +59,8 @@ def main() -> None:
         for robot, (environment, policy) in players.items():
             episodes = evaluate(robot, environment, policy)
             if not reports:
-                header = line("robot", "return", "IQM [95 % interval]", "paper's cpg", "steps", *episodes[0].progress)
+                names = {name: name for name in episodes[0].progress}
+                header = line("robot", names, "return", "IQM [95 % interval]", "steps", "paper's cpg")
                 print(header, "-" * len(header), sep="\n")
             reports[robot] = report(episodes, experts[robot])
             print(row(robot, reports[robot]), flush=True)
@@ -105,11 +111,11 @@ def row(robot: str, figures: dict) -> str:
     total, progress = figures["return"], figures["episodes"][0].progress
     return line(
         robot,
+        {name: f"{figures[name].mean:.3f}" for name in progress},
         f"{total.mean:.1f} +- {total.deviation:.1f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
-        "-" if figures["expert_return"] is None else f"{figures['expert_return']:.0f}",
         f"{figures['length'].mean:.1f}",
-        *(f"{figures[name].mean:.3f}" for name in progress),
+        "-" if figures["expert_return"] is None else f"{figures['expert_return']:.0f}",
     )
 
 

@@ -12,6 +12,7 @@ PROGRAMS = (
     "build_model",
     "check",
     "render",
+    "animate",
     "evaluate",
     "style",
     "collect",

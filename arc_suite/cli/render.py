@@ -55,7 +55,13 @@ def main() -> None:
     walkers = bodies(_ROBOT)
     task_name, task_kwargs = task()
     camera = checks.name(FLAGS.camera or ("profile" if len(walkers) == 1 else "portrait"), CAMERAS, "camera")
-    policies = {name: alone(policy(FLAGS.policy, body, FLAGS.preset), FLAGS.seed) for name, body in walkers.items()}
+    environments = {
+        name: arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed}) for name, body in walkers.items()
+    }
+    policies = {
+        name: alone(policy(FLAGS.policy, body, FLAGS.preset, task=environments[name].task.definition), FLAGS.seed)
+        for name, body in walkers.items()
+    }
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.png, .mp4 or .gif")
     extension = checks.name(Path(FLAGS.output).suffix.lower(), films.WRITERS, "extension")
@@ -64,8 +70,7 @@ def main() -> None:
 
     with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:
         takes = []
-        for name, body in walkers.items():
-            environment = arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed})
+        for name, environment in environments.items():
             takes.append(films.Take(name, environment, policies[name], camera, size))
             stack.callback(takes[-1].close)
         takes[0].view()  # finds out at once whether there is OpenGL

@@ -5,6 +5,8 @@ and losses, a checkpoint, the policy, and a picture of its returns, which grows 
 `--policy FOLDER` has it walk in every program.
 
   arc-suite train --robot tick --algorithm sac --steps 200000
+  arc-suite train --robot tick --algorithm ppo --minutes 10
+  arc-suite train --robot queen --algorithm imitation --row preset=tuned
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --spec examples/spider.json --algorithm speq --row phase_updates=7500
   arc-suite evaluate --robot tick --policy runs/tick-walk-sac-0
@@ -37,7 +39,7 @@ flags.DEFINE_string(
 )
 flags.DEFINE_multi_string("row", [], "Number of the algorithm's row, name=value; repeat it for several.")
 flags.DEFINE_integer("seed", 0, "Seed of the run.", lower_bound=0)
-flags.DEFINE_integer("steps", 1_000_000, "Environment steps.", lower_bound=1)
+flags.DEFINE_integer("steps", None, "Environment steps. [default: the algorithm's]", lower_bound=1)
 flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithms that take any.")
 flags.DEFINE_integer("evaluate_every", None, "Steps between evaluations. [default: the algorithm's]", lower_bound=1)
 flags.DEFINE_float("minutes", None, "Stop after so many minutes; the same command goes on.", lower_bound=0.0)
@@ -58,7 +60,8 @@ def main() -> None:
     if len(walkers) > 1:
         raise ValueError("--robot=all: a run has one robot")
     (body,) = walkers.values()
-    run = Run(body, FLAGS.algorithm, definition, *task(), FLAGS.seed, FLAGS.steps, FLAGS.prior, FLAGS.evaluate_every)
+    steps = FLAGS.steps or definition.steps
+    run = Run(body, FLAGS.algorithm, definition, *task(), FLAGS.seed, steps, FLAGS.prior, FLAGS.evaluate_every)
     folder = Path(FLAGS.output or run.folder())
     with contextlib.ExitStack() as stack:
         listeners = [picture(run, folder), *([stack.enter_context(events(folder))] if FLAGS.tensorboard else [])]

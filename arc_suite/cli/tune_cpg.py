@@ -1,10 +1,11 @@
 """Search the numbers of a robot's demonstrator that earn most.
 
 It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off
-at any moment, the same command goes on. At the end the best numbers are judged beside `medium` over
-many resets and printed as a row for the table of presets.
+at any moment, the same command goes on. At the end the best numbers are judged beside the presets
+that there are over many resets and printed as a row for the table of presets.
 
   arc-suite tune_cpg --robot queen --output out/tune/queen
+  arc-suite tune_cpg --robot queen --numbers torques --output out/tune/queen-torques
 """
 
 import contextlib
@@ -21,14 +22,22 @@ from arc_suite.tasks.contract import STEPS
 from arc_suite.tuning import Journal, Judge, Search
 from arc_suite.tuning.judge import STYLE
 from arc_suite.tuning.search import HARD
+from arc_suite.tuning.space import SPACES
 
 FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
-flags.DEFINE_integer("generations", 250, "Generations of the search; more make a finished one go on.", lower_bound=1)
-flags.DEFINE_integer("episodes", 2, "Episodes by which a candidate is judged.", lower_bound=1)
-flags.DEFINE_integer("steps", 300, "Control steps of these episodes.", 1, STEPS)
-flags.DEFINE_integer("starts", 1000, "Starts, of which candidates are tried in the hardest.", lower_bound=HARD)
+flags.DEFINE_string(
+    "numbers", "law", "law: those of the paper's law, about `medium`; torques: of what is added to it, about `tuned`."
+)
+for name, least, most, what in (
+    ("generations", 1, None, "Generations of the search, more make a finished one go on"),
+    ("episodes", 1, None, "Episodes by which a candidate is judged"),
+    ("steps", 1, STEPS, "Control steps of these episodes"),
+    ("starts", 0, None, f"Starts, of which candidates are tried in the {HARD} hardest; 0 for none"),
+):
+    usual = " and ".join(f"{getattr(kind, name)} for {numbers}" for numbers, kind in SPACES.items())
+    flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
 flags.DEFINE_string(
@@ -36,9 +45,16 @@ flags.DEFINE_string(
 )
 
 
+def given(name: str) -> int:
+    """Return the value of a flag, or what is usual for the numbers that are searched."""
+    value = FLAGS[name].value
+    return getattr(SPACES[FLAGS.numbers], name) if value is None else value
+
+
 def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
-    settings = {name: FLAGS[name].value for name in ("robot", "seed", "episodes", "steps", "starts")}
+    settings = {name: FLAGS[name].value for name in ("robot", "numbers", "seed")}
+    settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
     settings |= dict(zip(("task", "task_kwargs"), task(), strict=True))
     with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
         try:
@@ -48,8 +64,9 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
         for generation in journal.generations:
             course.step(generation.fitness)
         done = len(journal.generations)
-        with progress(total=max(FLAGS.generations, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
-            for _ in range(done, FLAGS.generations):
+        wanted = given("generations")
+        with progress(total=max(wanted, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
+            for _ in range(done, wanted):
                 journal.append(course.step())
                 bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}")
                 bar.update()
@@ -57,9 +74,9 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
 
 
 def judge(preset: Preset) -> dict:
-    """Return the return, falls and style over the resets, of the result and of medium."""
-    body = ROBOTS[FLAGS.robot]
-    presets = {"tuned": preset, "medium": TUNINGS[FLAGS.robot]["medium"]}
+    """Return returns, falls and style over the resets: of the result, of what it was searched about, and of medium."""
+    body, there = ROBOTS[FLAGS.robot], TUNINGS[FLAGS.robot]
+    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.numbers].preset, "medium")}
     score = Judge(body, len(presets), FLAGS.resets, STEPS, *task())(list(presets.values()), range(FLAGS.resets))
     return {
         name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
@@ -70,15 +87,18 @@ def judge(preset: Preset) -> dict:
 
 def violations(figures: dict) -> list[str]:
     """Return in what the result is not as good as it must be, a line each."""
-    tuned, medium = figures["tuned"], figures["medium"]
-    worse = [f"{name} {tuned[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if tuned[name] > medium[name]]
-    return worse + [f"{tuned['falls']} falls"] * bool(tuned["falls"])
+    found, medium = figures["found"], figures["medium"]
+    worse = [f"{name} {found[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if found[name] > medium[name]]
+    return worse + [f"{found['falls']} falls"] * bool(found["falls"])
 
 
 def main() -> None:
     """Search, judge, print and write."""
     task_name, task_kwargs = task()
     checks.name(FLAGS.robot, TUNINGS, "robot")
+    checks.name(FLAGS.numbers, SPACES, "numbers")
+    if 0 < (FLAGS.starts or 0) < HARD:
+        raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
     try:
         from arc_suite.tuning import plots
     except ImportError as error:
@@ -93,6 +113,7 @@ def main() -> None:
             robot=FLAGS.robot,
             task=task_name,
             task_kwargs=task_kwargs,
+            numbers=FLAGS.numbers,
             seed=FLAGS.seed,
             generations=len(journal.generations),
             resets=FLAGS.resets,

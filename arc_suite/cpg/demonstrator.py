@@ -7,8 +7,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import checks, robots
-from arc_suite.cpg.law import Pattern, felt, joint_targets, torques
+from arc_suite import checks, robots, rotations
+from arc_suite.cpg.law import Ahead, Pattern, felt, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.steering import MANNERS, Manner, Steered
 from arc_suite.cpg.stride import Stride
@@ -25,8 +25,8 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 class Demonstrator:
     """A policy that walks one body by a preset, in one environment or in the rows of a batch.
 
-    The presets slow, medium, fast and tuned walk straight by a clock of their own, and take joint
-    angles and velocities and the torso's orientation alone from the observation. Those of
+    The presets slow, medium, fast, tuned and refined walk straight by a clock of their own, and take
+    joint angles and velocities and the torso's orientation alone from the observation. Those of
     `steering.MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
     of a batch by `begin` and `act`, as every policy does, and in one environment as a function of a
     `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
@@ -43,7 +43,8 @@ class Demonstrator:
         Args:
             robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast; for the four robots also tuned, which earns most of what
-                the law can earn in walk, or numbers of your own; steered or surefooted, which follow
+                the paper's law can earn in walk, and refined, which earns most of all, or numbers of
+                your own; steered or surefooted, which follow
                 the command of a task.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, which have presets
@@ -161,12 +162,14 @@ class Prescribed(NamedTuple):
 
     Attributes:
         pattern: of the joints.
+        ahead: what is added to the PD loop's actions; None for nothing.
         crouch: (joints,) angles held while settling, rad.
         control_timestep: s.
         stiffness, damping, settle, ramp, ramp_start: as in `Preset`.
     """
 
     pattern: Pattern
+    ahead: Ahead | None
     crouch: np.ndarray
     control_timestep: float | np.ndarray
     stiffness: float | np.ndarray
@@ -182,7 +185,8 @@ class Prescribed(NamedTuple):
             preset = preset._replace(phase_offsets=gait.offsets, duty_factor=gait.duty_factor)
         laid = pattern(body, preset)
         crouch = pattern(body, preset._replace(centre=preset.crouch)).centre if preset.crouch else laid.centre
-        return cls(laid, crouch, control_timestep(body), *(getattr(preset, name) for name in cls._fields[3:]))
+        numbers = (getattr(preset, name) for name in cls._fields[4:])
+        return cls(laid, ahead(body, preset), crouch, control_timestep(body), *numbers)
 
     @classmethod
     def stacked(cls, controls: Sequence[Self]) -> Self:
@@ -191,16 +195,23 @@ class Prescribed(NamedTuple):
         def stack(values):
             return np.stack([np.atleast_1d(value) for value in values])
 
-        patterns, *numbers = zip(*controls, strict=True)
-        return cls(Pattern(*map(stack, zip(*patterns, strict=True))), *map(stack, numbers))
+        patterns, aheads, *numbers = zip(*controls, strict=True)
+        if any(ahead is not None for ahead in aheads):
+            none = Ahead(*(np.zeros_like(field) for field in next(filter(None, aheads))))
+            added = Ahead(*map(stack, zip(*(ahead or none for ahead in aheads), strict=True)))
+        else:
+            added = None
+        return cls(Pattern(*map(stack, zip(*patterns, strict=True))), added, *map(stack, numbers))
 
     def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
-        """Return the actions (..., joints) after `clock` (...) control steps; nothing but the joints is felt."""
+        """Return the actions (..., joints) after `clock` (...) control steps; few presets feel more than the joints."""
         steps = clock[..., None]
-        walking = joint_targets(self.pattern, (self.control_timestep * steps)[..., 0])
+        time = (self.control_timestep * steps)[..., 0]
+        walking = joint_targets(self.pattern, time)
         targets = np.where(steps < self.settle, self.crouch, walking)
         ramp = (self.ramp_start + (1.0 - self.ramp_start) * steps / self.ramp).clip(max=1.0)
-        return torques(targets, angles, velocities, ramp * self.stiffness, self.damping)
+        added = 0.0 if self.ahead is None else self.ahead(self.pattern, time, rotations.yaw(np.asarray(quaternion)))
+        return torques(targets, angles, velocities, ramp * self.stiffness, self.damping, added)
 
 
 def pattern(body: Body, preset: Preset) -> Pattern:
@@ -209,11 +220,24 @@ def pattern(body: Body, preset: Preset) -> Pattern:
     Raises:
         ValueError: it does not fit the body; one line.
     """
+    return _laid_out(_pattern, body, preset)
+
+
+def ahead(body: Body, preset: Preset) -> Ahead | None:
+    """Return what a preset adds to the PD loop's actions, laid out over a body's joints; None for nothing.
+
+    Raises:
+        ValueError: it does not fit the body; one line.
+    """
+    return _laid_out(_ahead, body, preset)
+
+
+def _laid_out(function, body: Body, preset: Preset):
     legs, offsets = len(body.legs), len(preset.phase_offsets)
     if legs != offsets:
         raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
     try:
-        return _pattern(body, preset)
+        return function(body, preset)
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
 
@@ -234,3 +258,16 @@ def _pattern(body: Body, preset: Preset) -> Pattern:
                 angles = (preset.centre[joint.name], bend.stance, bend.swing)
                 rows.append((offset, 0.0, *(by_rank(angle, rank) for angle in angles)))
     return Pattern(preset.frequency, preset.duty_factor, *np.array(rows).T)
+
+
+def _ahead(body: Body, preset: Preset) -> Ahead | None:
+    if preset.torques is None and not preset.steering:
+        return None
+    amplitudes, steering = [], []
+    for leg, rank in zip(body.legs, body.ranks, strict=True):
+        for joint in leg.joints:
+            hip = joint.name == "hip"
+            sign = -1.0 if hip and leg.side == "left" else 1.0
+            amplitudes.append(sign * np.array(preset.torques[joint.name][rank]) if preset.torques else (0.0, 0.0))
+            steering.append(preset.steering if hip else 0.0)
+    return Ahead(*np.split(np.array(amplitudes), 2, axis=-1), np.array(steering))

@@ -1,7 +1,8 @@
 """The one law of all demonstrators (the paper's Section 5), as pure functions of arrays.
 
 A leg's hip sweeps linearly, back in stance and forth in swing; its other joints add a half-sine
-bell to their centre. A PD loop turns the distance to these targets into torques.
+bell to their centre. A PD loop turns the distance to these targets into torques. Beyond the paper,
+a preset may add torques ahead of any error: harmonics of the leg's phase, and steering by yaw.
 """
 
 from collections.abc import Mapping
@@ -43,9 +44,39 @@ def joint_targets(pattern: Pattern, time) -> np.ndarray:
     return pattern.centre + pattern.sweep * sweep + bend * np.sin(np.pi * progress)
 
 
-def torques(targets, angles, velocities, stiffness, damping) -> np.ndarray:
-    """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s)."""
-    return (stiffness * (targets - angles) - damping * velocities).clip(-1.0, 1.0)
+def torques(targets, angles, velocities, stiffness, damping, ahead=0.0) -> np.ndarray:
+    """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s).
+
+    Args:
+        targets: (..., joints) rad.
+        angles: (..., joints) rad.
+        velocities: (..., joints) rad/s.
+        stiffness: action per rad.
+        damping: action per rad/s.
+        ahead: (..., joints) actions that are added, whatever the error is.
+    """
+    return (stiffness * (targets - angles) - damping * velocities + ahead).clip(-1.0, 1.0)
+
+
+class Ahead(NamedTuple):
+    """Actions that a preset adds whatever the error is, per joint.
+
+    Attributes:
+        cosines: (joints, harmonics) of the leg's phase and its multiples.
+        sines: the same.
+        steering: (joints,) per rad of yaw, times the cosine of the leg's phase.
+    """
+
+    cosines: np.ndarray
+    sines: np.ndarray
+    steering: np.ndarray
+
+    def __call__(self, pattern: Pattern, time, yaw) -> np.ndarray:
+        """Return the actions (..., joints) at a time (...) in s, with the torso turned by a yaw (...), rad."""
+        phase = 2.0 * np.pi * (pattern.frequency * time[..., None] + pattern.offset)
+        multiples = phase[..., None] * np.arange(1, 1 + self.cosines.shape[-1])
+        waves = (self.cosines * np.cos(multiples) + self.sines * np.sin(multiples)).sum(axis=-1)
+        return waves + self.steering * yaw[..., None] * np.cos(phase)
 
 
 def felt(

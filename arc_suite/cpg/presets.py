@@ -35,6 +35,11 @@ class Preset(NamedTuple):
         bends: of the other joints, by name.
         crouch: angles held while settling, as `centre`; None for the centre. Legs drawn up catch a
             robot whom a reset with its feet in the ground has thrown.
+        torques: actions that are added whatever the error is, by joint and for each rank: amplitudes of
+            the cosines of the leg's phase and its multiples, then of their sines; a hip's positive
+            forwards. None for none.
+        steering: action of the hips per rad of yaw, times the cosine of the leg's phase; the same sign
+            left and right, so that a negative one turns back to where the robot started.
     """
 
     stiffness: float
@@ -49,10 +54,12 @@ class Preset(NamedTuple):
     centre: Mapping[str, ByRank]
     bends: Mapping[str, Bend]
     crouch: Mapping[str, ByRank] | None = None
+    torques: Mapping[str, tuple[tuple[float, ...], ...]] | None = None
+    steering: float = 0.0
 
 
 SPEEDS = ("slow", "medium", "fast")  # the published ones
-PRESETS = (*SPEEDS, "tuned", "steered", "surefooted")
+PRESETS = (*SPEEDS, "tuned", "refined", "steered", "surefooted")
 
 _hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=TRIPOD)
 _queen = functools.partial(
@@ -201,3 +208,82 @@ TUNINGS = {
         ),
     },
 }
+
+# What `refined` adds to `tuned`: steering and torques, by joint, rank and then cosines and sines of three multiples of
+# the leg's phase. Found by `arc-suite tune_cpg --numbers torques`.
+_REFINEMENTS = {
+    "queen": {
+        "steering": -0.326,
+        "torques": {
+            "hip": (
+                (-0.041, 0.022, -0.007, 0.043, -0.053, 0.015),
+                (0.014, 0.028, 0.005, -0.029, 0.036, 0.013),
+                (-0.039, 0.017, 0.023, -0.017, 0.041, 0.065),
+            ),
+            "knee": (
+                (-0.062, -0.106, -0.024, 0.007, -0.068, -0.003),
+                (-0.002, -0.004, -0.049, -0.045, -0.027, 0.018),
+                (0.035, -0.006, 0.012, 0.016, 0.096, 0.042),
+            ),
+            "ankle": (
+                (0.062, 0.138, -0.017, 0.035, -0.134, 0.007),
+                (0.1, -0.065, 0.004, -0.074, -0.008, 0.038),
+                (0.051, -0.066, 0.018, -0.109, -0.071, 0.02),
+            ),
+        },
+    },
+    "bastion": {
+        "steering": -0.279,
+        "torques": {
+            "hip": (
+                (-0.085, -0.004, -0.011, 0.05, -0.023, -0.05),
+                (0.122, 0.039, -0.012, 0.018, 0.005, -0.034),
+                (-0.07, 0.003, -0.013, -0.067, 0.019, -0.024),
+            ),
+            "ankle": (
+                (-0.024, 0.105, 0.041, 0.085, 0.045, -0.054),
+                (-0.036, 0.008, 0.079, 0.038, 0.022, -0.013),
+                (0.008, 0.012, 0.035, 0.03, 0.009, 0.0),
+            ),
+        },
+    },
+    "tick": {
+        "steering": -0.278,
+        "torques": {
+            "hip": (
+                (-0.09, 0.044, -0.065, 0.102, 0.098, 0.011),
+                (0.072, 0.082, -0.043, 0.179, 0.001, -0.052),
+                (-0.02, -0.002, 0.021, 0.032, 0.059, -0.028),
+            ),
+            "knee": (
+                (-0.014, -0.015, -0.054, -0.041, 0.039, -0.019),
+                (0.005, 0.015, 0.011, 0.001, 0.056, -0.039),
+                (-0.077, 0.005, -0.051, 0.076, 0.015, -0.015),
+            ),
+            "ankle": (
+                (-0.061, 0.036, -0.054, 0.13, -0.014, 0.038),
+                (0.052, -0.006, 0.075, 0.08, -0.032, -0.061),
+                (0.106, 0.036, -0.025, 0.063, 0.053, -0.044),
+            ),
+        },
+    },
+    "leaper": {
+        "steering": -0.203,
+        "torques": {
+            "hip": (
+                (-0.055, 0.054, 0.005, -0.048, -0.136, -0.032),
+                (-0.054, -0.038, 0.021, -0.062, -0.031, -0.005),
+            ),
+            "knee": (
+                (0.077, 0.051, -0.081, -0.051, 0.061, 0.03),
+                (-0.164, -0.068, 0.019, -0.053, 0.025, 0.011),
+            ),
+            "ankle": (
+                (-0.051, 0.065, 0.161, 0.071, 0.179, -0.093),
+                (0.312, 0.048, -0.088, 0.19, 0.009, -0.101),
+            ),
+        },
+    },
+}
+for _robot, _added in _REFINEMENTS.items():
+    TUNINGS[_robot]["refined"] = TUNINGS[_robot]["tuned"]._replace(**_added)

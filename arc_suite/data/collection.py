@@ -16,7 +16,7 @@ from arc_suite.data.dataset import quoted
 from arc_suite.data.settings import Settings
 from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.tasks import terms
+from arc_suite.tasks import Task, terms
 
 ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
 
@@ -93,8 +93,8 @@ def _check(settings: Settings, episodes: int) -> None:
     _policy(settings, rows=1)  # finds out whether there is such a policy
 
 
-def _policy(settings: Settings, rows: int) -> policies.Policy:
-    return policies.policy(settings.policy, settings.body, settings.presets, rows, settings.noise)
+def _policy(settings: Settings, rows: int, task: Task | None = None) -> policies.Policy:
+    return policies.policy(settings.policy, settings.body, settings.presets, rows, settings.noise, task)
 
 
 def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
@@ -141,7 +141,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
         unit_scale=True,
     ) as bar:
         try:
-            for step in rollouts.play(environment, _policy(settings, rows), seeds, settings.steps):
+            for step in rollouts.play(environment, _policy(settings, rows, environment.task), seeds, settings.steps):
                 bar.update(step.playing)
                 for episode in step.finished:
                     pending[episode.seed - settings.seed] = episode._replace(preset=settings.preset(episode.seed))
@@ -185,6 +185,6 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
     """Return the mean return over the seeds of the evaluation protocol, one in each row of the environment."""
     count = environment.num_envs
-    played = rollouts.play(environment, _policy(settings, count), range(count), settings.steps)
+    played = rollouts.play(environment, _policy(settings, count, environment.task), range(count), settings.steps)
     totals = {episode.seed: episode.total for step in played for episode in step.finished}
     return float(np.mean([totals[seed] for seed in range(count)]))  # in one order, whichever falls first

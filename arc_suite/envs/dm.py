@@ -208,6 +208,8 @@ class TaskRun(control.Task):
             self._carry = self.definition.carry(self.memory)
         self._stream_begins = False
         start = self.definition.start(self._random, self._carry)
+        if start.model:
+            physics.change_model(start.model)
         data = physics.data.ptr
         data.qpos[:], data.qvel[:] = start.qpos, start.qvel
         if start.mocap_pos is not None:

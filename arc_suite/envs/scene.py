@@ -10,7 +10,9 @@ import numpy as np
 from arc_suite import checks, registry
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks.contract import STEPS, Scene, Task
+from arc_suite.tasks import modified, modifiers
+from arc_suite.tasks.contract import CHANGEABLE, STEPS, Scene, Task
+from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
 
 _NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
@@ -23,7 +25,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         domain_name: a body; see `registry.body_of`.
         task_name: see `registry.task_of`.
         task_kwargs: settings of the task, and for every task `time_limit` (s, may be infinite; 1000
-            control steps by default) and `arena` (a name, or an `Arena`).
+            control steps by default), `arena` (a name, or an `Arena`) and those of `tasks.modifiers`.
 
     Raises:
         ValueError: an unknown name, or a value that does not fit; one line that names it.
@@ -34,6 +36,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     time_limit, arena = settings.pop("time_limit", None), settings.pop("arena", None)
     if arena is not None and kind.own_arena:
         raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
+    changes = {**kind.modifiers, **{name: settings.pop(name) for name in modifiers.NAMES if name in settings}}
     settings = kind.fitted(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)
@@ -44,8 +47,28 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         layout=layout(model, body.joint_names, body.part_names, body.foot_names),
         standing=model.qpos0.copy(),
         control_timestep=step,
+        model={name: getattr(model, name).copy() for name in CHANGEABLE},
     )
-    return kind(scene, settings, _step_limit(time_limit, step)), model
+    task = kind(scene, settings, _step_limit(time_limit, step))
+    return modified.modified(task, changes) if changes else task, model
+
+
+def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> Symmetry:
+    """Return the exact mirror maps of a task's observations and actions, left for right.
+
+    `symmetry(...).observation` maps observation vectors (..., size), `.action` actions (..., joints); see
+    `tasks.contract.Task.symmetry`.
+
+    Args:
+        domain_name: as in `load`.
+        task_name: as in `load`.
+        task_kwargs: as in `load`.
+
+    Raises:
+        ValueError: the body, the gait or the task has no mirror image, or see `load`; one line.
+        OSError: a file that cannot be read.
+    """
+    return prepared(domain_name, task_name, task_kwargs)[0].symmetry
 
 
 def _step_limit(time_limit, step: float) -> float:

@@ -379,9 +379,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             if not self._streams_begin[row]:
                 self._carries[row] = task.carry(_mapped(lambda field, row=row: field[row], self._memory))
             starts.append(task.start(self._randoms[row], self._carries[row]))
-        qpos, qvel, memories, mocap = zip(*starts, strict=True)
+        qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         self._streams_begin &= ~rows
-        self.batch.reset(rows, np.stack(qpos), np.stack(qvel), None if mocap[0] is None else np.stack(mocap))
+        mocap = None if mocap[0] is None else np.stack(mocap)
+        self.batch.reset(rows, np.stack(qpos), np.stack(qvel), mocap, models)
         memory, readings = _mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(rows))
         lifted = task.lift(memory, readings)
         if lifted is not None:

@@ -1,7 +1,7 @@
 """Policies: one protocol of acting, and policies by name."""
 
 from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, is_file, policy, preset_names
-from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum, alone
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
 
 __all__ = [
     "HELP",
@@ -10,6 +10,7 @@ __all__ = [
     "Individuals",
     "Mixture",
     "Policy",
+    "Positioned",
     "Script",
     "Sum",
     "alone",

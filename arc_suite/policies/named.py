@@ -12,10 +12,11 @@ from arc_suite import checks
 from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.policies import network
-from arc_suite.policies.protocol import Individuals, Mixture, Policy, Script, Sum
+from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
+from arc_suite.tasks import Task
 
 _ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
@@ -60,7 +61,12 @@ def preset_names() -> tuple[str, ...]:
 
 
 def policy(
-    name: str, robot: str | Body, presets: str | Sequence[str] = "medium", rows: int = 1, noise: float = 0.0
+    name: str,
+    robot: str | Body,
+    presets: str | Sequence[str] = "medium",
+    rows: int = 1,
+    noise: float = 0.0,
+    task: Task | None = None,
 ) -> Policy:
     """Make a policy for the rows of a batch, or for one environment; see `protocol.alone`.
 
@@ -75,6 +81,8 @@ def policy(
             that take turns from seed to seed.
         rows: of the batch.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
+        task: that it is to act in: the demonstrator, whose actions are torques, then gives positions where
+            the task asks for them, as `protocol.Positioned`. None for torques. Other policies give what they give.
 
     Raises:
         ValueError: an unknown name, or a value out of range; one line that names it and the nearest
@@ -92,6 +100,8 @@ def policy(
         made = _from_path(name, body, rows)
     else:
         made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, rows)
+        if name == "cpg" and task is not None and task.actions == "position":
+            made = Positioned(made, task)
     return Sum(made, _noise(body, noise, rows)) if noise else made
 
 

@@ -7,7 +7,9 @@ import dm_env
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.cpg.law import felt
 from arc_suite.envs.scene import checked_action
+from arc_suite.tasks.modified import Modified
 
 
 class Policy(Protocol):
@@ -65,6 +67,31 @@ class Sum:
     def act(self, observation, rewards) -> np.ndarray:
         """Return the sum of the actions."""
         return sum(policy.act(observation, rewards) for policy in self._policies)
+
+
+class Positioned:
+    """A policy of torques where motors hold positions: its actions are the positions for which they give its torques.
+
+    They do so where the observation is exact, and as far as joints reach.
+    """
+
+    def __init__(self, policy: Policy, task: Modified):
+        """Take a policy, and the task with `actions="position"` that it is to act in."""
+        self._policy, self._task = policy, task
+
+    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some rows."""
+        self._policy.begin(rows, seeds)
+
+    def act(self, observation, rewards) -> np.ndarray:
+        """Return the positions.
+
+        Raises:
+            ValueError: an observation without the blocks that tell how the joints are; one line.
+        """
+        torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
+        _, angles, speeds = felt(observation, torques.shape[-1])
+        return self._task.positions(torques, angles, speeds)
 
 
 class Mixture:

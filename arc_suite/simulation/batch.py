@@ -2,15 +2,17 @@
 
 import copy
 import types
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import mujoco
 import mujoco.batch
 import numpy as np
 
 from arc_suite.simulation import forks, timers
+from arc_suite.simulation.model import change
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_OF_MODEL = "model_"  # with which names of models' fields begin in a snapshot
 
 
 class Batch:
@@ -41,8 +43,9 @@ class Batch:
         self._forks = forks.count
         self._simulations = mujoco.batch.Batch(model, rows, threads)
         forks.keep(self._simulations)
-        self._silent = copy.copy(model)
-        self._silent.opt.disableflags |= _SENSOR
+        self._own = None  # a model of its own for each row, once one has been changed
+        self._changed = {}  # fields that ever were, as compiled
+        self._silent = _silent(model)
         # What is bound is filled by every call, so it must be bound before the first.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
@@ -75,11 +78,18 @@ class Batch:
             try:
                 simulations.step(rows, nstep - 1)
             finally:
-                simulations.set_models(None)
+                simulations.set_models(self._own)
             simulations.step(rows)
         return simulations.warning[..., 1].any(axis=-1)
 
-    def reset(self, rows: np.ndarray, qpos: np.ndarray, qvel: np.ndarray, mocap_pos: np.ndarray | None = None) -> None:
+    def reset(
+        self,
+        rows: np.ndarray,
+        qpos: np.ndarray,
+        qvel: np.ndarray,
+        mocap_pos: np.ndarray | None = None,
+        models: Sequence[Mapping[str, np.ndarray]] = (),
+    ) -> None:
         """Restart some rows, as dm_control's `reset_context` does.
 
         Args:
@@ -87,12 +97,17 @@ class Batch:
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
             mocap_pos: (restarted, nmocap, 3) positions of the arena's movable bodies; None for the model's.
+            models: (restarted,) fields of the model by name that differ in a row until its next reset; empty for none.
 
         Raises:
             ForkError: made before a fork.
         """
         self._check_process()
+        self._simulations.set_models(None)
         self._simulations.reset(rows)  # runs mj_forward, from whose result the solver starts next
+        if self._own is not None or any(models):
+            self._change(rows, models or [{}] * len(qpos))
+        self._simulations.set_models(self._own)
         self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
         if mocap_pos is not None:
             self._simulations.bind("mocap_pos")[rows] = mocap_pos
@@ -112,17 +127,33 @@ class Batch:
         self.data.qpos[rows] = qpos
         self._simulations.forward(rows)
 
+    def _change(self, rows: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
+        model = self._simulations.model
+        if self._own is None:
+            self._own, self._silent = ([copy.copy(each) for _ in rows] for each in (model, self._silent))
+        self._changed |= {name: getattr(model, name) for fields in models for name in fields}
+        scratch = mujoco.MjData(model)
+        for row, fields in zip(np.flatnonzero(rows), models, strict=True):
+            for own in (self._own[row], self._silent[row]):
+                change(own, self._changed | fields, scratch)
+
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return copies of the simulations' state and of `data`, from which `restore` goes on to the bit."""
+        """Return copies of the simulations' state, of `data` and of models' fields, from which `restore` goes on."""
         fields = {name: array.copy() for name, array in vars(self.data).items()}
-        return {"state": self._simulations.state.copy(), **fields}
+        models = {f"{_OF_MODEL}{name}": np.stack([getattr(own, name) for own in self._own]) for name in self._changed}
+        return {"state": self._simulations.state.copy(), **fields, **models}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from what `snapshot` returned.
+        """Go on, to the bit, from what `snapshot` returned.
 
         Raises:
             KeyError, ValueError: an array is missing or does not fit.
         """
+        models = {name.removeprefix(_OF_MODEL): array for name, array in arrays.items() if name.startswith(_OF_MODEL)}
+        if models or self._own is not None:
+            rows = range(self._simulations.nsim)
+            self._change(np.ones(len(rows), bool), [{name: models[name][row] for name in models} for row in rows])
+            self._simulations.set_models(self._own)
         self._simulations.state[...] = arrays["state"]
         for name, bound in vars(self.data).items():
             _fill(bound, arrays[name])
@@ -139,6 +170,13 @@ class Batch:
     def _check_process(self) -> None:
         if self._forks != forks.count:
             forks.refuse("vector environment")
+
+
+def _silent(model: mujoco.MjModel) -> mujoco.MjModel:
+    """A copy of a model that computes no sensors."""
+    model = copy.copy(model)
+    model.opt.disableflags |= _SENSOR
+    return model
 
 
 def _fill(array: np.ndarray, values: np.ndarray) -> None:

@@ -2,6 +2,7 @@
 
 import copy
 import functools
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -42,6 +43,19 @@ def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
     if euler_suffices(model):
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     return model
+
+
+def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: mujoco.MjData) -> None:
+    """Write fields of a model, by name, and bring up to date what MuJoCo has derived from them.
+
+    Args:
+        model: to write to.
+        fields: values by name.
+        scratch: data of such a model, which nobody needs.
+    """
+    for name, values in fields.items():
+        getattr(model, name)[:] = values
+    mujoco.mj_setConst(model, scratch)
 
 
 def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:

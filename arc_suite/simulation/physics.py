@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -12,7 +13,7 @@ from dm_control.mujoco import wrapper
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
-from arc_suite.simulation.model import compiled
+from arc_suite.simulation.model import change, compiled
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
@@ -48,14 +49,29 @@ class Physics(dm_mujoco.Physics):
     def _reload_from_data(self, data):
         super()._reload_from_data(data)
         self._decorated = None
+        self._unchanged, self._scratch = {}, None
         self.shown_reward = None
         self._forks = forks.count
         self._option = self.model.ptr.opt
 
     def reset(self, keyframe_id=None) -> None:
-        """Restart from the default pose, as in dm_control."""
+        """Restart from the default pose, as in dm_control, with the model as it was before `change_model`."""
         self._check_process()
+        if self._unchanged:
+            self._change(self._unchanged)
+            self._unchanged = {}
         super().reset(keyframe_id)
+
+    def change_model(self, fields: Mapping[str, np.ndarray]) -> None:
+        """Give fields of the model, by name, other values until the next reset."""
+        model = self.model.ptr
+        self._unchanged = {name: getattr(model, name).copy() for name in fields} | self._unchanged
+        self._change(fields)
+
+    def _change(self, fields: Mapping[str, np.ndarray]) -> None:
+        if self._scratch is None:
+            self._scratch = mujoco.MjData(self.model.ptr)
+        change(self.model.ptr, fields, self._scratch)
 
     def step(self, nstep: int = 1) -> None:
         """Advance by `nstep` substeps.
@@ -131,15 +147,16 @@ class Physics(dm_mujoco.Physics):
         """Return an independent copy of the simulation, as it stands."""
         copied = super().copy(share_model)
         mujoco.mj_copyData(copied.data.ptr, copied.model.ptr, self.data.ptr)
-        copied.body, copied.arena = self.body, self.arena
+        copied.body, copied.arena, copied._unchanged = self.body, self.arena, self._unchanged
         return copied
 
     def __getstate__(self):
-        return super().__getstate__(), self.body, self.arena
+        return super().__getstate__(), self.body, self.arena, self._unchanged
 
     def __setstate__(self, state):
-        data, self.body, self.arena = state
+        data, self.body, self.arena, unchanged = state
         # dm_control recomputes the derived quantities; here they are one substep behind the state.
         as_it_stands = copy.copy(data.ptr)
         super().__setstate__(data)
         mujoco.mj_copyData(data.ptr, data.model.ptr, as_it_stands)
+        self._unchanged = unchanged

@@ -79,7 +79,8 @@ def source(name: str, preset: str = "medium") -> Source:
 def _played(name: str, preset: str) -> Source:
     def takes(stage, seeds):
         seeds = [checks.seed(seed) for seed in seeds]
-        environment, policy = load_environment(*stage), policies.policy(name, stage.body, preset)
+        environment = load_environment(*stage)
+        policy = policies.policy(name, stage.body, preset, task=environment.task.definition)
         return [functools.partial(record, environment, policy, seed) for seed in seeds]
 
     return Source(f"cpg {preset}" if name == "cpg" else name, None, takes)

@@ -27,6 +27,7 @@ import collections
 import dataclasses
 import functools
 import itertools
+import types
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
@@ -34,13 +35,19 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
+from arc_suite.tasks import mirrors
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.clock import Clock
+from arc_suite.tasks.mirrors import Mirror, Symmetry
 from arc_suite.tasks.readings import Layout, Readings
 from arc_suite.tasks.terms import Parameters
 
 STEPS = 1000  # control steps of an episode
+
+# Fields of `MjModel` that an episode can have its own values of: masses and frictions.
+CHANGEABLE = ("body_mass", "body_inertia", "pair_friction", "geom_friction")
 
 _CLEAR = 0.01  # of the standing height, by which a lift brings feet clear of the ground
 
@@ -54,6 +61,7 @@ class Scene(NamedTuple):
         layout: of the body in the simulation's arrays.
         standing: (nq,) the pose in which it stands: torso position and quaternion, joint angles.
         control_timestep: s between two actions.
+        model: the fields of `MjModel` that `CHANGEABLE` names, as compiled.
     """
 
     body: Body
@@ -61,6 +69,7 @@ class Scene(NamedTuple):
     layout: Layout
     standing: np.ndarray
     control_timestep: float
+    model: Mapping[str, np.ndarray]
 
 
 class Start(NamedTuple):
@@ -71,12 +80,14 @@ class Start(NamedTuple):
         qvel: (nv,) velocities.
         memory: a NamedTuple of numbers and arrays, replaced from step to step and never written in place.
         mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
+        model: fields of `MjModel` that differ in this episode, by name.
     """
 
     qpos: np.ndarray
     qvel: np.ndarray
     memory: Any
     mocap_pos: np.ndarray | None = None
+    model: Mapping[str, np.ndarray] = types.MappingProxyType({})
 
 
 class Inputs(NamedTuple):
@@ -105,6 +116,8 @@ class Task(ABC):
         commands: what may be set from outside while an episode runs, such as by a player's stick:
             size by name of a field of the memory; NaN stands for what the task itself would do.
         own_arena: whether it takes place in an arena of its own, and in no other.
+        modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
+        actions: what an action asks of a motor: "torque" or "position".
     """
 
     scene: Scene
@@ -116,6 +129,8 @@ class Task(ABC):
     reads: ClassVar[tuple[str, ...]] = reading.FIELDS
     commands: ClassVar[Mapping[str, int]] = {}
     own_arena: ClassVar[bool] = False
+    modifiers: ClassVar[Mapping[str, Any]] = {}
+    actions: ClassVar[str] = "torque"
 
     @classmethod
     @abstractmethod
@@ -150,6 +165,30 @@ class Task(ABC):
     def target_velocity(self) -> float | None:
         """The velocity along world x that is asked for all the time, m/s; None where it changes or is not."""
         return None
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """How the blocks of the observation are mirrored across the x-z plane, by name.
+
+        Raises:
+            ValueError: what is asked for is not the same on both sides, or the task does not tell; one line.
+        """
+        raise ValueError(f"task {self.name}: does not tell how its observation is mirrored")
+
+    @functools.cached_property
+    def symmetry(self) -> Symmetry:
+        """The mirror maps of observations and actions.
+
+        A walk and its mirror image, from the mirrored start by the mirrored actions, earn the same, the
+        clock of the gait half a cycle later where left and right take turns. On ground that is not level
+        the image walks on mirrored ground.
+
+        Raises:
+            ValueError: the body is not its own mirror image, or see `mirrors`; one line.
+        """
+        action = mirrors.joints(mirror.image(self.scene.body))
+        blocks = self.mirrors
+        return Symmetry(mirrors.joined(blocks[name] for name in self.blocks), action)
 
     def first(self) -> Any:
         """Return the carry with which a new stream of episodes begins."""

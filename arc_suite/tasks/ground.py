@@ -15,8 +15,9 @@ from arc_suite import checks
 from arc_suite.arenas import Arena, terrain
 from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import steer, walk
+from arc_suite.tasks import modifiers, steer, walk
 from arc_suite.tasks.contract import STEPS, Start
+from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.terms import Parameters
 
@@ -113,7 +114,7 @@ class Lanes(steer.Steer):
     def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return steer's settings, with those of `Ground`."""
         for name in overrides:
-            checks.name(name, (*Ground._fields, *walk.NAMES), f"setting of {cls.name}")
+            checks.name(name, (*Ground._fields, *walk.NAMES), f"setting of {cls.name}", near=modifiers.NAMES)
         own = Ground()._asdict() | {name: value for name, value in overrides.items() if name in Ground._fields}
         ground = Ground(
             checks.number("difficulty", own["difficulty"], 0.0, 1.0),
@@ -138,6 +139,12 @@ class Lanes(steer.Steer):
     def blocks(self) -> Mapping[str, int]:
         """Steer's, and the height scan."""
         return {**super().blocks, "scan": SCAN.shape[1]}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """Steer's; what is seen on the left is seen on the right, as on mirrored ground."""
+        places = np.arange(SCAN.shape[1]).reshape(len(AHEAD), len(ASIDE))[:, ::-1].ravel()
+        return {**super().mirrors, "scan": Mirror(places, np.ones(len(places), np.int8))}
 
     @functools.cached_property
     def reach(self) -> float:
@@ -205,13 +212,9 @@ class Lanes(steer.Steer):
         return beyond | (abs(y - memory.lane) > OFF_LANE * unit)
 
     def progress(self, memory: Memory) -> dict:
-        """Return `distance`, a share of what was asked for; steer's figures; whether a foot `sank`, and the `level`."""
-        return {
-            "distance": self.distance(memory),
-            **super().progress(memory),
-            "sank": self.sunk(memory) * 1.0,
-            "level": memory.level * 1.0,
-        }
+        """Return `distance`, as a share; steer's figures; whether a foot `sank`; and the `level` of a curriculum."""
+        figures = {"distance": self.distance(memory), **super().progress(memory), "sank": self.sunk(memory) * 1.0}
+        return figures | ({"level": memory.level * 1.0} if self.settings.ground.curriculum else {})
 
     def distance(self, memory: Memory):
         """Return the way along the lane (...) as a share of that at the target velocity.

@@ -16,15 +16,17 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
+from arc_suite.tasks import mirrors, terms, walk
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks import terms, walk
 from arc_suite.tasks.contract import Start
 from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.mirrors import PLANAR, Mirror
 from arc_suite.tasks.readings import Readings, component
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
 COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
 LOWEST = 0.3  # healthy height of the torso over the ground, in standing heights
+LYING = 0.5  # of the weight: who has it carried by the torso itself lies on the ground
 LEAST_UPRIGHT = 0.4  # healthy cosine of the torso's tilt
 # Walk's weights of rates in SI units, as Queen has them in units of her own.
 RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
@@ -81,6 +83,11 @@ class Steer(walk.Walk):
     def blocks(self) -> Mapping[str, int]:
         """Walk's, and the command beside the motion that is to follow it."""
         return {**super().blocks, "command": 6}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """Walk's; what goes left goes right, and turns the other way."""
+        return {**super().mirrors, "command": mirrors.joined([PLANAR, PLANAR])}
 
     @functools.cached_property
     def units(self) -> np.ndarray:
@@ -167,9 +174,10 @@ class Steer(walk.Walk):
         return {name: own.get(name, walked.get(name)) for name in self.settings.weights}
 
     def healthy(self, readings: Readings):
-        """Return whether the torso is off the ground and upright: (...) booleans."""
+        """Return whether the torso is upright, and high enough without being carried by the ground: (...) booleans."""
         high = readings.torso_height >= LOWEST * self.scene.body.torso.standing_height
-        return high & (rotations.upright(readings.torso_quaternion) >= LEAST_UPRIGHT)
+        lies = component(readings.contact_forces, 5) >= LYING  # upwards on the torso
+        return high & ~lies & (rotations.upright(readings.torso_quaternion) >= LEAST_UPRIGHT)
 
     def observe(self, memory: Memory, readings: Readings) -> dict:
         """Return walk's blocks as the torso heads, without a clock at a stop; and the command beside the motion."""

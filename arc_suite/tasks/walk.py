@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import checks, robots
-from arc_suite.robots import gaits
+from arc_suite.robots import gaits, mirror
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import terms
+from arc_suite.tasks import mirrors, modifiers, terms
 from arc_suite.tasks.clock import TWO_PI, Clock
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.fitting import fitted_noise, fitted_settings
+from arc_suite.tasks.mirrors import AXIAL, POLAR, QUATERNION, SAME, Mirror
 from arc_suite.tasks.readings import Readings, component
 from arc_suite.tasks.terms import Parameters
 
@@ -146,7 +147,7 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
     row = robots.row(SETTINGS, body, "walk")
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
     for name in overrides:
-        checks.name(name, NAMES, "setting of walk")
+        checks.name(name, NAMES, "setting of walk", near=modifiers.NAMES)
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)
@@ -260,6 +261,31 @@ class Walk(Task):
         body = self.scene.body
         joints, parts = len(body.joint_names), len(body.part_names)
         return {"posture": 5 + joints, "velocities": 6 + joints, "contact_forces": 6 * parts, "gait_clock": 2}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """Of a gait whose sides take turns, the mirrored clock is half a cycle later: its sine and cosine change sign.
+
+        Raises:
+            ValueError: the body, the gait or the angles of the posture are not the same on both sides; one line.
+        """
+        image = mirror.image(self.scene.body)
+        joints, default = mirrors.joints(image), self.parameters.default_angles
+        if not np.allclose(joints(default), default):
+            raise ValueError("default_angles: expected mirrored poses left and right")
+        return {
+            "posture": mirrors.joined([SAME, QUATERNION, joints]),
+            "velocities": mirrors.joined([POLAR, AXIAL, joints]),
+            "contact_forces": mirrors.of_each(image.parts, mirrors.joined([AXIAL, POLAR])),
+            "gait_clock": self._mirrored_clock(image.legs),
+        }
+
+    def _mirrored_clock(self, across: np.ndarray) -> Mirror:
+        offsets = self.parameters.phase_offsets
+        for sign in (1, -1):  # of the clock's sine and cosine, whose leads over the legs across are 0 or half a cycle
+            if np.allclose(np.exp(1j * offsets[across]), sign * np.exp(1j * offsets)):
+                return Mirror.signed(sign, sign)
+        raise ValueError("phase_offsets: expected legs across from each other to move together, or half a cycle apart")
 
     @functools.cached_property
     def clock(self) -> Clock:

@@ -44,6 +44,7 @@ class Judge:
         steps: int,
         task: str = "walk",
         task_kwargs: Mapping[str, Any] | None = None,
+        skipped: int = 0,
     ):
         """Allocate the rows.
 
@@ -54,11 +55,12 @@ class Judge:
             steps: control steps of an episode.
             task: name of the task, whose reward has the terms of `TERMS`.
             task_kwargs: its settings, as in `arc_suite.load`.
+            skipped: first steps that count for neither rewards nor style.
 
         Raises:
             ValueError: a task whose reward has other terms; one line.
         """
-        self._body, self._shape, self._steps = body, (presets, episodes), steps
+        self._body, self._shape, self._steps, self._skipped = body, (presets, episodes), steps, skipped
         self._environment = VectorEnv(body, task, presets * episodes, task_kwargs=task_kwargs)
         there = self._environment.task.settings.weights
         if not set(TERMS) <= there.keys():
@@ -78,19 +80,20 @@ class Judge:
         for step in range(self._steps):
             actions = control(np.full(upright.size, step), *felt(split(observations), joints))
             observations, rewards, fallen, _, info = self._environment.step(actions)
-            totals += rewards * upright
-            lengths += upright
+            counted = upright & (step >= self._skipped)
+            totals += rewards * counted
+            lengths += counted
             uprightness = rotations.upright(felt(split(observations), joints)[0])
             costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all rows start anew
             costs["tilt"] = 1.0 - uprightness**2
             for name, cost in costs.items():
-                style[name] += cost * upright
+                style[name] += cost * counted
             tipping = np.where(upright, np.maximum(tipping, np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)), tipping)
             upright &= ~fallen
         return Score(
-            rewards=(totals / self._steps).reshape(self._shape),
+            rewards=(totals / (self._steps - self._skipped)).reshape(self._shape),
             falls=~upright.reshape(self._shape),
-            style={name: (total / lengths).reshape(self._shape) for name, total in style.items()},
+            style={name: (total / lengths.clip(1)).reshape(self._shape) for name, total in style.items()},
             tipping=tipping.reshape(self._shape),
         )
 

@@ -2,8 +2,8 @@
 
 A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
 generation and the same for all of its candidates, less two penalties: for a style that is worse
-than that of the preset from which the search sets out, in the same episodes, and for tipping over
-in hard starts, those of many that throw this preset about most.
+than that of the preset `medium`, in the same episodes, and for tipping over in hard starts, those
+of many that throw this preset about most.
 """
 
 from collections.abc import Mapping
@@ -14,10 +14,9 @@ import numpy as np
 from arc_suite.cpg.presets import TUNINGS, Preset
 from arc_suite.robots import ROBOTS
 from arc_suite.tuning.judge import STYLE, Judge, Score
-from arc_suite.tuning.space import Space
+from arc_suite.tuning.space import SPACES
 
 SPREAD = 0.5  # of the first generation, in scales of the numbers
-LEADS = 20  # of all legs over the clock, tried beforehand
 HARD = 8  # starts that candidates are tried in
 
 _EXCESS = 1.5  # reward that a cost of style twice as large takes
@@ -35,7 +34,7 @@ class Generation(NamedTuple):
         fitness: of its candidates.
         reward: mean over the episodes of the fittest.
         tipping: of the fittest in the hard starts; see `Score`.
-        style: the fittest's costs of style as shares of the origin's, in the order of `judge.STYLE`.
+        style: the fittest's costs of style as shares of medium's, in the order of `judge.STYLE`.
     """
 
     fitness: list[float]
@@ -45,7 +44,7 @@ class Generation(NamedTuple):
 
 
 class Search:
-    """A search about a robot's preset `medium`, by generations.
+    """A search about a robot's preset, by generations.
 
     It is determined by its arguments and the fitness of its generations, so that one that was
     broken off goes on where it was told of these.
@@ -62,17 +61,19 @@ class Search:
         episodes: int,
         steps: int,
         starts: int,
+        numbers: str = "law",
         task: str = "walk",
         task_kwargs: Mapping[str, Any] | None = None,
     ):
-        """Judge `medium`, with leads over its clock too; the best one is where the search sets out.
+        """Judge `medium` and where the search may set out; it does from the best.
 
         Args:
             robot: one that has presets.
             seed: of the search and its episodes.
             episodes: by which a candidate is judged.
             steps: control steps of each.
-            starts: of which the hard ones are taken, at least `HARD`.
+            starts: of which the hard ones are taken, at least `HARD`; 0 for none.
+            numbers: that are searched, a name of `space.SPACES`.
             task: name of the task.
             task_kwargs: its settings, as in `arc_suite.load`.
 
@@ -82,24 +83,27 @@ class Search:
         """
         import cma  # of the extra "tune"
 
-        body, medium = ROBOTS[robot], TUNINGS[robot]["medium"]
-        self._space, self._episodes = Space(body, medium), episodes
+        body, self._medium, kind = ROBOTS[robot], TUNINGS[robot]["medium"], SPACES[numbers]
+        self._space, self._episodes = kind.space(body, TUNINGS[robot][kind.preset]), episodes
         self._first = _SEEDS * (1 + seed)
         self._starts = range(self._first, self._first + starts)
-        leads = [lead / LEADS for lead in range(LEADS)]
-        presets = [medium, *(self._space.preset(self._space.vector(lead)) for lead in leads)]
+        origins = self._space.origins()
+        presets = [self._medium, *map(self._space.preset, origins)]
         play = {"task": task, "task_kwargs": task_kwargs}
-        score = _judged(body, presets, range(self._first, self._first + episodes), steps, play)
-        self.reward, *by_lead = score.rewards.mean(axis=-1).tolist()
-        tipping = _judged(body, [medium], self._starts, _START_STEPS, play).tipping[0]
-        self._hard = [self._starts[index] for index in np.argsort(tipping, stable=True)[-HARD:]]
-        self._origin = self._space.vector(leads[np.argmax(by_lead)])
+        walk = play | {"skipped": kind.skipped}
+        score = _judged(body, presets, range(self._first, self._first + episodes), steps, walk)
+        self.reward, *by_origin = score.rewards.mean(axis=-1).tolist()
+        self._origin = origins[np.argmax(by_origin)]
         self._scale = np.array([number.scale for number in self._space.ranges()])
         options = {"randn": np.random.RandomState(seed).randn, "seed": np.nan, "verbose": -9}
+        options |= {} if kind.candidates is None else {"popsize": kind.candidates}
         self._strategy = cma.CMAEvolutionStrategy(np.zeros_like(self._origin), SPREAD, options)
         self.candidates = self._strategy.popsize
-        self._judge = Judge(body, self.candidates + 1, episodes, steps, **play)
-        self._judge_of_starts = Judge(body, self.candidates, HARD, _START_STEPS, **play)
+        self._judge, self._judge_of_starts = Judge(body, self.candidates + 1, episodes, steps, **walk), None
+        if starts:
+            tipping = _judged(body, [self._medium], self._starts, _START_STEPS, play).tipping[0]
+            self._hard = [self._starts[index] for index in np.argsort(tipping, stable=True)[-HARD:]]
+            self._judge_of_starts = Judge(body, self.candidates, HARD, _START_STEPS, **play)
         self._generations = 0
 
     def step(self, fitness: list[float] | None = None) -> Generation | None:
@@ -129,8 +133,10 @@ class Search:
 
     def _judged(self, presets) -> Generation:
         first = self._starts.stop + self._generations * self._episodes
-        score = self._judge([*presets, self._space.origin], range(first, first + self._episodes))
-        tipping = self._judge_of_starts(presets, self._hard).tipping.mean(axis=-1)
+        score = self._judge([*presets, self._medium], range(first, first + self._episodes))
+        tipping = np.zeros(len(presets))
+        if self._judge_of_starts:
+            tipping = self._judge_of_starts(presets, self._hard).tipping.mean(axis=-1)
         rewards = score.rewards[:-1].mean(axis=-1)
         costs = np.stack([score.style[name].mean(axis=-1) for name in STYLE], axis=-1)
         style = costs[:-1] / costs[-1]

@@ -1,5 +1,10 @@
-"""Spaces of a search: the numbers in which presets of a robot may differ, as vectors."""
+"""Spaces of a search: the numbers in which presets of a robot may differ, as vectors.
 
+`SPACES` names them: those of the paper's law about `medium`, and those of the torques that are added
+to it about `tuned`.
+"""
+
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -43,6 +48,11 @@ _BY_JOINT_AND_RANK = {
     "swing": Range(10.0, -120.0, 120.0, 1),
 }
 _DECIMALS = 4  # of all numbers of a preset
+LEADS = 20  # of all legs over the clock, from which a search about the law may set out
+HARMONICS = 3  # of torques
+_AMPLITUDE = Range(0.08, -1.0, 1.0, 3)
+_STEERING = Range(0.1, -1.0, 1.0, 3)
+_STEERED = -0.2  # from which a search for torques sets out; without it, what it finds drifts
 
 
 class Space(NamedTuple):
@@ -71,9 +81,13 @@ class Space(NamedTuple):
         by_rank = [*_BY_RANK.values(), *len(self.origin.bends) * list(_BY_JOINT_AND_RANK.values())]
         return [*_SHARED.values(), *(number for number in by_rank for _ in range(self.ranks))]
 
+    def origins(self) -> list[np.ndarray]:
+        """Return the vectors of which the best is where a search sets out: the preset with leads over its clock."""
+        return [self.vector(lead / LEADS) for lead in range(LEADS)]
+
     def rounded(self, vector: np.ndarray) -> np.ndarray:
         """Return a vector (size,) to the decimals that matter."""
-        return np.array([round(value, number.decimals) for value, number in zip(vector, self.ranges(), strict=True)])
+        return _rounded(vector, self.ranges())
 
     def vector(self, lead: float = 0.0) -> np.ndarray:
         """Return the vector (size,) of the preset itself, but for a lead of all legs in cycles."""
@@ -109,3 +123,77 @@ class Space(NamedTuple):
 
     def _by_rank(self, angle: ByRank) -> Iterable[float]:
         return angle if isinstance(angle, tuple) else (angle,) * self.ranks
+
+
+class Torques(NamedTuple):
+    """A space of vectors of torques that are added to a preset.
+
+    A vector holds for each joint and each rank of legs the amplitudes of the cosines and then of the
+    sines of the leg's phase and its multiples, and last the steering. All other numbers are the
+    preset's.
+
+    Attributes:
+        body: of the robot.
+        origin: the preset.
+    """
+
+    body: Body
+    origin: Preset
+
+    @property
+    def _shape(self) -> tuple[int, int, int]:
+        return 1 + len(self.origin.bends), max(self.body.ranks) + 1, 2 * HARMONICS
+
+    def ranges(self) -> list[Range]:
+        """Return the range of every number of a vector, in order."""
+        return [*[_AMPLITUDE] * math.prod(self._shape), _STEERING]
+
+    def origins(self) -> list[np.ndarray]:
+        """Return the vector at which a search sets out: no torques but for steering."""
+        return [np.array([*[0.0] * math.prod(self._shape), _STEERED])]
+
+    def rounded(self, vector: np.ndarray) -> np.ndarray:
+        """Return a vector (size,) to the decimals that matter."""
+        return _rounded(vector, self.ranges())
+
+    def preset(self, vector: np.ndarray) -> Preset:
+        """Return the preset of a vector (size,), within its ranges."""
+        _, low, high, _ = np.transpose(self.ranges())
+        *amplitudes, steering = vector.clip(low, high).round(_DECIMALS) + 0.0
+        table = np.reshape(amplitudes, self._shape).tolist()
+        torques = {name: tuple(map(tuple, rows)) for name, rows in zip(("hip", *self.origin.bends), table, strict=True)}
+        return self.origin._replace(torques=torques, steering=float(steering))
+
+
+def _rounded(vector: np.ndarray, ranges: Iterable[Range]) -> np.ndarray:
+    return np.array([round(value, number.decimals) for value, number in zip(vector, ranges, strict=True)])
+
+
+class Kind(NamedTuple):
+    """What a search may be for, and how it judges unless it is told otherwise.
+
+    Attributes:
+        space: of the numbers.
+        preset: about which it searches.
+        generations: of the search.
+        candidates: of a generation; None for as many as the number of numbers asks for.
+        episodes: by which a candidate is judged.
+        steps: control steps of each.
+        skipped: steps at their beginning that earn nothing, as a robot that sets out is no walker yet.
+        starts: of which the hard ones are taken; 0 for none.
+    """
+
+    space: type[Space] | type[Torques]
+    preset: str
+    generations: int
+    candidates: int | None
+    episodes: int
+    steps: int
+    skipped: int
+    starts: int
+
+
+SPACES = {
+    "law": Kind(Space, "medium", generations=250, candidates=None, episodes=2, steps=300, skipped=0, starts=1000),
+    "torques": Kind(Torques, "tuned", generations=60, candidates=48, episodes=1, steps=180, skipped=20, starts=0),
+}

@@ -68,7 +68,8 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
         (
             ["--policy=zero", "--preset=slow,fats"],
-            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast, tuned, steered, surefooted)",
+            "unknown preset 'fats'; did you mean 'fast'? "
+            "(there are: slow, medium, fast, tuned, refined, steered, surefooted)",
         ),
         (["--robot=all", "--id=some-v0"], "--id=some-v0: names one dataset, and --robot=all makes 4"),
         (

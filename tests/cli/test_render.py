@@ -176,7 +176,8 @@ def test_a_take_stays_at_its_end():
         ),
         (
             ["--preset=fats", "--output=a.png"],
-            "unknown preset 'fats'; did you mean 'fast'? (there are: slow, medium, fast, tuned, steered, surefooted)",
+            "unknown preset 'fats'; did you mean 'fast'? "
+            "(there are: slow, medium, fast, tuned, refined, steered, surefooted)",
         ),
         (
             ["--camera=portait", "--output=a.png"],

@@ -44,20 +44,20 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
         assert (broken / name).read_bytes() == (straight / name).read_bytes()
 
     result = json.loads((straight / "result.json").read_text())
-    tuned, medium = result["figures"]["tuned"], result["figures"]["medium"]
-    worse = [cost for cost in ("posture", "smoothness", "tilt") if tuned[cost] > medium[cost]]
-    assert done.returncode == (1 if worse or tuned["falls"] else 0)
+    found, medium = result["figures"]["found"], result["figures"]["medium"]
+    worse = [cost for cost in ("posture", "smoothness", "tilt") if found[cost] > medium[cost]]
+    assert done.returncode == (1 if worse or found["falls"] else 0)
     broken = "tune_cpg.py: the result breaks its constraints: "
     assert [cost for cost in worse if cost not in done.stderr.partition(broken)[2]] == []
     assert (result["robot"], result["generations"], result["resets"]) == ("bastion", 4, 2)
-    assert tuned["return"]["mean"] > medium["return"]["mean"]
+    assert found["return"]["mean"] > medium["return"]["mean"]
     assert result["versions"]["mujoco"].startswith("3.17")
     picture = imageio.imread(straight / "course.png")
     assert picture.shape[0] > 500 and picture.std() > 10.0
 
     lines = done.stdout.splitlines()
     assert lines[0].split() == ["preset", "return", "falls", "of", "2", "posture", "smoothness", "tilt"]
-    assert [line.split()[0] for line in lines[2:4]] == ["tuned", "medium"]
+    assert [line.split()[0] for line in lines[2:4]] == ["found", "medium"]
     assert lines[5].startswith("Preset(stiffness=")
 
 
@@ -67,6 +67,8 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
         (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'?"),
         (["--generations=0"], "flag --generations=0: 0 is not a positive integer"),
         (["--steps=1001"], "flag --steps=1001: "),
+        (["--numbers=torqes"], "unknown numbers 'torqes'; did you mean 'torques'?"),
+        (["--starts=7"], "flag --starts=7: expected 8 or more, or 0"),
         (["queen"], "unexpected argument 'queen'; see --help"),
         (["--output=/dev/null/tune"], "cannot make folder /dev/null/tune: not a directory"),
     ],

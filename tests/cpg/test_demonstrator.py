@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
+from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of
 from arc_suite.cpg.presets import TUNINGS, Bend, Preset
@@ -46,6 +47,7 @@ MEDIUM = {
     },
 }
 OFFSETS = {"l1": 0.5, "r1": 0, "l2": 0, "r2": 0.5, "l3": 0.5, "r3": 0, "fl": 0, "fr": 0.5, "rl": 0.5, "rr": 0}
+UPRIGHT = np.array((1.0, 0.0, 0.0, 0.0))
 RANKS = {"l1": 0, "r1": 0, "l2": 1, "r2": 1, "l3": 2, "r3": 2, "fl": 0, "fr": 0, "rl": 1, "rr": 1}
 LEFT = ("l1", "l2", "l3", "fl", "rl")
 
@@ -223,10 +225,79 @@ def test_stacked_controls_are_single_ones():
     stacked = Prescribed.stacked(controls)
     random = np.random.default_rng(0)
     for clock in (0, 3, 14, 15, 40, 500):
+        quaternions = rotations.turned(UPRIGHT, random.uniform(-1.0, 1.0, len(presets)))
         angles, velocities = random.normal(0.0, 0.3, (2, len(presets), 18))
-        actions = stacked(np.full(len(presets), clock), None, angles, velocities)
+        actions = stacked(np.full(len(presets), clock), quaternions, angles, velocities)
         for row, control in enumerate(controls):
-            assert_array_equal(actions[row], control(np.array(clock), None, angles[row], velocities[row]))
+            alone = control(np.array(clock), quaternions[row], angles[row], velocities[row])
+            assert_array_equal(actions[row], alone)
+
+
+def test_torques_ahead_are_harmonics_of_the_legs_phase_and_steering_by_yaw():
+    body, medium = ROBOTS["leaper"], TUNINGS["leaper"]["medium"]
+    rows = {
+        "hip": ((0.1, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.02)),
+        "knee": ((0.0, 0.03, 0.0, 0.0), (0.0, 0.0, 0.04, 0.0)),
+        "ankle": ((0.0, 0.0, 0.0, 0.0), (0.005, 0.0, 0.0, 0.006)),
+    }
+    limp = medium._replace(stiffness=0.0, damping=0.0, torques=rows, steering=-0.2)
+    control, still, yaw = Prescribed.fit(body, limp), np.zeros(12), 0.3
+    offsets = dict(zip((leg.name for leg in body.legs), medium.phase_offsets, strict=True))
+    for clock in (0, 1, 7, 123):
+        action = control(np.array(clock), rotations.turned(UPRIGHT, np.array(yaw)), still, still)
+        for name, found in zip(body.joint_names, action, strict=True):
+            leg, _, joint = name.partition("_")
+            phase = 2.0 * np.pi * (medium.frequency * 0.05 * clock + offsets[leg])
+            waves = np.array([np.cos(phase), np.cos(2 * phase), np.sin(phase), np.sin(2 * phase)])
+            expected = waves @ rows[joint][0 if leg[0] == "f" else 1]
+            if joint == "hip":
+                expected = (-expected if leg[1] == "l" else expected) - 0.2 * yaw * np.cos(phase)
+            assert_allclose(found, expected, atol=1e-12)
+
+
+def test_torques_ahead_are_added_to_those_of_the_loop_and_clipped_with_them():
+    body, medium = ROBOTS["bastion"], TUNINGS["bastion"]["medium"]
+    rows = {"hip": ((0.3, 0.1),) * 3, "ankle": ((-0.2, 0.4),) * 3}
+    random = np.random.default_rng(0)
+    for clock in (0, 20, 21):
+        state = UPRIGHT, random.normal(0.0, 0.3, 12), random.normal(0.0, 0.3, 12)
+        tight, weak = medium._replace(damping=1.0), medium._replace(stiffness=0.0, damping=0.0)
+        both, loop, ahead = (
+            Prescribed.fit(body, preset)(np.array(clock), *state)
+            for preset in (tight._replace(torques=rows), tight, weak._replace(torques=rows))
+        )
+        inside = (abs(loop) < 1.0) & (abs(both) < 1.0)
+        assert inside.any() and (abs(both) <= 1.0).all()
+        assert_allclose(both[inside], (loop + ahead)[inside], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_steering_turns_back_to_where_the_robot_started():
+    def last_yaw(steering):
+        environment = arc_suite.load("leaper", "walk", {"time_limit": 20.0})
+        demonstrator = Demonstrator("leaper", TUNINGS["leaper"]["tuned"]._replace(steering=steering))
+        timestep, yaws = environment.reset(1), []
+        while not timestep.last():
+            timestep = environment.step(demonstrator(timestep))
+            yaws.append(rotations.yaw(timestep.observation["posture"][1:5]))
+        return abs(np.mean(yaws[-100:]))
+
+    back, straight, away = map(last_yaw, (-0.2, 0.0, 0.1))
+    assert back < 0.5 * straight and straight < 0.2 * away
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ({"hip": ((0.0, 0.1),) * 2}, "preset: does not fit leaper: KeyError: 'knee'"),
+        ({name: ((0.0, 0.1),) for name in ("hip", "knee", "ankle")}, "preset: does not fit leaper: IndexError: tuple "),
+        ({name: ((0.0,) * 3,) * 2 for name in ("hip", "knee", "ankle")}, "preset: does not fit leaper: ValueError: "),
+    ],
+)
+def test_torques_that_do_not_fit_are_refused_in_one_line(rows, message):
+    with pytest.raises(ValueError) as error:
+        Demonstrator("leaper", TUNINGS["leaper"]["medium"]._replace(torques=rows))
+    assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("preset", ["medium", "steered"])

@@ -25,14 +25,17 @@ def test_medium_earns_the_published_return(robot):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", RETURNS)
-def test_tuned_earns_most_and_walks_no_worse_than_medium(robot):
-    presets = [TUNINGS[robot][name] for name in ("tuned", "medium")]
-    score = Judge(ROBOTS[robot], presets=2, episodes=10, steps=1000)(presets, range(10))
-    returns = RETURNS[robot]
-    assert_allclose(1000 * score.rewards[0].mean(), returns.tuned, rtol=returns.tuned_within)
+def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
+    presets = [TUNINGS[robot][name] for name in ("refined", "tuned", "medium")]
+    score = Judge(ROBOTS[robot], presets=3, episodes=10, steps=1000)(presets, range(10))
+    returns, (refined, tuned, _) = RETURNS[robot], 1000 * score.rewards.mean(axis=-1)
+    assert_allclose(tuned, returns.tuned, rtol=returns.tuned_within)
+    assert_allclose(refined, returns.refined, rtol=returns.tuned_within)
+    assert refined > tuned
     assert not score.falls.any()
-    for cost, (tuned, medium) in score.style.items():
-        assert tuned.mean() <= medium.mean(), cost
+    for cost, (*searched, medium) in score.style.items():
+        for each in searched:
+            assert each.mean() <= medium.mean(), cost
 
 
 @pytest.mark.slow

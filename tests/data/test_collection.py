@@ -56,6 +56,8 @@ def replay(environment, seed, actions):
     return np.array(observations), np.array(rewards), terms, np.array(terminations), np.array(truncations)
 
 
+MODIFIERS = {"kicks": 1.0, "motor_strength": [0.5, 1.0], "limp": True, "friction": [0.3, 1.0], "mass": [0.8, 1.5]}
+MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "without": "contact_forces"}
 RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
 
 
@@ -68,10 +70,14 @@ RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
         RANDOM._replace(body=TICK, steps=200),
         RANDOM._replace(task="steer", task_kwargs={"gait": "ripple", "weights": {"tracking": 2.0}}),
         RANDOM._replace(task_kwargs={"arena": "bumps"}),
+        RANDOM._replace(task="shoved", steps=60),
+        RANDOM._replace(task="steer", steps=60, task_kwargs=MODIFIERS),
+        data.Settings(SPIDER, noise=0.05, seed=3, steps=60, task_kwargs=MODIFIERS),
         RANDOM._replace(body=SPIDER, task="steer", task_kwargs={"arena": "bumps"}),
         RANDOM._replace(task="stay"),
     ],
-    ids=["queen", "spider", "tick", "steer", "bumps", "spider steers on bumps", "no gait"],
+    ids=["queen", "spider", "tick", "steer", "bumps", "shoved", "modifiers", "spider by positions"]
+    + ["spider steers on bumps", "no gait"],
 )
 def test_minari_opens_a_dataset_whose_environment_replays_it_to_the_bit(settings, stay):
     assert collect(ID, settings, 4) == 4

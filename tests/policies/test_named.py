@@ -10,7 +10,7 @@ from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
-ALL = "slow, medium, fast, tuned, steered, surefooted"
+ALL = "slow, medium, fast, tuned, refined, steered, surefooted"
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -35,6 +35,29 @@ def test_noise_is_added_to_what_the_policy_does():
     plain, noisy = (alone(policy("random", "tick", noise=noise), 1)(time_step) for noise in (0.0, 0.1))
     noise = alone(policy("zero", "tick", noise=0.1), 1)(time_step)
     np.testing.assert_array_equal(noisy, plain + noise)
+
+
+@pytest.mark.parametrize("body", ["tick", generate(6, 3)])
+def test_a_demonstrator_walks_by_positions_as_by_torques(body):
+    """Where no joint would have to be pulled beyond its reach, to rounding."""
+    rewards = {}
+    for actions in ("torque", "position"):
+        environment = arc_suite.load(body, "walk", {"random": 0, "actions": actions})
+        act = alone(policy("cpg", body, task=environment.task.definition), 0)
+        timestep, rewards[actions] = environment.reset(), []
+        for _ in range(40):
+            timestep = environment.step(act(timestep))
+            rewards[actions].append(timestep.reward)
+    np.testing.assert_allclose(*rewards.values(), rtol=1e-6)
+    assert act(timestep).any() and np.abs(act(timestep) - environment.physics.data.ctrl).max() > 0.01
+
+
+def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes():
+    task = arc_suite.load("tick", "walk", {"actions": "position"}).task.definition
+    time_step = arc_suite.load("tick", "walk").reset(0)
+    for name in ("zero", "random"):
+        actions = [alone(policy(name, "tick", task=given), 1)(time_step) for given in (None, task)]
+        np.testing.assert_array_equal(*actions)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """Rows of a batch: what one simulation does, to the bit, and what only rows can."""
 
+import pickle
+
 import mujoco
 import numpy as np
 import pytest
@@ -98,6 +100,35 @@ def test_obstacles_stand_where_a_reset_puts_them():
     assert_array_equal(batch.data.xpos[:, post], [(1.0, 2.0, 0.5), (5.0, 0.0, 0.5), (3.0, 4.0, 0.5)])
     batch.reset(ALL, *starts(model))
     assert_array_equal(batch.data.xpos[:, post], [(5.0, 0.0, 0.5)] * ROWS)
+
+
+def test_rows_have_models_of_their_own_until_their_next_reset():
+    body = ROBOTS["tick"]
+    model = compiled(body)
+    batch, singles, (qpos, qvel) = Batch(model, ROWS, 2), [Physics.from_body(body) for _ in range(ROWS)], starts(model)
+    heavy = {name: 2.0 * getattr(model, name) for name in ("body_mass", "body_inertia")}
+    slippery = {"pair_friction": 0.1 * model.pair_friction}
+    for models in ([{}, heavy, slippery], [slippery, {}, heavy | slippery], []):
+        batch.reset(ALL, qpos, qvel, models=models)
+        for row, physics in enumerate(singles):
+            with physics.reset_context():
+                physics.change_model(models[row] if models else {})
+                physics.data.qpos[:], physics.data.qvel[:] = qpos[row], qvel[row]
+        for twin in (batch, pickle.loads(pickle.dumps(batch))):
+            for row, physics in enumerate(singles):
+                assert_same(twin, row, physics)
+        batch = twin
+        for _ in range(5):
+            batch.step(25, ALL)
+            for row, physics in enumerate(singles):
+                physics.step(25)
+                assert_same(batch, row, physics)
+    assert not np.array_equal(batch.data.qpos[0], batch.data.qpos[1])
+    plain = Batch(model, ROWS)
+    plain.reset(ALL, qpos, qvel)
+    for _ in range(5):
+        plain.step(25, ALL)
+    assert_array_equal(plain.data.qpos, batch.data.qpos)
 
 
 def test_sensors_are_back_after_an_exception():

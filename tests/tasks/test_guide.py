@@ -52,6 +52,8 @@ def test_task(package):
     out = package("-c", USING_A_TASK + "print(observations.shape, [block.shape for block in blocks.values()])")
     assert out.startswith("[0.7] {'height': ")
     assert out.endswith("(8, 48) [(8, 23), (8, 24), (8, 1)]\n")
+    out = package("-c", USING_A_TASK + 'print((arc_suite.symmetry("leaper", "crouch").observation.signs < 0).sum())')
+    assert out.endswith(f"\n{2 + 4 + 3 + 4}\n")  # the quaternion, hips, velocities of the torso, hips
 
 
 def test_arena(package):

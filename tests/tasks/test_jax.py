@@ -12,6 +12,8 @@ jax.config.update("jax_enable_x64", True)
 
 BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": generator.random_body(3)}
 ROWS, STEPS = 3, 60
+MODIFIERS = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "limp": True, "observation_noise": 1.0, "delay": (0, 3)}
+MODIFIERS |= {"actions": "position", "without": "gait_clock"}
 
 
 def assert_close(ours, theirs):
@@ -39,6 +41,7 @@ PLACES = [
     for name, task in TASKS.items()
     for settings in ([{}] if task.own_arena else [{"arena": "flat"}, {"arena": "bumps"}, {"arena": "stairs"}])
 ]
+PLACES += [(name, MODIFIERS) for name in ("walk", "steer", "course")]
 
 
 @pytest.mark.parametrize(("task_name", "settings"), PLACES)
@@ -53,7 +56,7 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
         return (
             readings,
             memory,
-            inputs.ctrl,
+            inputs,
             task.terms(memory, readings),
             task.observe(memory, readings),
             ends[0],

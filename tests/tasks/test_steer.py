@@ -219,3 +219,26 @@ def test_the_same_shape_earns_the_same_at_any_size():
             total += timestep.reward
         returns.append(total)
     assert returns == pytest.approx([returns[1]] * 3, rel=0.02)
+
+
+def test_who_is_carried_by_the_torso_has_fallen():
+    environment = arc_suite.load("tick", "steer", {"random": 0})
+    environment.reset()
+    task = environment.task.definition
+    readings = task.read(environment.physics.data.ptr)
+    for share, healthy in ((0.4, True), (0.6, False)):
+        forces = np.zeros_like(readings.contact_forces)
+        forces[5] = share  # upwards, on the first part, in the body's weight
+        assert task.healthy(readings._replace(contact_forces=forces)) == healthy
+
+
+def test_a_body_that_lies_on_its_torso_is_not_healthy():
+    """Tick draws its legs up, and rests on its torso at 0.39 of its height."""
+    environment = arc_suite.load("tick", "steer", {"random": 0})
+    timestep, data, joints = environment.reset(), environment.physics.data.ptr, environment.physics.model.jnt_range[1:]
+    while not timestep.last():
+        error = joints[:, 1] - data.qpos[7:]
+        timestep = environment.step((3.0 * error - 0.2 * data.qvel[6:]).clip(-1.0, 1.0))
+    assert timestep.discount == 0.0
+    assert timestep.observation["posture"][0] > steer.LOWEST * ROBOTS["tick"].torso.standing_height
+    assert environment.task.progress["fell"] == 1.0

@@ -57,6 +57,17 @@ def test_judge_counts_falls_and_pays_nothing_after_them():
     assert 0.0 < score.tipping[1] < 0.1
 
 
+def test_first_steps_may_count_for_nothing():
+    presets = [TUNINGS["leaper"]["medium"]]
+    whole, first, last = (
+        Judge(ROBOTS["leaper"], 1, 2, steps, skipped=skipped)(presets, range(2))
+        for steps, skipped in ((30, 0), (12, 0), (30, 12))
+    )
+    assert_allclose(30 * whole.rewards, 12 * first.rewards + 18 * last.rewards, rtol=1e-12)
+    for name, costs in whole.style.items():
+        assert_allclose(30 * costs, 12 * first.style[name] + 18 * last.style[name], rtol=1e-9)
+
+
 def test_the_judge_asks_for_the_terms_of_style():
     with gaitless.registered(), pytest.raises(ValueError) as error:
         Judge(ROBOTS["tick"], 1, 1, 5, "stay")

@@ -23,6 +23,21 @@ def test_a_search_goes_on_where_it_was_broken_off():
 
 
 @pytest.mark.slow
+def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_tuned():
+    settings = SETTINGS | {"robot": "leaper", "numbers": "torques", "episodes": 1, "steps": 40, "starts": 0}
+    straight, resumed = Search(**settings), Search(**settings)
+    generations = [straight.step() for _ in range(3)]
+    for generation in generations[:2]:
+        assert resumed.step(generation.fitness) is None
+    assert resumed.step() == generations[2]
+    assert resumed.result() == straight.result()
+    assert [generation.tipping for generation in generations] == [0.0] * 3
+    tuned = TUNINGS["leaper"]["tuned"]
+    assert straight.result()._replace(torques=None, steering=0.0) == tuned
+    assert straight.candidates == 48
+
+
+@pytest.mark.slow
 def test_a_search_learns():
     search = Search(**SETTINGS | {"episodes": 1, "steps": 80})
     first = search.step()

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from arc_suite.cpg.demonstrator import pattern
+from arc_suite.cpg.demonstrator import ahead, pattern
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tuning import Space
+from arc_suite.tuning.space import HARMONICS, SPACES, Torques
 
 
 @pytest.mark.parametrize("robot", TUNINGS)
@@ -37,3 +38,30 @@ def test_every_number_of_a_vector_counts_and_stays_within_bounds():
     assert len({str(preset) for preset in presets}) == vector.size
     assert space.preset(np.full(vector.size, 1e9)) == space.preset(high)
     assert space.preset(np.full(vector.size, -1e9)) == space.preset(low)
+
+
+@pytest.mark.parametrize("robot", TUNINGS)
+def test_torques_are_searched_about_tuned_and_refined_is_such(robot):
+    body, kind = ROBOTS[robot], SPACES["torques"]
+    space = kind.space(body, TUNINGS[robot][kind.preset])
+    (origin,) = space.origins()
+    ranks, joints = max(body.ranks) + 1, len(body.legs[0].joints)
+    assert origin.size == len(space.ranges()) == ranks * joints * 2 * HARMONICS + 1
+    begun, refined = space.preset(origin), TUNINGS[robot]["refined"]
+    added = ahead(body, begun)
+    assert not added.cosines.any() and not added.sines.any() and added.steering.any()
+    for name in begun._fields:
+        if name not in ("torques", "steering"):
+            assert getattr(begun, name) == getattr(refined, name) == getattr(TUNINGS[robot]["tuned"], name)
+    found = [value for rows in refined.torques.values() for row in rows for value in row]
+    assert space.preset(np.array([*found, refined.steering])) == refined
+
+
+def test_every_torque_counts_and_stays_within_bounds():
+    space = Torques(ROBOTS["leaper"], TUNINGS["leaper"]["tuned"])
+    (vector,), (scale, low, high, _) = space.origins(), np.transpose(space.ranges())
+    presets = [space.preset(vector + step) for step in np.diag(0.5 * scale)]
+    assert len({str(preset) for preset in presets}) == vector.size
+    assert space.preset(np.full(vector.size, 1e9)) == space.preset(high)
+    assert space.preset(np.full(vector.size, -1e9)) == space.preset(low)
+    assert space.rounded(np.full(vector.size, 0.12345)).tolist() == [0.123] * vector.size

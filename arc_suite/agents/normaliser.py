@@ -1,0 +1,48 @@
+"""Running moments of observations, by which networks see numbers of like size."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from arc_suite.policies.network import Layer
+
+LIMIT = 5.0  # of a normalised number
+_LEAST = 1e-3  # standard deviation, so that what hardly ever moves does not shout when it does
+
+
+class Moments(NamedTuple):
+    """Moments of vectors.
+
+    Attributes:
+        count: () of the vectors.
+        mean: (size,)
+        squares: (size,) sum of the squared deviations from the mean.
+    """
+
+    count: np.ndarray
+    mean: np.ndarray
+    squares: np.ndarray
+
+    @classmethod
+    def none(cls, size: int) -> Self:
+        """Return the moments before the first vector."""
+        return cls(np.zeros(()), np.zeros(size), np.zeros(size))
+
+    def after(self, vectors: np.ndarray) -> Self:
+        """Return the moments with more vectors (..., size) (Chan, Golub and LeVeque, 1979)."""
+        vectors = vectors.reshape(-1, vectors.shape[-1])
+        mean = vectors.mean(axis=0, dtype=float)
+        squares = ((vectors - mean) ** 2).sum(axis=0)
+        count = self.count + len(vectors)
+        apart = mean - self.mean
+        return Moments(
+            count,
+            self.mean + apart * (len(vectors) / count),
+            self.squares + squares + apart**2 * (self.count * len(vectors) / count),
+        )
+
+    def layer(self) -> Layer:
+        """Return the layer that normalises by them."""
+        deviation = np.sqrt(self.squares / max(self.count, 1.0))
+        factor = 1.0 / np.maximum(deviation, _LEAST) if self.count else np.ones_like(deviation)
+        return Layer("normalise", tuple(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))

@@ -1,0 +1,79 @@
+"""Make animation clips of a robot for game engines: glTF (.glb), figures beside it.
+
+  arc-suite animate --robot queen --output queen.glb
+  arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
+  arc-suite animate --legs 8 --links 3 --rig nodes --output spider.glb
+  arc-suite animate --spec examples/spider.json --policy my_package.policies:make --clips walk --output spider.glb
+
+The clip walk is the policy's; slow and fast are the demonstrator's presets; turn_left, turn_right, strafe_left,
+strafe_right, back and stop are commands that its preset steered follows; idle stands and breathes. Loops begin at the
+same phase of the gait and hold the same number of cycles, so that an engine can blend them.
+"""
+
+import math
+from pathlib import Path
+
+from absl import flags
+
+from arc_suite import checks, export, files, policies
+from arc_suite.cli.flags import bodies, define_body, define_task, task
+from arc_suite.cli.program import VERSION, progress
+from arc_suite.robots import ROBOTS
+
+_COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
+
+FLAGS = flags.FLAGS
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{', '.join(ROBOTS)}.")
+flags.DEFINE_string("policy", "cpg", policies.HELP)
+flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: tuned, or medium where there is none]")
+flags.DEFINE_list("clips", list(export.DEFAULT), f"Which, with commas between them: {', '.join(export.CLIPS)}.")
+flags.DEFINE_float("fps", export.FPS, "Frames a second.", 1.0, 1000.0)
+flags.DEFINE_string("rig", "skin", f"{' or '.join(export.RIGS)}: bones and one mesh, or rigid parts.")
+flags.DEFINE_string(
+    "root_motion",
+    "both",
+    "moving: the root goes as the body walks; in_place: it stays; both: each clip twice.",
+)
+flags.DEFINE_string("output", None, "File to write, .glb. Required.", short_name="o")
+
+
+def main() -> None:
+    """Record, write both files and print a row for each clip."""
+    checks.name(FLAGS.rig, export.RIGS, "rig")
+    checks.name(FLAGS.root_motion, export.ROOT_MOTIONS, "root_motion")
+    body, *others = bodies(_ROBOT).values()
+    if others:
+        raise ValueError(f"--robot={_ROBOT.value}: expected one robot, as a file holds one")
+    task_name, task_kwargs = task()
+    if not FLAGS.output:
+        raise ValueError("no file to write; say --output=FILE.glb")
+    checks.name(Path(FLAGS.output).suffix.lower(), [".glb"], "extension")
+    beside = Path(FLAGS.output).with_suffix(".json")
+    with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as figures:
+        clips = export.clips(
+            body,
+            FLAGS.clips,
+            FLAGS.policy,
+            FLAGS.preset,
+            task_name,
+            task_kwargs,
+            FLAGS.fps,
+            lambda names: progress(names, "recording", unit="clip", leave=False),
+        )
+        temporary.write_bytes(export.glb(body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
+        figures |= export.sidecar(body, clips, FLAGS.root_motion)
+    print_table(clips)
+    print(f"wrote {FLAGS.output} and {beside}")
+
+
+def print_table(clips: list[export.Clip]) -> None:
+    """Print a row for each clip."""
+    line = "{:<12}" + " {:>11}" * (len(_COLUMNS) - 1)
+    print(line.format(*_COLUMNS))
+    for clip in clips:
+        forward, left, turning = clip.motion.twist + 0.0
+        figures = [f"{forward:.3f}", f"{left:.3f}", f"{math.degrees(turning):.1f}"]
+        seam = f"{math.degrees(clip.motion.seam):.3f}" if clip.loops else "-"
+        print(line.format(clip.name, f"{clip.motion.seconds:.3f}", len(clip.times), clip.cycles, *figures, seam))

@@ -1,0 +1,6 @@
+"""Walks to take away: animation clips for game engines."""
+
+from arc_suite.export.clips import CLIPS, DEFAULT, FPS, Clip, clips
+from arc_suite.export.creatures import RIGS, ROOT_MOTIONS, glb, sidecar
+
+__all__ = ["CLIPS", "DEFAULT", "FPS", "Clip", "RIGS", "ROOT_MOTIONS", "clips", "glb", "sidecar"]

@@ -1,0 +1,68 @@
+"""Recordings of policies at the pace of the physics: every substep, to the bit."""
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+
+from arc_suite.envs.dm import Environment
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.policies import Policy, alone
+
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+
+
+class Recording(NamedTuple):
+    """Poses of one body, one for every substep.
+
+    Attributes:
+        step: s between two poses.
+        qpos: (samples, nq): torso position and quaternion in the world, joint angles in rad.
+    """
+
+    step: float
+    qpos: np.ndarray
+
+
+def record(
+    environment: Environment, policy: Policy, settle: int, steps: int, commands: Iterable[tuple[int, tuple]] = ()
+) -> Recording:
+    """Play a policy and record it, once it has settled.
+
+    Control steps are taken in the environment; their substeps are then run again from the state in which
+    the recording begins, with the controls that were applied, which gives the same bits.
+
+    Args:
+        environment: of `arc_suite.load`; its next episode is played.
+        policy: made for one row.
+        settle: control steps before the recording.
+        steps: control steps to record.
+        commands: pairs of a control step, counted from the start, and the value that the task's `command`
+            takes there.
+
+    Returns:
+        `steps * SUBSTEPS + 1` poses.
+
+    Raises:
+        ValueError: the episode ends before; one line.
+    """
+    act, commands = alone(policy), dict(commands)
+    model, data = environment.physics.model.ptr, environment.physics.data.ptr
+    timestep, controls = environment.reset(), []
+    for count in range(settle + steps):
+        if count in commands:
+            environment.command("command", commands[count])
+        if count == settle:
+            state = np.empty(mujoco.mj_stateSize(model, _STATE))
+            mujoco.mj_getState(model, data, state, _STATE)
+            start, warmstart = data.qpos.copy(), data.qacc_warmstart.copy()
+        timestep = environment.step(act(timestep))
+        if timestep.last():
+            raise ValueError(f"the episode ends after {count + 1} control steps, {settle + steps} are needed")
+        controls.append(data.ctrl.copy())
+    controls = np.repeat(controls[settle:], SUBSTEPS, axis=0)
+    states, _ = rollout.rollout(model, mujoco.MjData(model), state, controls[None], initial_warmstart=warmstart)
+    # Of the full state, time comes first and then the positions.
+    return Recording(model.opt.timestep, np.concatenate([start[None], states[0, :, 1 : 1 + model.nq]]))

@@ -1,0 +1,119 @@
+"""Bodies in a mirror: which leg, joint and part of a body takes the place of which across the x-z plane."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.robots.spec import Body, Leg, Solid
+
+_ROUNDING = 1e-9  # of the standing height for lengths, and of a number for numbers
+
+_REFLECTION = np.array((1.0, -1.0, 1.0))  # of a point, and of a velocity
+_TURNED = -_REFLECTION  # of the axis of a rotation
+
+
+class Image(NamedTuple):
+    """What of a body takes the place of what in its mirror image, which is the body itself.
+
+    Attributes:
+        legs: (legs,) index of the leg across, its own on the midline.
+        joints: (joints,) index of the joint across, in the order of the actions.
+        signs: (joints,) 1 where equal angles make mirrored poses, -1 where opposite ones do.
+        parts: (parts,) index of the rigid part across, in the order of the contact forces.
+    """
+
+    legs: np.ndarray
+    joints: np.ndarray
+    signs: np.ndarray
+    parts: np.ndarray
+
+
+def image(body: Body) -> Image:
+    """Return what of a body takes the place of what across the x-z plane.
+
+    What counts is geometry, joints and motors, whatever names and order the legs have.
+
+    Raises:
+        ValueError: a body that is not its own mirror image; one line that names a part without one.
+    """
+    rounding = _ROUNDING * body.torso.standing_height
+    for kind, solids in (("solid", body.torso.solids), ("ballast", body.ballast)):
+        for solid in solids:
+            if not any(_solids_match(solid, other, rounding) for other in solids):
+                raise ValueError(f"{body.name} is not its own mirror image: no {kind} is across from {solid.name}")
+    legs, signs = [], []
+    for leg in body.legs:
+        matches = [(across, found) for across, other in enumerate(body.legs) if (found := _signs(leg, other, rounding))]
+        if not matches:
+            raise ValueError(f"{body.name} is not its own mirror image: no leg is across from {leg.name}")
+        across, found = matches[0]
+        legs.append(across)
+        signs += found
+    joints, parts = {name: i for i, name in enumerate(body.joint_names)}, {n: i for i, n in enumerate(body.part_names)}
+    across = [(leg, body.legs[other]) for leg, other in zip(body.legs, legs, strict=True)]
+    return Image(
+        legs=np.array(legs),
+        joints=np.array([joints[other.full_name(joint)] for _, other in across for joint in other.joints]),
+        signs=np.array(signs),
+        parts=np.array([0, *(parts[other.full_name(p)] for _, other in across for p in (*other.links, other.foot))]),
+    )
+
+
+def _signs(leg: Leg, other: Leg, rounding: float) -> list[int] | None:
+    """The signs of the joints of two legs, if one is the mirror image of the other; else None."""
+    if len(leg.links) != len(other.links) or not np.isclose(leg.foot.radius, other.foot.radius, _ROUNDING, 0.0):
+        return None
+    if not np.allclose(np.array(leg.points) * _REFLECTION, other.points, rtol=0.0, atol=rounding):
+        return None
+    signs = []
+    for link, across in zip(leg.links, other.links, strict=True):
+        if not np.isclose(link.radius, across.radius, _ROUNDING, 0.0) or (link.joint is None) != (across.joint is None):
+            return None
+        if link.joint is None:
+            continue
+        cosine = (_axis(leg, link) * _TURNED) @ _axis(other, across)
+        sign = 1 if cosine > 0.0 else -1
+        bounds = tuple(sorted(sign * bound for bound in link.joint.range_deg))
+        ours, theirs = ([j.armature, j.damping, j.motor and j.motor.gear] for j in (link.joint, across.joint))
+        pairs = zip([*bounds, *ours], [*across.joint.range_deg, *theirs], strict=True)
+        if abs(cosine) < 1.0 - _ROUNDING or not all(_equal(a, b) for a, b in pairs):
+            return None
+        signs.append(sign)
+    return signs
+
+
+def _axis(leg: Leg, link) -> np.ndarray:
+    """The direction of a link's joint in the torso's frame."""
+    yaw, axis = np.radians(leg.yaw_deg), np.array(link.joint.axis)
+    x = np.cos(yaw) * axis[0] - np.sin(yaw) * axis[1]
+    y = np.sin(yaw) * axis[0] + np.cos(yaw) * axis[1]
+    return np.array((x, y, axis[2])) / np.linalg.norm(axis)
+
+
+def _equal(number: float | None, other: float | None) -> bool:
+    return number == other if None in (number, other) else bool(np.isclose(number, other, _ROUNDING, 0.0))
+
+
+def _solids_match(solid: Solid, other: Solid, rounding: float) -> bool:
+    """Whether a shape is the other's mirror image; of shapes that are turned, if their own axes are mirrored ones."""
+    if solid.shape != other.shape or not np.allclose(solid.size, other.size, rtol=_ROUNDING, atol=0.0):
+        return False
+    if not _equal(getattr(solid, "mass", None), getattr(other, "mass", None)):
+        return False
+    if not np.allclose(np.array(solid.position) * _REFLECTION, other.position, rtol=0.0, atol=rounding):
+        return False
+    # Every shape is its own mirror image along its axes: a ball along all, what is round about z along any beside it.
+    axes = {"sphere": [], "capsule": [2], "cylinder": [2]}.get(solid.shape, [0, 1, 2])
+    cosines = ((_REFLECTION[:, None] * _turned(solid)) * _turned(other)).sum(axis=0)
+    return bool((abs(cosines[axes]) > 1.0 - _ROUNDING).all())
+
+
+def _turned(solid: Solid) -> np.ndarray:
+    """The axes (3, 3) of a shape, in columns, in the torso's frame."""
+    axes = np.eye(3)
+    for i, angle in enumerate(np.radians(solid.euler_deg)):
+        turn, (j, k) = np.eye(3), ((i + 1) % 3, (i + 2) % 3)
+        turn[j, j] = turn[k, k] = np.cos(angle)
+        turn[k, j], turn[j, k] = np.sin(angle), -np.sin(angle)
+        axes = axes @ turn
+    return axes

@@ -1,0 +1,328 @@
+"""Tasks with modifiers: any task, disturbed, or with other motors or senses.
+
+A modified task is a task around another. Its memory is that of the other with more fields, so that
+all functions of the other work on it.
+"""
+
+import collections
+import dataclasses
+import functools
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from arc_suite.models.sizing import GRAVITY, position_gains, sized
+from arc_suite.models.standing import standing
+from arc_suite.tasks import noise
+from arc_suite.tasks.contract import Inputs, Start, Task
+from arc_suite.tasks.modifiers import LIMP_FROM, Modifiers, checked
+from arc_suite.tasks.readings import Readings
+
+KICKS, SHORTEST, LONGEST = 25, 40, 121  # of a schedule, and control steps from one to the next
+
+# What friction and mass multiply.
+_FRICTIONS, _MASSES = ("pair_friction", "geom_friction"), ("body_mass", "body_inertia")
+
+
+class Changes(NamedTuple):
+    """What the memory of a modified task holds behind that of the task itself.
+
+    Attributes:
+        elapsed: (..., 1) uint32, control steps since the start.
+        terminated: (...) whether the latest step has ended the episode in failure.
+        kick_steps: (..., KICKS) control steps, counted from 1, before which kicks come.
+        kicks: (..., KICKS, 2) changes of the torso's velocity in the world, m/s.
+        strength: (..., joints) of the motors, a share.
+        limp: (..., joints) whether they are those of the limp leg.
+        noise_key: (..., 1) uint32, from which the noise of the episode follows.
+        delay: (...) of actions, control steps.
+        waiting: (..., longest delay, joints) the latest actions, the newest first.
+        angles: (..., joints) of the joints at the latest reading, rad.
+        speeds: (..., joints) likewise, rad/s.
+    """
+
+    elapsed: np.ndarray
+    terminated: np.ndarray
+    kick_steps: np.ndarray
+    kicks: np.ndarray
+    strength: np.ndarray
+    limp: np.ndarray
+    noise_key: np.ndarray
+    delay: np.ndarray
+    waiting: np.ndarray
+    angles: np.ndarray
+    speeds: np.ndarray
+
+
+class Draws(NamedTuple):
+    """What is random in the modifiers of one episode, in the order in which it is drawn; all is, always.
+
+    Attributes:
+        kick_steps: (KICKS,) control steps before which kicks come, each 40 to 120 after the one before.
+        kick_sizes: (KICKS,) uniform in [0, 1).
+        kick_directions: (KICKS,) rad, uniform in [0, 2 pi).
+        leg: index of one.
+        strength: uniform in [0, 1), where in its range the motors' strength lies.
+        friction: likewise.
+        mass: likewise.
+        delay: likewise.
+        noise_key: an integer of 32 bits.
+    """
+
+    kick_steps: np.ndarray
+    kick_sizes: np.ndarray
+    kick_directions: np.ndarray
+    leg: int
+    strength: float
+    friction: float
+    mass: float
+    delay: float
+    noise_key: int
+
+
+def draw(random: np.random.RandomState, legs: int) -> Draws:
+    """Draw the modifiers of an episode of a body with a number of legs."""
+    return Draws(
+        random.randint(SHORTEST, LONGEST, KICKS).cumsum(),
+        random.uniform(size=KICKS),
+        random.uniform(0.0, 2.0 * math.pi, KICKS),
+        random.randint(legs),
+        *random.uniform(size=4),
+        random.randint(2**32, dtype=np.uint32),
+    )
+
+
+def modified(task: Task, settings: Mapping[str, Any]) -> "Modified":
+    """Return a task with modifiers.
+
+    Args:
+        task: any.
+        settings: some of the fields of `modifiers.Modifiers` by name.
+
+    Raises:
+        ValueError: an unknown name, or a value that does not fit; one line that names it.
+    """
+    widths = noise.half_widths(task.scene.body, task.blocks)
+    changes = checked(settings, task.scene.body, task.blocks, widths)
+    return Modified(task.scene, task.settings, task.step_limit, task=task, changes=changes)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Modified(Task):
+    """A task around another.
+
+    Attributes:
+        task: the other.
+        changes: what is changed of it.
+    """
+
+    task: Task = dataclasses.field(kw_only=True)
+    changes: Modifiers = dataclasses.field(kw_only=True)
+
+    name = property(lambda self: self.task.name)
+    version = property(lambda self: self.task.version)
+    reads = property(lambda self: self.task.reads)
+    commands = property(lambda self: self.task.commands)
+    actions = property(lambda self: self.changes.actions)
+    clock = property(lambda self: self.task.clock)
+    parameters = property(lambda self: self.task.parameters)
+    target_velocity = property(lambda self: self.task.target_velocity)
+    mirrors = property(lambda self: self.task.mirrors)
+
+    @classmethod
+    def fitted(cls, body, overrides):
+        """Refuse, as the other task fits its own settings."""
+        raise TypeError("a modified task is made by tasks.modified.modified, of a task that is fitted")
+
+    @functools.cached_property
+    def blocks(self) -> Mapping[str, int]:
+        """Those of the other task, but for what is left out."""
+        return {name: size for name, size in self.task.blocks.items() if name not in self.changes.without}
+
+    @functools.cached_property
+    def members(self) -> np.ndarray:
+        """(legs, joints) which joints are those of a leg."""
+        owners = np.repeat(np.arange(len(self.scene.body.legs)), [len(leg.joints) for leg in self.scene.body.legs])
+        return owners == np.arange(len(self.scene.body.legs))[:, None]
+
+    @functools.cached_property
+    def gains(self) -> tuple[np.ndarray, np.ndarray]:
+        """The stiffness, action per rad, and damping, action per rad/s, of the joints as positions hold them."""
+        body = sized(self.scene.body)
+        return position_gains(body, standing(body).inertias)
+
+    @functools.cached_property
+    def reach(self) -> np.ndarray:
+        """(joints,) the farther limit of each joint's range, from the standing pose, rad."""
+        return abs(np.radians([joint.range_deg for leg in self.scene.body.legs for joint in leg.joints])).max(axis=-1)
+
+    @functools.cached_property
+    def noises(self) -> dict[str, tuple[slice, np.ndarray]]:
+        """Where the noise of a block lies among that of all blocks, and its half-widths, by name."""
+        levels, first, noises = self.changes.observation_noise, 0, {}
+        for name, widths in noise.half_widths(self.scene.body, self.task.blocks).items():
+            last = first + len(widths)
+            if levels.get(name) and name in self.blocks:
+                noises[name] = slice(first, last), levels[name] * widths
+            first = last
+        return noises
+
+    def first(self) -> Any:
+        """Return the other task's."""
+        return self.task.first()
+
+    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+        """Draw the other task's start, then what is random in the modifiers; see `Draws`."""
+        start, body, changes = self.task.start(random, carry), self.scene.body, self.changes
+        drawn = draw(random, len(body.legs))
+        joints = len(body.joint_names)
+        directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
+        unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
+        low, high = changes.delay
+        leg = drawn.leg if changes.limp is True else changes.limp
+        own = Changes(
+            elapsed=np.zeros(1, np.uint32),
+            terminated=np.False_,
+            kick_steps=drawn.kick_steps,
+            kicks=unit * drawn.kick_sizes[:, None] * directions,
+            strength=np.full(joints, _within(changes.motor_strength, drawn.strength)),
+            limp=np.zeros(joints, bool) if changes.limp is False else self.members[leg],
+            noise_key=np.array([drawn.noise_key], np.uint32),
+            delay=low + int(drawn.delay * (high - low + 1)),
+            waiting=np.zeros((high, joints)),
+            angles=np.zeros(joints),
+            speeds=np.zeros(joints),
+        )
+        model = dict(start.model)
+        for names, span, share in (
+            (_FRICTIONS, changes.friction, drawn.friction),
+            (_MASSES, changes.mass, drawn.mass),
+        ):
+            if span != (1.0, 1.0):
+                model |= {name: _within(span, share) * model.get(name, self.scene.model[name]) for name in names}
+        return start._replace(memory=extended(type(start.memory))(*start.memory, *own), model=model)
+
+    def read(self, data) -> Readings:
+        """Take the other task's readings."""
+        return self.task.read(data)
+
+    def lift(self, memory, readings: Readings) -> np.ndarray | None:
+        """Return the other task's positions at the start."""
+        return self.task.lift(memory, readings)
+
+    def begin(self, memory, readings: Readings) -> Any:
+        """Return the other task's memory, and how the joints are."""
+        return self._felt(self.task.begin(memory, readings), readings)
+
+    def before(self, memory, action) -> tuple[Any, Inputs]:
+        """Return the memory, and what the other task writes as motors and kicks change it.
+
+        What the other task is given, and judges by its reward, is what is asked of the motors as
+        torques, when it arrives; what they give of it is less.
+        """
+        changes, asked = self.changes, action
+        if changes.delay[1]:
+            memory, asked = _delayed(memory, action)
+        if changes.actions == "position":
+            asked = self.torques(memory, asked)
+        memory, inputs = self.task.before(memory, asked)
+        ctrl = memory.strength * inputs.ctrl
+        if changes.limp is not False:
+            ctrl = ctrl * ~(memory.limp & (memory.elapsed >= LIMP_FROM))
+        kick = self._kick(memory, inputs.kick) if changes.kicks else inputs.kick
+        return memory._replace(elapsed=memory.elapsed + np.uint32(1)), Inputs(ctrl, kick)
+
+    def torques(self, memory, action):
+        """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
+        stiffness, damping = self.gains
+        return (stiffness * (self.reach * action - memory.angles) - damping * memory.speeds).clip(-1.0, 1.0)
+
+    def positions(self, torques, angles, speeds):
+        """Return the action (..., joints) for which motors that hold positions give torques, as far as joints reach.
+
+        Args:
+            torques: (..., joints) in [-1, 1].
+            angles: (..., joints) of the joints, rad.
+            speeds: (..., joints) likewise, rad/s.
+        """
+        stiffness, damping = self.gains
+        return ((angles + (torques + damping * speeds) / stiffness) / self.reach).clip(-1.0, 1.0)
+
+    def after(self, memory, readings: Readings) -> Any:
+        """Return the other task's memory, how the joints are, and whether the body has fallen."""
+        memory = self._felt(self.task.after(memory, readings), readings)
+        return memory._replace(terminated=self.task.ended(memory, readings)[0])
+
+    def terms(self, memory, readings: Readings) -> dict:
+        """Return the other task's terms."""
+        return self.task.terms(memory, readings)
+
+    def observe(self, memory, readings: Readings) -> dict:
+        """Return the other task's blocks, with noise, but for what is left out."""
+        observed = self.task.observe(memory, readings)
+        blocks = {name: observed[name] for name in observed if name not in self.changes.without}
+        if self.noises:
+            count = max(part.stop for part, _ in self.noises.values())
+            drawn = noise.noise(memory.noise_key, memory.elapsed, count)
+            blocks |= {name: blocks[name] + widths * drawn[..., part] for name, (part, widths) in self.noises.items()}
+        return blocks
+
+    def ended(self, memory, readings: Readings) -> tuple:
+        """Return whether the other task has ended."""
+        return self.task.ended(memory, readings)
+
+    def progress(self, memory) -> dict:
+        """Return the other task's figures, and whether the body `fell`, 0 or 1."""
+        figures = self.task.progress(memory)
+        return figures if "fell" in figures else figures | {"fell": memory.terminated * 1.0}
+
+    def carry(self, memory) -> Any:
+        """Return the other task's."""
+        return self.task.carry(memory)
+
+    def _felt(self, memory, readings: Readings):
+        if self.changes.actions == "torque":
+            return memory
+        return memory._replace(angles=readings.joint_angles + 0.0, speeds=readings.velocities[..., 6:] + 0.0)
+
+    def _kick(self, memory, kick):
+        """The kick (..., nv) of a step; a schedule that has run out begins again."""
+        numpy, last = memory.kicks.__array_namespace__(), memory.kick_steps[..., -1:]
+        due = memory.elapsed % last + 1 == memory.kick_steps
+        push = (due[..., None] * memory.kicks).sum(axis=-2)
+        rest = numpy.zeros((*push.shape[:-1], len(self.scene.standing) - 3))
+        push = numpy.concatenate([push, rest], axis=-1)
+        return push if kick is None else kick + push
+
+
+@functools.cache
+def extended(kind: type) -> type:
+    """Return the memory of a task, a NamedTuple, with the fields of `Changes` behind."""
+
+    class Memory(collections.namedtuple(kind.__name__, (*kind._fields, *Changes._fields))):
+        __slots__ = ()
+
+        def __reduce__(self):
+            return _remembered, (kind, *self)
+
+    return Memory
+
+
+def _remembered(kind: type, *fields):
+    return extended(kind)(*fields)
+
+
+def _within(span: tuple[float, float], share: float) -> float:
+    low, high = span
+    return low + share * (high - low)
+
+
+def _delayed(memory, action):
+    """The memory, with an action among those that wait, and the one that arrives (..., joints)."""
+    numpy = action.__array_namespace__()
+    under_way = numpy.concatenate([action[..., None, :], memory.waiting], axis=-2)
+    delay = numpy.asarray(memory.delay)[..., None, None]
+    arrived = numpy.take_along_axis(under_way, delay, axis=-2)[..., 0, :]
+    return memory._replace(waiting=under_way[..., :-1, :]), arrived

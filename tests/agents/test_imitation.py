@@ -1,0 +1,95 @@
+"""Imitation of demonstrators."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+
+from arc_suite.agents import imitation, run_folder
+from arc_suite.agents.algorithms import ALGORITHMS
+from arc_suite.agents.learner import Stage
+from arc_suite.agents.rows import Imitation
+from arc_suite.agents.training import Run, train
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import network
+from arc_suite.robots import ROBOTS, generator
+
+SMALL = Imitation(rows=8, round=10, left_out=2, updates=20, last_updates=40, batch=64, hidden=16)
+
+
+def stage(tmp_path, robot="leaper", task="walk", steps=240, **settings):
+    body = ROBOTS[robot] if isinstance(robot, str) else robot
+    return Stage(body, task, settings, 3, steps, tmp_path)
+
+
+def learned(learner, steps):
+    figures = []
+    while learner.step < steps:
+        figures.append(learner.advance(steps))
+    return figures
+
+
+@pytest.mark.parametrize(("robot", "task"), [("leaper", "walk"), ("tick", "steer")])
+def test_it_goes_on_to_the_bit(tmp_path, robot, task):
+    """The demonstrators of steer remember what they felt; episodes of 11 steps begin and end meanwhile."""
+    given = stage(tmp_path, robot, task, time_limit=0.55)
+    whole, first, second = (imitation.begin(SMALL, given) for _ in range(3))
+    learned(whole, 240)
+    learned(first, 80)
+    arrays = {name: array.copy() for name, array in first.arrays().items()}
+    learned(first, 240)
+    second.restore(arrays)
+    assert second.step == 80
+    learned(second, 240)
+    for other in (first, second):
+        for name, array in whole.arrays().items():
+            assert_array_equal(other.arrays()[name], array, err_msg=name)
+    assert whole.arrays()["ages"].max() == 10
+
+
+def test_what_it_says_comes_near_to_what_the_demonstrator_does(tmp_path):
+    row = dataclasses.replace(SMALL, hidden=64, updates=60, last_updates=200)
+    figures = learned(imitation.begin(row, stage(tmp_path, steps=640)), 640)
+    errors = [each["error"] for each in figures]
+    assert errors[-1] < 0.3 * errors[0] < 0.03
+
+
+def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path):
+    learner = imitation.begin(dataclasses.replace(SMALL, noise=0.0), stage(tmp_path))
+    environment, acted = learner._environment, []
+    step = environment.step
+    environment.step = lambda actions: acted.append(actions.copy()) or step(actions)
+    learner.advance(80)
+    labels, actions = learner.arrays()["labels"], np.array(acted)
+    assert_array_equal(actions[:, :4].astype(np.float32), labels[:, :4])
+    assert (abs(actions[:, 4:] - labels[:, 4:]).max(axis=-1) > 1e-3).all()
+    demonstrator = imitation.Demonstrator("leaper", "refined")
+    for observation, label in zip(learner.arrays()["observations"], labels, strict=True):
+        said = demonstrator.act(environment.task.split(observation))
+        assert_array_equal(said.astype(np.float32), label)
+
+
+@pytest.mark.parametrize(
+    ("robot", "task", "preset"),
+    [("queen", "walk", "refined"), ("queen", "steer", "steered"), (generator.generate(4, 2), "walk", "medium")],
+)
+def test_whom_it_imitates_unless_told(robot, task, preset):
+    body = ROBOTS[robot] if isinstance(robot, str) else robot
+    assert imitation.best(body, VectorEnv(body, task, 1).task) == preset
+
+
+def test_an_unknown_demonstrator_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"^unknown preset 'tunde'; did you mean 'tuned'"):
+        imitation.begin(dataclasses.replace(SMALL, preset="tunde"), stage(tmp_path))
+
+
+def test_a_run_of_any_body(tmp_path):
+    definition = ALGORITHMS["imitation"]._replace(row=SMALL)
+    body, folder = generator.random_body(0), tmp_path / "run"
+    settings = {"time_limit": 1.0}
+    assert train(Run(body, "imitation", definition, "walk", settings, steps=160, evaluate_every=160), folder)
+    assert len(run_folder.table(folder, "evaluations")["return"]) == 10
+    assert network.load(folder).task == "walk"

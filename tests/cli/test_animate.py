@@ -1,0 +1,65 @@
+"""The program that writes animation clips."""
+
+import json
+
+import gltf_reader
+import programs
+import pytest
+
+
+def animate(*arguments, cwd=None):
+    return programs.run("-m", "arc_suite", "animate", *arguments, cwd=cwd)
+
+
+def test_both_files_and_a_row_for_each_clip(tmp_path):
+    arguments = ("--robot=tick", "--clips=walk,idle", "--fps=30", "-o", "tick.glb")
+    done = animate(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    header, walk, idle, wrote = done.stdout.splitlines()
+    assert header.split("  ")[0] == "clip"
+    assert walk.split()[:4] == ["walk", "2.000", "61", "3"]
+    assert float(walk.split()[4]) == pytest.approx(0.32, abs=0.01)
+    assert idle.split()[3:7] == ["0", "0.000", "0.000", "0.0"]
+    assert wrote == "wrote tick.glb and tick.json"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["tick.glb", "tick.json"]
+    data = (tmp_path / "tick.glb").read_bytes()
+    file, figures = gltf_reader.read(data), json.loads((tmp_path / "tick.json").read_text())
+    assert list(figures["clips"]) == [animation["name"] for animation in file.json["animations"]]
+    assert figures["clips"]["walk_loop"]["frames"] == 61
+    assert file.json["asset"]["generator"].startswith("arc_suite ")
+    animate(*arguments, cwd=tmp_path)
+    assert (tmp_path / "tick.glb").read_bytes() == data
+
+
+def test_any_body_as_rigid_parts(tmp_path):
+    flags = ("--legs=4", "--links=2", "--rig=nodes", "--root_motion=moving", "--clips=walk", "-o", "walker.glb")
+    done = animate(*flags, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    file = gltf_reader.read((tmp_path / "walker.glb").read_bytes())
+    assert "skins" not in file.json and len(file.json["animations"]) == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "no file to write; say --output=FILE.glb"),
+        (("-o", "a.gltf"), "unknown extension '.gltf'; did you mean '.glb'?"),
+        (("-o", "a.glb", "--rig=bones"), "unknown rig 'bones'; did you mean 'nodes'?"),
+        (("-o", "a.glb", "--root_motion=none"), "unknown root_motion 'none'"),
+        (("-o", "a.glb", "--clips=walk,run"), "unknown clip 'run'"),
+        (("-o", "a.glb", "--robot=all"), "--robot=all: expected one robot"),
+        (("-o", "a.glb", "--robot=tick", "--clips=walk", "--policy=zero"), "tick, clip walk: the pose does not return"),
+        (
+            (
+                "-o",
+                "nowhere/a.glb",
+            ),
+            "cannot write nowhere/a.glb: no such file or directory",
+        ),
+    ],
+)
+def test_errors_are_one_line_and_leave_no_file(tmp_path, arguments, message):
+    done = animate(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"arc-suite animate: {message}") and done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,52 @@
+"""Write the clips of many bodies, which real programs then open: `make check-glb`, `check-blender`, `check-godot`.
+
+python tests/engines/make_files.py FOLDER [few]
+"""
+
+import pathlib
+import sys
+
+import mujoco
+import numpy as np
+from tqdm import tqdm
+
+from arc_suite import export
+from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.simulation.model import compiled
+
+FEW = ("walk", "turn_left", "idle")
+
+
+def main(folder: str, few: str = "") -> None:
+    """Write FOLDER/<body>-<rig>.glb, and beside it the places of all bones on every frame as .npz."""
+    out = pathlib.Path(folder)
+    out.mkdir(parents=True, exist_ok=True)
+    bodies = dict(ROBOTS)
+    if not few:
+        examples = sorted(pathlib.Path("examples").glob("*.json"))
+        bodies |= {path.stem: spec_files.load_body(path) for path in examples}
+        bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(50)}
+    for name, body in tqdm(bodies.items(), disable=None, unit="body"):
+        clips = export.clips(body, FEW if name in ROBOTS else ("walk", "idle"))
+        for rig in export.RIGS if name in ROBOTS else ("skin",):
+            (out / f"{name}-{rig}.glb").write_bytes(export.glb(body, clips, rig))
+        np.savez(out / f"{name}.npz", **truth(body, clips))
+
+
+def truth(body, clips) -> dict[str, np.ndarray]:
+    """Return where MuJoCo has the parts, (frames, parts, 3) in the axes of glTF, by animation; and their names."""
+    model = compiled(body)
+    data, parts, places = mujoco.MjData(model), [model.body(name).id for name in body.part_names], {}
+    for clip in clips:
+        for motion, end in ((clip.motion, ""), (clip.motion._replace(root=0.0 * clip.motion.root), "_in_place")):
+            frames = []
+            for pose in motion.qpos():
+                data.qpos[:] = pose
+                mujoco.mj_kinematics(model, data)
+                frames.append(data.xpos[parts][:, [1, 2, 0]])
+            places[f"{clip.name}{end if clip.moves else ''}_loop"] = np.stack(frames)
+    return places | {"parts": np.array(body.part_names)}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,135 @@
+"""Motions: places on the ground, loops of synthetic walks whose truth is known."""
+
+import numpy as np
+import pytest
+
+from arc_suite import rotations
+from arc_suite.export import motions
+from arc_suite.export.recordings import Recording
+
+STEP, CYCLE = 0.002, 0.55  # s; a cycle is 11 control steps
+TWISTS = [(0.5, 0.0, 0.0), (0.4, -0.1, 0.8), (0.0, 0.2, -0.5), (-0.3, 0.0, 1e-12)]
+
+
+def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
+    """Two joints and a torso that sway once a cycle on a path of constant twist."""
+    times = STEP * np.arange(round(seconds / STEP) + 1)
+    phase = 2.0 * np.pi * times / cycle
+    root = motions.along(np.array(twist), times)
+    sway = np.stack([0.02 * np.sin(2.0 * phase), 0.03 * np.cos(phase), 0.1 * np.sin(phase)], axis=-1)
+    place = np.stack([motions.after(motions.after(np.array(start), a), b) for a, b in zip(root, sway, strict=True)])
+    roll = 0.05 * np.sin(phase) + drift * times
+    tilt = np.stack([np.cos(0.5 * roll), np.sin(0.5 * roll), 0.0 * roll, 0.0 * roll], axis=-1)
+    quaternions = rotations.turned(tilt, place[:, 2])
+    joints = np.stack([np.sin(phase), 0.3 * np.sin(2.0 * phase) + 0.2 * np.cos(phase) + drift * times], axis=-1)
+    height = 0.5 + 0.01 * np.cos(2.0 * phase)
+    return Recording(STEP, np.concatenate([place[:, :2], height[:, None], quaternions, joints], axis=-1))
+
+
+@pytest.mark.parametrize("twist", TWISTS)
+def test_logarithm_undoes_along(twist):
+    place = motions.along(np.array(twist), np.array([0.0, 1.0]))
+    np.testing.assert_allclose(place[0], 0.0)
+    np.testing.assert_allclose(motions.logarithm(place[1]), twist, atol=1e-12)
+
+
+def test_along_adds_small_steps():
+    twist, place = np.array((0.4, -0.1, 0.8)), np.zeros(3)
+    small = motions.along(twist, np.array([1e-3]))[0]
+    for _ in range(1000):
+        place = motions.after(place, small)
+    np.testing.assert_allclose(motions.along(twist, np.array([1.0]))[0], place, atol=1e-12)
+
+
+def test_relative_undoes_after():
+    first, second = np.array((1.0, 2.0, 0.7)), np.array((-0.5, 0.2, 2.0))
+    np.testing.assert_allclose(motions.relative(first, motions.after(first, second)), second)
+
+
+def test_the_period_is_the_cycle():
+    assert motions.period(walk(TWISTS[0])) == pytest.approx(CYCLE, abs=STEP)
+
+
+def test_what_does_not_return_has_no_period():
+    recording = walk(TWISTS[0])
+    random = np.random.default_rng(0).normal(size=(len(recording.qpos), 2)).cumsum(axis=0)
+    assert motions.period(recording._replace(qpos=np.concatenate([recording.qpos[:, :7], random], axis=-1))) is None
+
+
+@pytest.mark.parametrize("twist", TWISTS)
+def test_a_loop(twist):
+    recording = walk(twist)
+    closing = motions.closings(recording, CYCLE)[1]
+    assert closing.samples == 275 and closing.seam < 1e-9
+    loop = motions.loop(recording, closing._replace(first=137))
+    assert loop.seconds == pytest.approx(CYCLE)
+    np.testing.assert_allclose(loop.twist[2], twist[2], atol=1e-9)
+    assert np.hypot(*loop.twist[:2]) == pytest.approx(np.hypot(*twist[:2]), rel=0.02)
+    for name in ("positions", "quaternions", "joints"):
+        values = getattr(loop, name)
+        assert (values[0] == values[-1]).all(), name
+    # The root runs below the torso, and the whole is what was recorded.
+    np.testing.assert_allclose(loop.positions[:-1, :2].mean(axis=0), 0.0, atol=1e-3)
+    np.testing.assert_allclose(rotations.yaw(loop.quaternions[:-1]).mean(), 0.0, atol=1e-3)
+    qpos = loop.qpos()
+    there = np.concatenate([recording.qpos[:, :2], rotations.yaw(recording.qpos[:, 3:7])[:, None]], axis=-1)[137:413]
+    here = np.concatenate([qpos[:, :2], rotations.yaw(qpos[:, 3:7])[:, None]], axis=-1)
+    difference = motions.relative(here[0], here) - motions.relative(there[0], there)
+    np.testing.assert_allclose(difference[:, :2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(rotations.wrapped(difference[:, 2]), 0.0, atol=1e-9)
+    np.testing.assert_allclose(qpos[:, 7:], recording.qpos[137:413, 7:], atol=1e-9)
+
+
+def test_a_seam_is_spread():
+    recording = walk(TWISTS[1], drift=0.02)
+    assert motions.closing(recording, 275).seam == pytest.approx(0.02 * CYCLE, rel=0.01)
+    loop = motions.loop(recording, motions.Closing(0.0, 10, 275))
+    assert (loop.joints[0] == loop.joints[-1]).all() and (loop.quaternions[0] == loop.quaternions[-1]).all()
+    correction = loop.joints[:, 1] - recording.qpos[10:286, 8]
+    np.testing.assert_allclose(np.diff(correction)[:-1], -0.02 * STEP, atol=1e-12)
+    jumps = abs(np.diff(loop.quaternions, axis=0)).max(axis=-1)
+    assert jumps[[0, -1]].max() < 1.2 * np.median(jumps) + 1e-3
+
+
+def test_of_the_loops_that_close_the_usual_one_is_taken():
+    recording = walk(TWISTS[0], seconds=4 * CYCLE)
+    qpos = recording.qpos.copy()
+    qpos[825:, 0] += 0.02 * np.cos(2.5) * np.arange(276) / 275.0  # the last cycle leads further
+    qpos[825:, 1] += 0.02 * np.sin(2.5) * np.arange(276) / 275.0
+    assert motions.closing(Recording(STEP, qpos), 275).first < 600
+
+
+def test_beginning_elsewhere_is_the_same_loop():
+    loop = motions.loop(walk(TWISTS[1]), motions.Closing(0.0, 10, 275))
+    begun = loop.begun(100)
+    assert (begun.joints[0] == loop.joints[100]).all() and (begun.joints[-1] == begun.joints[0]).all()
+    np.testing.assert_array_equal(np.sort(begun.joints[:-1], axis=0), np.sort(loop.joints[:-1], axis=0))
+
+
+def test_frames_lie_between_samples():
+    loop = motions.loop(walk(TWISTS[1]), motions.Closing(0.0, 10, 275))
+    frames = loop.at(np.linspace(0.0, loop.seconds, 34))
+    assert (frames.joints[0] == loop.joints[0]).all() and (frames.joints[-1] == loop.joints[-1]).all()
+    place = loop.seconds / 33.0 / STEP
+    low = int(place)
+    np.testing.assert_allclose(
+        frames.joints[1], loop.joints[low] + (place - low) * (loop.joints[low + 1] - loop.joints[low]), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.norm(frames.quaternions, axis=-1), 1.0)
+    assert (loop.at(STEP * np.arange(276)).joints == loop.joints).all()
+
+
+def test_a_passage_keeps_the_way():
+    recording = walk((0.5, 0.0, 0.3))
+    passage = motions.passage(recording, 500, 600, 275)
+    there = recording.qpos[500:1101]
+    qpos = passage.qpos()
+    turn = rotations.yaw(qpos[:1, 3:7])[0] - rotations.yaw(there[:1, 3:7])[0]
+    way = rotations.headed(there[:, :2] - there[0, :2], -turn)
+    np.testing.assert_allclose(qpos[:, :2] - qpos[0, :2], way, atol=1e-9)
+    np.testing.assert_allclose(passage.root[0], 0.0, atol=1e-12)
+    speeds = np.hypot(*np.diff(passage.root[:, :2], axis=0).T) / STEP
+    np.testing.assert_allclose(speeds, 0.5, rtol=0.05)  # the torso's own varies by 0.8
+    part = passage.part(100, 200)
+    np.testing.assert_allclose(part.root[0], 0.0, atol=1e-12)
+    assert len(part.joints) == 201 and (part.joints == passage.joints[100:301]).all()

@@ -1,0 +1,310 @@
+"""Lanes of ground: what is drawn, seen and asked for, how an episode ends, and how a curriculum climbs."""
+
+import hashlib
+
+import gymnasium
+import mujoco
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import arc_suite
+from arc_suite import policies
+from arc_suite.arenas import terrain
+from arc_suite.cpg import Demonstrator
+from arc_suite.envs.scene import prepared
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.simulation.model import compiled
+from arc_suite.tasks import TASKS
+from arc_suite.tasks.ground import AHEAD, ASIDE, LEVELS, SCAN, Carry, next_level
+
+KINDS = ("rough", "slopes", "stairs", "gaps")
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+def opened(kind="stairs", robot="tick", **settings):
+    environment = arc_suite.load(robot, kind, {"random": 0, **settings})
+    environment.reset(seed=0)
+    return environment, environment.task.definition, environment.task.memory
+
+
+@pytest.mark.parametrize("curriculum", [False, True])
+def test_height_is_that_of_rays_in_every_lane(curriculum):
+    task, model = prepared("leaper", "course", {"curriculum": curriculum})
+    arena, data = task.scene.arena, mujoco.MjData(model)
+    lanes = len(arena.lanes)
+    assert lanes == (4 * LEVELS if curriculum else 4 * 4)
+    assert {kind for kind, _ in arena.lanes} == set(KINDS)
+    data.qpos[2] = 1e3
+    mujoco.mj_forward(model, data)
+    random, hit = np.random.RandomState(0), np.zeros(1, np.int32)
+    for lane in range(lanes):
+        for x, y in random.uniform((-terrain.BACK, -11.9), (arena.length, 11.9), (40, 2)) * arena.unit:
+            y += arena.start(lane)
+            start = np.array([x, y, 50.0])
+            distance = mujoco.mj_ray(model, data, start, np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
+            assert abs(50.0 - distance - arena.height(np.float64(x), np.float64(y))) < 1e-6 * arena.unit, (lane, x, y)
+
+
+# Of (robot's heights at fixed places) by kind of ground: the ground of a setting never changes.
+DIGESTS = {
+    "rough": "eeeaf6d1f9e96022",
+    "slopes": "20855599f2a44947",
+    "stairs": "bdfc16118cefe904",
+    "gaps": "cc1ab0723c09a40b",
+}
+
+
+@every_kind
+def test_ground_is_a_function_of_its_settings(kind):
+    def heights(**settings):
+        arena = prepared("queen", kind, settings)[0].scene.arena
+        x, y = np.random.RandomState(0).uniform((-3.0, -80.0), (40.0, 80.0), (500, 2)).T
+        return np.round(arena.height(x * arena.unit, y * arena.unit), 9)
+
+    assert hashlib.sha256(heights().tobytes()).hexdigest()[:16] == DIGESTS[kind]
+    assert_array_equal(heights(), heights(terrain_seed=0, difficulty=2.0 / 3.0))
+    assert not np.array_equal(heights(), heights(terrain_seed=1))
+    assert abs(heights(difficulty=1.0)).max() > abs(heights(difficulty=0.3)).max() or kind == "gaps"
+
+
+def test_a_lane_is_the_same_beside_others():
+    body, places = ROBOTS["queen"], np.linspace(0.0, 20.0, 300)
+    alone = terrain.made(body, {"gaps": 1}, 40.0)
+    beside = terrain.made(body, {"rough": 2, "gaps": 2}, 40.0)
+    for one, other in ((0, 2),):
+        heights = (
+            arena.height(places, arena.start(lane) + 0.0 * places) for arena, lane in ((alone, one), (beside, other))
+        )
+        assert_array_equal(*heights)
+
+
+@pytest.mark.parametrize("kind", ["rough", "slopes"])
+def test_difficulty_0_is_level(kind):
+    arena = prepared("bastion", kind, {"difficulty": 0.0})[0].scene.arena
+    x, y = np.random.RandomState(0).uniform(-3.0, 12.0, (2, 100))
+    assert not arena.height(x, y).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
+    level = terrain.made(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
+    returns = []
+    for arena in (level, "flat"):
+        rows = VectorEnv(
+            ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0}
+        )  # none is lifted
+        policy = policies.policy("cpg", robot, "tuned", rows=6)
+        observations, rewards, total = rows.reset(seed=0)[0], np.zeros(6), 0.0
+        policy.begin(range(6), range(6))
+        for _ in range(300):
+            observations, rewards, *_ = rows.step(policy.act(rows.task.split(observations.astype(float)), rewards))
+            total += rewards.mean()
+        rows.close()
+        returns.append(total)
+    # Bastion's speed sways more on a height field, which touches a foot in several points: 2.4 % once it walks.
+    assert abs(returns[0] / returns[1] - 1.0) < (0.04 if robot == "bastion" else 0.01)
+
+
+@pytest.mark.parametrize("name", [name for name, task in TASKS.items() if task.own_arena])
+def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
+    environment, task, _ = opened(name, "bastion")
+    arena, radii = task.scene.arena, np.array([leg.foot.radius for leg in task.scene.body.legs])
+    lanes = set()
+    for _ in range(40):
+        environment.reset()
+        memory, data = environment.task.memory, environment.physics.data.ptr
+        lanes.add(float(memory.lane))
+        assert abs(data.qpos[1] - memory.lane) < 6.5 * arena.unit
+        assert abs(memory.place[2]) < 0.5
+        assert (task.read(data).foot_heights - radii).min() > 0.0099 * arena.unit
+    assert len(lanes) > 0.6 * min(40, len(arena.lanes))
+    assert lanes <= {arena.start(lane) for lane in range(len(arena.lanes))}
+
+
+def test_what_is_drawn_and_in_which_order():
+    """Kind, two for the level, lane, place; then the noise of the state, yaw, ends and commands of the schedule."""
+    task = prepared("tick", "course", {"curriculum": True, "level": 3})[0]
+    start = task.start(np.random.RandomState(7), task.first())
+    random = np.random.RandomState(7)
+    kind, stays, other, lane = random.randint(4), random.uniform(), random.randint(LEVELS), random.randint(1)
+    place = random.uniform(-6.0, 6.0)
+    joints = len(task.scene.body.joint_names)
+    random.uniform(size=7 + joints), random.standard_normal(6 + joints)
+    yaw, ends = random.uniform(-0.3, 0.3), random.randint(60, 161, 17).cumsum()
+    assert start.memory.lane == task.scene.arena.start(kind * LEVELS + 3 + lane) and start.memory.level == 3
+    noise = task.settings.noise.position_noise
+    assert abs(start.qpos[1] - start.memory.lane - place * task.scene.arena.unit) <= noise
+    assert_array_equal(start.memory.ends, ends)
+    assert abs(yaw) < 0.3 and 0.0 <= stays < 1.0 and other in range(LEVELS)
+
+
+def test_the_scan_is_the_ground_about_the_torso():
+    environment, task, _ = opened("gaps", "queen", difficulty=1.0)
+    demonstrator, timestep = Demonstrator("queen", "steered"), environment.reset(seed=3)
+    for _ in range(60):
+        timestep = environment.step(demonstrator(timestep))
+    memory, data, arena = environment.task.memory, environment.physics.data.ptr, task.scene.arena
+    scan = timestep.observation["scan"]
+    assert scan.shape == (len(AHEAD) * len(ASIDE),) == (175,)
+    heading = memory.place[2]
+    for (forward, left), value in zip(SCAN.T * task.reach, scan, strict=True):
+        x = data.qpos[0] + np.cos(heading) * forward - np.sin(heading) * left
+        y = data.qpos[1] + np.sin(heading) * forward + np.cos(heading) * left
+        under = (arena.height(x, y) - data.qpos[2]) / arena.unit + 1.0
+        assert value == pytest.approx(np.clip(under, -1.0, 1.0), abs=1e-12)
+    assert scan.min() < -0.4 < 0.0 < scan.max() + 0.3, "a trench is in sight, and land"
+
+
+def test_the_command_leads_along_the_lane():
+    _, task, memory = opened()
+    for heading in (-2.0, -0.2, 0.0, 0.3):
+        turned = memory._replace(place=np.array([0.0, 0.0, heading]))
+        forward, left, turn = task.wanted(turned)
+        assert_allclose(
+            (np.cos(heading), np.sin(heading)) @ np.array([[forward, left], [-left, forward]]), (1.0, 0.0), atol=1e-12
+        )
+        assert turn == np.clip(-heading * task.reach / task.scene.arena.unit, -1.0, 1.0)
+    player = turned._replace(command=np.array([0.2, np.nan, 0.1]))
+    assert_array_equal(task.wanted(player)[[0, 2]], (0.2, 0.1))
+    assert task.wanted(player)[1] == task.wanted(turned)[1]
+
+
+def test_how_an_episode_ends():
+    environment, task, memory = opened()
+    readings, unit = task.read(environment.physics.data.ptr), task.scene.arena.unit
+
+    def ended(**changed):
+        return tuple(bool(end) for end in task.ended(memory._replace(**changed), readings))
+
+    assert ended() == (False, False)
+    assert ended(fell=np.True_) == (True, False)
+    assert ended(place=np.array([0.0, memory.lane + 10.1 * unit, 0.0])) == (False, True)
+    assert ended(place=np.array([0.0, memory.lane - 9.9 * unit, 0.0])) == (False, False)
+    assert ended(place=np.array([(task.scene.arena.length - 0.9) * unit, memory.lane, 0.0])) == (False, True)
+    assert ended(place=np.array([-3.1 * unit, memory.lane, 0.0])) == (False, True)
+    deep = readings._replace(foot_heights=np.full(6, 0.1 * unit) - np.eye(6)[2] * 0.2 * unit)
+    for steps in range(1, 6):
+        memory = task.after(memory, deep)
+        assert (memory.sinking, bool(task.ended(memory, deep)[0])) == (steps, steps == 5)
+    assert task.progress(memory)["sank"] == 1.0
+    assert task.after(memory, readings).sinking == 0
+
+
+def test_distance_is_the_share_of_what_was_asked_for():
+    _, task, memory = opened(time_limit=10.0)
+    step = task.units[0] * task.scene.control_timestep
+    walked = memory._replace(steps=100, distance=50.0 * step)
+    assert task.distance(walked) == pytest.approx(0.5)
+    assert task.distance(walked._replace(fell=np.True_)) == pytest.approx(0.25), "of 200 steps"
+    assert_array_equal(list(task.progress(walked))[:2], ["distance", "tracking"])
+    assert task.carry(walked) == Carry(0, task.distance(walked), False)
+
+
+@pytest.mark.parametrize(
+    ("carry", "stays", "level"),
+    [
+        (Carry(4, 0.81, False), 0.9, 5),
+        (Carry(4, 0.81, True), 0.9, 4),
+        (Carry(4, 0.79, False), 0.9, 4),
+        (Carry(4, 0.41, True), 0.9, 4),
+        (Carry(4, 0.39, False), 0.9, 3),
+        (Carry(0, 0.1, True), 0.9, 0),
+        (Carry(9, 0.9, False), 0.74, 9),
+        (Carry(9, 0.9, False), 0.76, 2),
+        (Carry(9, 0.9, True), 0.76, 9),
+    ],
+)
+def test_levels_rise_and_fall_by_what_was_commanded(carry, stays, level):
+    assert next_level(carry, stays, other=2) == level
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("name", ["rough", "course"])
+def test_rows_of_a_curriculum_are_single_environments(name, threads):
+    """Over six episodes whose levels change."""
+    settings = {"curriculum": True, "level": 4, "time_limit": 0.6}
+    rows = VectorEnv("leaper", name, 3, threads, task_kwargs=settings)
+    single = gymnasium.make(f"arc_suite/leaper-{name}-v0", task_kwargs=settings)
+    assert_array_equal(rows.reset(seed=10)[0][1], single.reset(seed=11)[0])
+    random, levels, ended = np.random.RandomState(0), [], False
+    for _ in range(80):
+        actions = random.uniform(-1.0, 1.0, rows.action_space.shape).astype(np.float32)
+        observations, rewards, _, truncated, infos = rows.step(actions)
+        if ended:
+            (observation, _), ended = single.reset(), False
+        else:
+            observation, reward, _, ended, info = single.step(actions[1])
+            assert (rewards[1], truncated[1]) == (reward, ended)
+            assert {figure: infos[figure][1] for figure in info} == info
+            levels.append(info["progress_level"])
+        assert_array_equal(observations[1], observation)
+    assert levels[0] == 4.0 and len(set(levels)) >= 3
+    rows.close()
+
+
+@pytest.mark.slow
+def test_a_curriculum_rises_for_who_walks():
+    settings = {"curriculum": True, "time_limit": 12.0}
+    environment, demonstrator, levels = (
+        arc_suite.load("tick", "stairs", settings),
+        Demonstrator("tick", "surefooted"),
+        [],
+    )
+    environment.reset(seed=0)
+    for _ in range(3):
+        timestep = environment.reset()
+        levels.append(environment.task.memory.level)
+        while not timestep.last():
+            timestep = environment.step(demonstrator(timestep))
+    assert levels == [levels[0], levels[0] + 1, levels[0] + 2]
+
+
+@pytest.mark.slow
+def test_ground_has_no_scale():
+    distances = []
+    for scale in (0.075, 1.0, 10.0):
+        body = generator.scaled(generator.generate(6, 3), scale)
+        rows = VectorEnv(body, "rough", 6, task_kwargs={"terrain_seed": 3})
+        policy = policies.policy("cpg", body, "surefooted", rows=6)
+        observations, rewards = rows.reset(seed=0)[0], np.zeros(6)
+        policy.begin(range(6), range(6))
+        for _ in range(250):
+            actions = policy.act(rows.task.split(observations.astype(float)), rewards)
+            observations, rewards, *_, infos = rows.step(actions)
+        distances.append(infos["progress_distance"].mean())
+        rows.close()
+    assert np.ptp(distances) < 0.02 and min(distances) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"difficulty": 1.5}, "difficulty: expected a number from 0 to 1, got 1.5"),
+        ({"dificulty": 0.5}, "unknown setting of rough 'dificulty'; did you mean 'difficulty'?"),
+        ({"curriculum": 1}, "curriculum: expected true or false, got 1"),
+        ({"level": 10}, "level: expected an integer from 0 to 9, got 10"),
+        ({"terrain_seed": -1}, "terrain_seed: expected an integer from 0"),
+        ({"arena": "flat"}, "arena: task rough has a ground of its own, expected none"),
+    ],
+)
+def test_settings_that_do_not_fit_are_one_line(settings, message):
+    with pytest.raises(ValueError) as error:
+        arc_suite.load("tick", "rough", settings)
+    assert str(error.value).startswith(message) and "\n" not in str(error.value)
+
+
+def test_models_of_rows_and_of_one_environment_are_one():
+    body = ROBOTS["tick"]
+    arena = prepared(body, "stairs")[0].scene.arena
+    assert compiled(body, arena).ngeom == arc_suite.load(body, "stairs").physics.model.ngeom
+    assert arena == prepared(body, "stairs")[0].scene.arena and hash(arena) == hash(
+        prepared(body, "stairs")[0].scene.arena
+    )
+
+
+def test_the_scan_in_a_mirror():
+    mirror = prepared("queen", "rough")[0].mirrors["scan"]
+    assert_allclose(mirror(SCAN), SCAN * [[1.0], [-1.0]], atol=1e-15)

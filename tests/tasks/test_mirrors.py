@@ -1,0 +1,119 @@
+"""Walks in a mirror: from mirrored starts, by mirrored actions, they are mirrored to rounding."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import arc_suite
+from arc_suite.robots import ROBOTS, generator, mirror
+from arc_suite.tasks import mirrors
+
+STEPS = 20
+BODIES = [*ROBOTS, *(generator.random_body(seed) for seed in (1, 4, 5, 6, 7, 8)), generator.generate(8, 2)]
+
+
+def name_of(body):
+    return body if isinstance(body, str) else body.name
+
+
+def look_into_the_mirror(task):
+    """Let a task start mirrored, with the clock of its gait half a cycle later where its sides take turns."""
+    image, action, sign = mirror.image(task.scene.body), task.symmetry.action, task.mirrors["gait_clock"].signs[0]
+    poses = mirrors.joined([mirrors.POLAR, mirrors.QUATERNION, action])
+    velocities = mirrors.joined([mirrors.POLAR, mirrors.AXIAL, action])
+    start, clock = task.start, task.clock
+
+    def mirrored(random, carry):
+        begun = start(random, carry)
+        memory = begun.memory
+        if "schedule" in memory._fields:
+            memory = memory._replace(schedule=mirrors.PLANAR(memory.schedule))
+        return begun._replace(qpos=poses(begun.qpos), qvel=velocities(begun.qvel), memory=memory)
+
+    vars(task)["start"] = mirrored
+    vars(task)["clock"] = clock._replace(circle=sign * clock.circle, stance=clock.stance[:, image.legs])
+
+
+@pytest.mark.parametrize("task", ["walk", "steer"])
+@pytest.mark.parametrize("body", BODIES, ids=name_of)
+def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
+    one, other = (arc_suite.load(body, task, {"random": 0}) for _ in range(2))
+    definition = one.task.definition
+    observation, action = definition.symmetry
+    look_into_the_mirror(other.task.definition)
+    random = np.random.RandomState(1)
+    timestep, image = one.reset(), other.reset()
+    for _ in range(STEPS):
+        np.testing.assert_allclose(
+            definition.vector(image.observation), observation(definition.vector(timestep.observation)), atol=2e-12
+        )
+        acts = random.uniform(-0.5, 0.5, action.signs.shape)
+        timestep, image = one.step(acts), other.step(action(acts))
+        assert image.reward == pytest.approx(timestep.reward, abs=1e-12)
+        assert not timestep.last()
+    # The walk is none that is its own image.
+    last = definition.vector(timestep.observation)
+    moving = definition.blocks["posture"] + definition.blocks["velocities"]
+    assert (abs(observation(last) - last) > 1e-6)[:moving].mean() > 0.7
+
+
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_the_gaits_of_the_robots_take_turns(task):
+    for robot in ROBOTS:
+        task_of_robot = arc_suite.load(robot, task).task.definition
+        clock, image = task_of_robot.clock, mirror.image(ROBOTS[robot])
+        assert task_of_robot.mirrors["gait_clock"].signs.tolist() == [-1, -1]
+        later = task_of_robot.clock.made(
+            task_of_robot.parameters.gait_frequency,
+            task_of_robot.parameters.duty_factor,
+            task_of_robot.parameters.phase_offsets + np.pi,
+            task_of_robot.scene.control_timestep,
+            100,
+        )
+        # But where an edge falls on a tick to rounding.
+        assert (later.stance != clock.stance[:101, image.legs]).mean() < 0.1
+
+
+def test_twice_is_once_for_rows_of_any_precision():
+    observation, action = arc_suite.symmetry("leaper", "steer")
+    random = np.random.default_rng(0)
+    for there, size in ((observation, 169), (action, 12)):
+        for precision in (np.float32, np.float64):
+            vectors = random.normal(size=(3, 4, size)).astype(precision)
+            assert there(vectors).dtype == precision
+            assert_array_equal(there(there(vectors)), vectors)
+            assert not np.array_equal(there(vectors), vectors)
+
+
+def test_a_gait_whose_sides_move_together_keeps_its_clock():
+    task = arc_suite.load("leaper", "walk", {"gait": "bound"}).task.definition
+    assert task.mirrors["gait_clock"].signs.tolist() == [1, 1]
+
+
+@pytest.mark.parametrize(
+    ("body", "settings", "message"),
+    [
+        ("queen", {"phase_offsets": (0, 1, 2, 3, 4, 5)}, "phase_offsets: expected legs across from each other to move"),
+        ("queen", {"default_angles": np.arange(18) / 9}, "default_angles: expected mirrored poses left and right"),
+        (generator.random_body(0), {}, "phase_offsets: expected legs across from each other"),
+        (generator.random_body(10), {}, "random_10 is not its own mirror image: no leg is across from leg1"),
+    ],
+)
+def test_what_has_no_mirror_image_is_refused_in_one_line(body, settings, message):
+    with pytest.raises(ValueError) as error:
+        arc_suite.symmetry(body, "walk", settings)
+    assert str(error.value).startswith(message) and "\n" not in str(error.value)
+
+
+def test_a_task_that_does_not_tell_is_refused():
+    import gaitless
+
+    with gaitless.registered(), pytest.raises(ValueError, match=r"^task stay: does not tell how its observation is "):
+        arc_suite.symmetry("tick", "stay")
+
+
+@pytest.mark.parametrize(("robot", "task"), arc_suite.ALL_TASKS)
+def test_every_task_has_a_mirror(robot, task):
+    observation, _ = arc_suite.symmetry(robot, task)
+    size = arc_suite.load(robot, task).task.definition.size
+    assert_array_equal(np.sort(observation.sources), np.arange(size))

@@ -1,0 +1,436 @@
+"""Modifiers of tasks: what each changes, that nothing else does, and that rows are single environments to the bit."""
+
+import copy
+import itertools
+import math
+import pathlib
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+import arc_suite
+from arc_suite.envs.scene import prepared
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.models.sizing import GRAVITY
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec_files import load_body
+from arc_suite.tasks import TASKS, modified, noise
+from arc_suite.tasks.modifiers import NAMES
+
+SPIDER = load_body(pathlib.Path(__file__).parents[2] / "examples" / "spider.json")
+BODIES = {**ROBOTS, "spider": SPIDER}
+EACH = {
+    "kicks": {"kicks": 1.5},
+    "motor_strength": {"motor_strength": (0.5, 1.0)},
+    "limp": {"limp": True},
+    "friction": {"friction": (0.2, 1.0)},
+    "mass": {"mass": (0.7, 2.0)},
+    "observation_noise": {"observation_noise": 1.0},
+    "delay": {"delay": (0, 3)},
+    "actions": {"actions": "position"},
+    "without": {"without": ("contact_forces",)},
+}
+ALL = {name: value for setting in EACH.values() for name, value in setting.items()}
+CASES = EACH | {"all": ALL}
+# All at once in the fast tests, each by itself in the slow ones.
+every_case_and_task = pytest.mark.parametrize(
+    ("case", "task_name"),
+    [
+        pytest.param(case, task, marks=() if (case, task) in (("all", "walk"), ("all", "steer")) else pytest.mark.slow)
+        for case, task in [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)]
+    ],
+)
+every_body = pytest.mark.parametrize("body", BODIES)
+
+
+def load(body, task_name, random=0, **settings):
+    return arc_suite.load(BODIES[body], task_name, {"random": random, **settings})
+
+
+def flat(timestep):
+    return np.concatenate(list(timestep.observation.values()))
+
+
+def actions(environment, count, seed=0):
+    return np.random.RandomState(seed).uniform(-0.3, 0.3, (count, *environment.action_spec().shape))
+
+
+def test_every_modifier_is_tried():
+    assert set(EACH) == set(NAMES)
+
+
+@every_case_and_task
+@every_body
+def test_a_modified_task_conforms(case, task_name, body):
+    one, two = load(body, task_name, **CASES[case]), load(body, task_name, **CASES[case])
+    plain = load(body, task_name)
+    timestep, _ = one.reset(), plain.reset()
+    blocks = {name: (size,) for name, size in one.task.definition.blocks.items()}
+    assert {name: block.shape for name, block in timestep.observation.items()} == blocks
+    assert set(plain.task.definition.blocks) - set(blocks) == (
+        {"contact_forces"} if case in ("without", "all") else set()
+    )
+    assert one.action_spec() == plain.action_spec()
+    assert_array_equal(flat(timestep), flat(two.reset()))
+    for action in actions(one, 3):
+        once, twin = one.step(action), two.step(action)
+        assert once.reward == twin.reward
+        assert_array_equal(flat(once), flat(twin))
+    twin = copy.deepcopy(one)
+    for action in actions(one, 2, seed=1):
+        assert_array_equal(flat(one.step(action)), flat(twin.step(action)))
+    assert one.task.progress.keys() == plain.task.progress.keys() | {"fell"}
+    definition = one.task.definition
+    assert (definition.name, definition.version) == (task_name, plain.task.definition.version)
+
+
+@pytest.mark.parametrize("task_name", ["walk", "steer", "stairs", "shoved"])
+@every_body
+def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
+    """And what they draw, they draw after all that the task draws."""
+    neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0, "kicks": 0}
+    plain = load(body, task_name, **({"kicks": 0.0, "limp": False} if TASKS[task_name].modifiers else {}))
+    one = load(body, task_name, **neutral, limp=False, without=(), actions="torque")
+    assert_array_equal(flat(one.reset()), flat(plain.reset()))
+    for action in actions(one, 10):
+        once, other = one.step(action), plain.step(action)
+        assert once.reward == other.reward
+        assert_array_equal(flat(once), flat(other))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("case", "task_name", "threads"),
+    [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", task, 3) for task in TASKS)],
+)
+@every_body
+def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
+    """Over three episodes, through kicks and limping, among rows that start at other times, and through a pickle."""
+    length = 50 * prepared(BODIES[body], "walk")[0].scene.control_timestep
+    settings = CASES[case] | {"time_limit": length}
+    names = {"domain_name": BODIES[body], "task_name": task_name, "task_kwargs": settings}
+    rows, single = (
+        VectorEnv(num_envs=3, num_threads=threads, **names),
+        gymnasium.make("arc_suite/queen-walk-v0", **names),
+    )
+    observations, observation = rows.reset(seed=40)[0], single.reset(seed=41)[0]
+    assert_array_equal(observations[1], observation)
+    random, ended, episodes, step = np.random.RandomState(0), False, 1, 0
+    while episodes < 4:
+        step += 1
+        action = random.uniform(-0.4, 0.4, rows.single_action_space.shape).astype(np.float32)
+        if step == 20:
+            rows.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
+        if step == 45:
+            rows, single = pickle.loads(pickle.dumps(rows)), copy.deepcopy(single)
+        observations, rewards, terminated, truncated, infos = rows.step(np.stack([0.1 * action, action, -action]))
+        if ended:
+            (observation, _), ended, episodes = single.reset(), False, episodes + 1
+        else:
+            observation, reward, *ends, info = single.step(action)
+            ended = any(ends)
+            assert (rewards[1], terminated[1], truncated[1]) == (reward, *ends)
+            assert {name: infos[name][1] for name in info} == info
+        assert_array_equal(observations[1], observation)
+    rows.close()
+
+
+GOLDEN = [87, 108, 65, 107, 63, 0.9295281911731215, 0.26258377004339706, 0.7507627278607257, 0.25489406250513713]
+GOLDEN += [0.8512945862882053, 1.776380432471899, 5.786773079359972, 2.7227691187924683, 2.6311292476041475]
+GOLDEN += [5, 0.47232399628840227, 0.8414767148983973, 0.13111064234791392, 0.3087336572978354, 1988554376]
+
+
+def test_the_draws_are_these_in_this_order():
+    drawn = modified.draw(np.random.RandomState(7), 6)
+    first = [*np.diff(drawn.kick_steps, prepend=0)[:5], *drawn.kick_sizes[:5], *drawn.kick_directions[:4]]
+    last = [drawn.leg, drawn.strength, drawn.friction, drawn.mass, drawn.delay, drawn.noise_key]
+    assert len(first + last) == 20
+    assert_allclose(first + last, GOLDEN, rtol=1e-15)
+
+
+def test_draws_are_spread_as_they_say():
+    random = np.random.RandomState(0)
+    drawn = [modified.draw(random, 6) for _ in range(2000)]
+    gaps = np.diff([one.kick_steps for one in drawn], prepend=0, axis=-1)
+    assert (gaps.min(), gaps.max()) == (40, 120)
+    assert gaps.mean() == pytest.approx(80.0, abs=0.5)
+    sizes, directions = (np.ravel([getattr(one, name) for one in drawn]) for name in ("kick_sizes", "kick_directions"))
+    assert sizes.mean() == pytest.approx(0.5, abs=0.01) and 0.0 <= sizes.min() < 0.001 and 0.999 < sizes.max() < 1.0
+    assert abs(np.exp(1j * directions).mean()) < 0.01
+    assert_allclose(np.bincount([one.leg for one in drawn]) / 2000, 1 / 6, atol=0.03)
+    for name in ("strength", "friction", "mass", "delay"):
+        shares = np.array([getattr(one, name) for one in drawn])
+        assert shares.mean() == pytest.approx(0.5, abs=0.03) and shares.std() == pytest.approx(12**-0.5, abs=0.02)
+    assert len({int(one.noise_key) for one in drawn}) == 2000
+
+
+def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_again():
+    environment = load("tick", "walk", kicks=1.5, time_limit=math.inf)
+    environment.reset()
+    task, memory, seen = environment.task.definition, environment.task.memory, {}
+    for step in range(1, int(memory.kick_steps[-1]) + 200):
+        memory, inputs = task.before(memory, np.zeros(18))
+        assert inputs.kick.shape == (24,) and not inputs.kick[2:].any()
+        if inputs.kick.any():
+            seen[step] = inputs.kick[:2]
+    period = memory.kick_steps[-1]
+    due = [*memory.kick_steps, *(period + memory.kick_steps[: len(seen) - 25])]
+    assert len(seen) > 25 and list(seen) == due
+    assert_array_equal(list(seen.values())[:25], memory.kicks)
+    assert_array_equal(list(seen.values())[25:], memory.kicks[: len(seen) - 25])
+    sizes = np.hypot(*memory.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
+    assert sizes.min() > 0.0 and sizes.max() < 1.5
+    stronger = load("tick", "walk", kicks=3.0)
+    stronger.reset()
+    assert_allclose(stronger.task.memory.kicks, 2.0 * memory.kicks, rtol=1e-15)
+
+
+def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
+    environment = load("queen", "walk", kicks=1.5)
+    environment.reset()
+    physics, changes = environment.physics, []
+    advance = physics.step
+
+    def watched(nstep):
+        changes.append(physics.velocity() - after)
+        advance(nstep)
+
+    monkeypatch.setattr(physics, "step", watched)
+    first = environment.task.memory.kick_steps[0]
+    for _ in range(first):
+        after = physics.velocity().copy()
+        environment.step(np.zeros(18))
+    assert not np.any(changes[:-1])
+    assert_allclose(changes[-1], [*environment.task.memory.kicks[0], *np.zeros(22)], atol=1e-15)
+
+
+@pytest.mark.parametrize("leg", [True, 0, 4])
+def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
+    environment = load("queen", "walk", limp=leg)
+    environment.reset()
+    names = ROBOTS["queen"].joint_names
+    action = np.linspace(0.1, 0.2, 18)
+    for step in range(60):
+        environment.step(action)
+        ctrl = environment.physics.data.ctrl
+        assert_array_equal(ctrl, action if step < 40 else np.where(environment.task.memory.limp, 0.0, action))
+    limp = np.flatnonzero(environment.task.memory.limp)
+    assert len({names[index].rpartition("_")[0] for index in limp}) == 1 and len(limp) == 3
+    if leg is not True:
+        assert_array_equal(limp, [3 * leg, 3 * leg + 1, 3 * leg + 2])
+    assert environment.task.terms["control"] == (action**2).sum(), "the reward sees what was asked"
+
+
+def test_each_episode_draws_a_leg_a_strength_a_friction_and_a_delay_of_its_own():
+    environment = load(
+        "leaper", "walk", limp=True, motor_strength=(0.5, 1.0), friction=(0.2, 1.0), mass=(0.8, 2.0), delay=(1, 3)
+    )
+    compiled = environment.physics.model.ptr
+    friction, mass = compiled.pair_friction.copy(), compiled.body_mass.copy()
+    drawn = []
+    for _ in range(60):
+        environment.reset()
+        memory, model = environment.task.memory, environment.physics.model.ptr
+        slide, weight = model.pair_friction / friction, (model.body_mass[1:] / mass[1:])
+        for values in (slide, weight, memory.strength):
+            assert_allclose(values, values.flat[0], rtol=1e-12)
+        drawn.append((memory.limp.argmax(), memory.delay, memory.strength[0], slide[0, 0], weight[0]))
+    legs, delays, *ranges = zip(*drawn, strict=True)
+    assert set(legs) == {0, 3, 6, 9} and set(delays) == {1, 2, 3}
+    for values, (low, high) in zip(ranges, ((0.5, 1.0), (0.2, 1.0), (0.8, 2.0)), strict=True):
+        width = high - low
+        assert low <= min(values) < low + 0.15 * width and high - 0.15 * width < max(values) <= high
+
+
+def test_motors_that_are_weak_give_their_share():
+    environment = load("leaper", "walk", motor_strength=0.25)
+    environment.reset()
+    environment.step(np.full(12, 0.8))
+    assert_array_equal(environment.physics.data.ctrl, 0.2)
+    assert environment.task.terms["control"] == pytest.approx(12 * 0.64)
+
+
+def test_a_heavier_body_is_as_if_it_had_been_compiled_so():
+    """Masses, inertias and what MuJoCo derives from them; and the next reset begins from the body as it was."""
+    body = ROBOTS["queen"]
+    environment = load("queen", "walk", mass=2.0)
+    environment.reset()
+    model = environment.physics.model.ptr
+    plain = load("queen", "walk").physics.model.ptr
+    assert_allclose(model.body_subtreemass, 2.0 * plain.body_subtreemass)
+    assert_allclose(model.dof_M0 - model.dof_armature, 2.0 * (plain.dof_M0 - plain.dof_armature), rtol=1e-9)
+    assert model.body_invweight0[1, 0] < 0.6 * plain.body_invweight0[1, 0]
+    environment.physics.reset()
+    for field in ("body_mass", "body_inertia", "body_subtreemass", "dof_M0", "dof_invweight0", "body_invweight0"):
+        assert_array_equal(getattr(model, field), getattr(plain, field), err_msg=field)
+    assert body == environment.task.body
+
+
+@pytest.mark.parametrize("arena", ["flat", "bumps"])
+def test_what_slides_slides_further_with_less_friction(arena):
+    """Whether contacts are listed or not."""
+    gone = {}
+    for friction in (0.01, 1.0):
+        environment = load("queen", "walk", friction=friction, arena=arena)
+        environment.reset()
+        environment.physics.data.qvel[0] = 1.0
+        for _ in range(10):
+            environment.step(np.zeros(18))
+        gone[friction] = environment.physics.position()[0]
+    assert gone[0.01] > gone[1.0] + 0.1
+
+
+@pytest.mark.parametrize("delay", [1, 4])
+def test_actions_arrive_late(delay):
+    environment = load("tick", "walk", delay=delay)
+    environment.reset()
+    for step in range(10):
+        environment.step(np.full(18, 0.01 * (step + 1)))
+        assert_array_equal(environment.physics.data.ctrl, 0.01 * max(0, step + 1 - delay))
+
+
+def test_positions_are_held():
+    """Action 0 stands; others move the joints where they say, and the reward sees the torques."""
+    environment = load("queen", "walk", actions="position")
+    environment.reset()
+    for _ in range(30):
+        timestep = environment.step(np.zeros(18))
+    assert abs(timestep.observation["posture"][5:]).max() < 0.1
+    hips = np.array([name.endswith("hip") for name in ROBOTS["queen"].joint_names])
+    for _ in range(30):
+        timestep = environment.step(np.where(hips, 0.5, 0.0))
+    assert_allclose(timestep.observation["posture"][5:][hips], math.radians(15.0), atol=0.08)
+    ctrl = environment.physics.data.ctrl
+    assert environment.task.terms["control"] == pytest.approx((ctrl**2).sum())
+
+
+def test_torques_have_positions_that_give_them():
+    task, random = load("leaper", "walk", actions="position").task.definition, np.random.RandomState(0)
+    angles, speeds, torques = (scale * random.uniform(-1, 1, (50, 12)) for scale in (0.5, 1.0, 1.0))
+
+    class Memory:
+        pass
+
+    Memory.angles, Memory.speeds = angles, speeds
+    action = task.positions(torques, angles, speeds)
+    reached = abs(action) < 1.0
+    assert reached.mean() > 0.5
+    assert_allclose(task.torques(Memory, action)[reached], torques[reached], atol=1e-9)
+
+
+def test_noise_is_uniform_and_depends_on_all_that_it_counts():
+    keys = np.random.RandomState(0).randint(2**32, size=(40, 1), dtype=np.uint32)
+    drawn = np.stack([noise.noise(keys, np.full((40, 1), step, np.uint32), 50) for step in range(50)])
+    assert drawn.shape == (50, 40, 50) and drawn.min() >= -1.0 and drawn.max() < 1.0
+    counts = np.histogram(drawn, 20, (-1.0, 1.0))[0]
+    assert ((counts - 5000) ** 2 / 5000).sum() < 43.8, "chi squared with 19 degrees of freedom, 1 in 1000"
+    for axis in range(3):
+        lines = np.moveaxis(drawn, axis, 0).reshape(drawn.shape[axis], -1)
+        for lag in (1, 2, 7):
+            assert abs((lines[lag:] * lines[:-lag]).mean() * 3.0) < 0.012
+    # As MurmurHash3's own finaliser computes.
+    assert_array_equal(
+        noise.scrambled(np.array([0, 1, 0xDEADBEEF], np.uint32)), np.array([0, 0x514E28B7, 0x0DE5C6A9], np.uint32)
+    )
+
+
+def test_noise_is_on_what_is_measured_and_on_nothing_else():
+    noisy, plain = load("queen", "steer", observation_noise=1.0), load("queen", "steer")
+    once, other = noisy.reset(), plain.reset()
+    errors = []
+    for action in actions(noisy, 40):
+        assert_array_equal(once.observation["gait_clock"], other.observation["gait_clock"])
+        assert_array_equal(once.observation["command"], other.observation["command"])
+        errors.append({name: once.observation[name] - block for name, block in other.observation.items()})
+        once, other = noisy.step(action), plain.step(action)
+        assert once.reward == other.reward
+    widths = noise.half_widths(ROBOTS["queen"], plain.task.definition.blocks)
+    assert set(widths) == {"posture", "velocities", "contact_forces", "scan"} & set(plain.task.definition.blocks)
+    for name, width in widths.items():
+        error = np.array([step[name] for step in errors]) / width
+        assert 0.9 < abs(error).max() <= 1.0
+        assert error.std() == pytest.approx(3**-0.5, rel=0.05) and abs(error.mean()) < 0.05
+
+
+def test_noise_of_one_block_is_the_same_whatever_else_is_observed():
+    alone = load("queen", "walk", observation_noise={"velocities": 2.0}, without="posture")
+    both = load("queen", "walk", observation_noise={"velocities": 2.0, "contact_forces": 1.0})
+    plain = load("queen", "walk")
+    once, other, clean = alone.reset().observation, both.reset().observation, plain.reset().observation
+    assert_array_equal(once["velocities"], other["velocities"])
+    assert (once["velocities"] != clean["velocities"]).all()
+    assert_array_equal(once["contact_forces"], clean["contact_forces"])
+    assert_array_equal(other["posture"], clean["posture"])
+
+
+def test_a_fall_is_told():
+    environment = load("queen", "walk", kicks=0.0)
+    environment.reset()
+    environment.step(np.zeros(18))
+    assert environment.task.progress["fell"] == 0.0
+    environment.physics.data.qpos[2] = 3.0
+    assert environment.step(np.zeros(18)).discount == 0.0
+    assert environment.task.progress["fell"] == 1.0
+
+
+def test_named_rows_are_steer_with_modifiers_that_callers_can_change():
+    for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"limp": True})):
+        named, spelt = load("tick", name), load("tick", "steer", **settings)
+        assert_array_equal(flat(named.reset()), flat(spelt.reset()))
+        assert named.task.definition.changes == spelt.task.definition.changes
+    assert load("tick", "shoved", kicks=0.5, delay=1).task.definition.changes[::6] == (0.5, (1, 1))
+
+
+def test_live_commands_reach_the_task():
+    environment = load("tick", "steer", **ALL)
+    environment.reset()
+    environment.command("command", (0.5, 0.0, 0.1))
+    assert_array_equal(environment.step(np.zeros(18)).observation["command"][:3], [0.5, 0.0, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"kick": 1.0}, "unknown setting of walk 'kick'; did you mean 'kicks'? (there are: "),
+        ({"kicks": -1.0}, "kicks: expected a number from 0 to 100, got -1.0"),
+        ({"kicks": True}, "kicks: expected a number from 0 to 100, got True"),
+        ({"limp": 6}, "limp: expected an integer from 0 to 5, got 6"),
+        ({"limp": -1}, "limp: expected an integer from 0 to 5, got -1"),
+        ({"limp": "left"}, "limp: expected an integer from 0 to 5, got 'left'"),
+        (
+            {"motor_strength": -0.1},
+            "motor_strength: expected a number from 0 to 10, or two of them, the lower first, got",
+        ),
+        ({"friction": (1.0, 0.5)}, "friction: expected a number from 0 to 100, or two of them, the lower first, got"),
+        (
+            {"friction": (1, 2, 3)},
+            "friction: expected a number from 0 to 100, or two of them, the lower first, got (1, 2",
+        ),
+        ({"mass": 0}, "mass: expected a number from 0.01 to 100, or two of them, the lower first, got 0"),
+        ({"mass": math.nan}, "mass: expected a number from 0.01 to 100, or two of them, the lower first, got nan"),
+        ({"observation_noise": -1}, "observation_noise: expected a number from 0 to 100, got -1"),
+        (
+            {"observation_noise": {"postur": 1}},
+            "unknown block with noise 'postur'; did you mean 'posture'? (there are: posture, velocities, ",
+        ),
+        ({"delay": 1.5}, "delay: expected an integer from 0 to 100, got 1.5"),
+        ({"delay": (3, 1)}, "delay: expected an integer from 3 to 100, got 1"),
+        ({"actions": "velocity"}, "unknown actions 'velocity' (there are: torque, position)"),
+        ({"without": ("scan",)}, "unknown block 'scan' (there are: posture, velocities, contact_forces, gait_clock)"),
+        ({"without": 3}, "without: expected names of blocks, got 3"),
+        (
+            {"without": ["posture", "velocities", "contact_forces", "gait_clock"]},
+            "without: expected to leave a block, got all of them: posture, velocities, contact_forces, gait_clock",
+        ),
+    ],
+)
+def test_a_wrong_modifier_is_one_line(settings, message):
+    for use in (arc_suite.load, lambda body, task, kwargs: VectorEnv(body, task, 2, task_kwargs=kwargs)):
+        with pytest.raises(ValueError) as error:
+            use("tick", "walk", settings)
+        assert str(error.value).startswith(message) and "\n" not in str(error.value)
+    with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
+        modified.modified(prepared("tick", "walk")[0], {"kick": 1.0})
