@@ -7,6 +7,7 @@
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
+# make check-agents  learners, ONNX and statistics beside their oracles, in the environment of check-jax
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make census  walks 500 random bodies and tells which do
 # make soak    two million steps: memory, threads and files stay what they are
@@ -18,7 +19,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-clients check-glb check-blender check-godot check-jax bench census soak fuzz mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients check-glb check-blender check-godot check-jax check-agents bench census soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -66,7 +67,7 @@ check-sb3: setup.cfg
 	$(VENV)/bin/python -m pip install -q '$(TORCH)'
 	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
-	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py
+	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py tests/policies/test_sb3_file.py
 
 check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -97,6 +98,13 @@ check-jax: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,jax]'
 	$(VENV)/bin/python -m pytest tests/tasks/test_jax.py
+
+# pandas before 3, as what rliable needs does not know it yet.
+check-agents: VENV := .venv-jax
+check-agents: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[test,agents,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
+	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

@@ -72,6 +72,7 @@ class SoftActorCritic:
         dropout: share of units that the critics drop.
         prior: what prior data are: "none"; "fenced", in one buffer with online data, never overwritten; or
             "beside", a batch of their own in every update.
+        updates_per_step: of an environment step; all but the last are of the critics alone.
         random_steps: the policy acts once the buffer has more transitions than this; before, actions are uniform.
         phase_every: environment steps between stabilisation phases.
         phase_updates: the most updates of critics alone in a phase; 0 for no phases.
@@ -91,6 +92,7 @@ class SoftActorCritic:
     capacity: int = 1_000_000
     dropout: float = 0.0
     prior: str = "none"
+    updates_per_step: int = 1
     random_steps: int = 5000
     phase_every: int = 10_000
     phase_updates: int = 0
@@ -109,7 +111,13 @@ class SoftActorCritic:
         """
         for name, low in (("hidden", 1), ("batch", 1), ("capacity", 1), ("random_steps", 0), ("phase_every", 1)):
             checks.integer(name, getattr(self, name), low)
-        for name, low in (("phase_updates", 0), ("scored_batches", 1), ("check_every", 1), ("patience", 1)):
+        for name, low in (
+            ("updates_per_step", 1),
+            ("phase_updates", 0),
+            ("scored_batches", 1),
+            ("check_every", 1),
+            ("patience", 1),
+        ):
             checks.integer(name, getattr(self, name), low)
         for name in ("learning_rate", "discount", "averaging", "held_out", "improvement"):
             checks.number(name, getattr(self, name), 0.0, 1.0)
@@ -122,7 +130,7 @@ _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 _OFF_POLICY = "arc_suite.agents.off_policy"
 
-# The paper's six, as its published code runs them, and two that are not the paper's: docs/agents.md.
+# The paper's six, as its published code runs them, and what goes beyond the paper: docs/agents.md.
 ALGORITHMS = {
     "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
     "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
@@ -140,8 +148,22 @@ ALGORITHMS = {
         dataclasses.replace(_SPEQ, prior="beside", early_stop="published"),
         "SPEQ-O2O with phases that stop early",
     ),
+    # Beyond the paper: DroQ (Hiraoka et al., "Dropout Q-functions for doubly efficient reinforcement learning", 2022).
+    "droq": Algorithm(
+        _OFF_POLICY,
+        dataclasses.replace(_SAC, dropout=0.01, updates_per_step=20),
+        "SAC with 20 updates of critics with dropout in every step",
+    ),
     "ppo": Algorithm(
         "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
+    ),
+    # Small steps about a policy that is good already: the noise of learning from nothing would undo it.
+    "finetune": Algorithm(
+        "arc_suite.agents.on_policy",
+        ProximalPolicy(first_std=0.1, last_std=0.04, first_divergence=0.008, policy_rate=1e-5, warm_up=320),
+        "proximal policy optimisation from the policy of another run, --row start=FOLDER",
+        evaluate_every=100_000,
+        steps=500_000,
     ),
     "imitation": Algorithm(
         "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600

@@ -1,8 +1,9 @@
 """Learns by soft actor-critic from a buffer: the algorithms of the ARC-RL paper, which differ in their rows alone.
 
-A step acts, stores the transition and makes one update. Where the row has stabilisation phases, one follows
-the update of every `phase_every`-th step: updates of the critics alone, on the buffer as it stands. With early
-stopping, a share of the buffer is held out of the phase and tells when to stop.
+A step acts, stores the transition and makes an update, or several, of which the last moves the policy too. Where
+the row has stabilisation phases, one follows the update of every `phase_every`-th step: updates of the critics
+alone, on the buffer as it stands. With early stopping, a share of the buffer is held out of the phase and tells when
+to stop.
 """
 
 import functools
@@ -16,7 +17,7 @@ import numpy as np
 from arc_suite.agents import networks, priors
 from arc_suite.agents import soft_actor_critic as sac
 from arc_suite.agents.algorithms import SoftActorCritic
-from arc_suite.agents.learner import ENVIRONMENT, Diverged, Stage, generator
+from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.replay import Fenced, Replay, Transitions
 from arc_suite.agents.stopping import Patience
 
@@ -131,7 +132,7 @@ class OffPolicy:
             "earned": np.array(list(self._earned.values())),
             "replay": np.array([self._replay.total, self._replay.ends]),
             "phase": np.array(phase or (), float),
-            **{f"{ENVIRONMENT}{name}": array for name, array in self._environment.snapshot().items()},
+            **environment_arrays(self._environment),
         }
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -145,11 +146,7 @@ class OffPolicy:
             updates, held_out, best, waited = arrays["phase"]
             self._phase = Phase(int(updates), int(held_out), Patience(float(best), int(waited)))
             self._prepare_phase()
-        snapshot = {
-            name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)
-        }
-        self._environment.restore(snapshot)
-        self._observation = snapshot["observation"][0]
+        self._observation = restore_environment(self._environment, arrays)[0]
 
     def _step(self) -> None:
         """Act, store the transition, update, and begin a phase if it is time."""
@@ -164,6 +161,10 @@ class OffPolicy:
         if is_last:
             self._earned = {"present": 0.0, "latest": self._earned["present"]}
         count["steps"] += 1
+        spent = _zeros(_OF_CRITICS)
+        for _ in range(row.updates_per_step - 1):
+            self._state, spent = _update(self._core, self._state, spent, *self._drawn(with_policy=False))
+            count["updates"] += 1
         self._state, self._sums = _update(self._core, self._state, self._sums, *self._drawn(with_policy=True))
         count["updates"] += 1
         count["summed"] += 1

@@ -115,9 +115,11 @@ def distribution(policy, observations):
 
 def sample(mean, log_std, noise):
     """Return actions (..., joints) for standard normal noise, and the logarithm of their density (...)."""
-    action = jnp.tanh(mean + jnp.exp(log_std) * noise)
-    density = -0.5 * noise * noise - log_std - 0.5 * _LOG_TWO_PI - jnp.log(1.0 - action * action + _TINY)
-    return action, density.sum(axis=-1)
+    raw = mean + jnp.exp(log_std) * noise
+    small = jnp.exp(-2.0 * jnp.abs(raw))
+    slope = 4.0 * small / (1.0 + small) ** 2  # 1 - tanh(raw)^2, without its loss of digits where tanh saturates
+    density = -0.5 * noise * noise - log_std - 0.5 * _LOG_TWO_PI - jnp.log(slope + _TINY)
+    return jnp.tanh(raw), density.sum(axis=-1)
 
 
 def values(critics, observations, actions, kept=None, dropout: float = 0.0):

@@ -103,7 +103,7 @@ def train(
     minutes: float | None = None,
     threads: int = 1,
     progress: Callable = tqdm,
-    evaluated: Callable[[Path, int, Mapping[str, float]], None] = lambda folder, step, figures: None,
+    told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
 ) -> bool:
     """Train, or go on.
 
@@ -113,8 +113,8 @@ def train(
         minutes: to stop after, of wall clock; None to train to the end.
         threads: on which rows are simulated; nothing depends on it but time.
         progress: makes a progress bar as `tqdm` does.
-        evaluated: called after each line of training.csv and each evaluation with the folder, the
-            environment step and the figures.
+        told: called after each line of training.csv, and after each evaluation, with the environment
+            step and figures by name; an evaluation's is `return`.
 
     Returns:
         Whether the run is finished.
@@ -144,11 +144,13 @@ def train(
                 figures = learner.advance(due)
                 bar.update(learner.step - bar.n)
                 if figures is not None:
-                    _record(run_files, learner, figures, evaluated)
+                    _record(run_files, learner, figures)
+                    told(learner.step, figures)
                     bar.set_postfix_str(_shown(figures, state), refresh=False)
                 if learner.step >= due:
-                    state["return"] = judge(run_files, learner, evaluated)
+                    state["return"] = judge(run_files, learner)
                     state["evaluated"] = learner.step
+                    told(learner.step, {"return": state["return"]})
                 clock.read(run_files, learner.step, write=figures is not None or learner.step >= due)
                 arrays = learner.arrays()
                 _check_finite(arrays, learner.step)
@@ -164,12 +166,11 @@ def _restore(learner: Learner, run_files: RunFolder) -> None:
         raise ValueError(f"{where}: {' '.join(str(error).split())}; delete it to start the run over") from None
 
 
-def _record(run_files: RunFolder, learner: Learner, figures: Mapping[str, float], evaluated: Callable) -> None:
+def _record(run_files: RunFolder, learner: Learner, figures: Mapping[str, float]) -> None:
     for name, figure in figures.items():
         if not np.isfinite(figure):
             raise Diverged(_diverged(f"{name} is {figure}", learner.step))
     run_files.append("training", {"step": learner.step, **figures})
-    evaluated(run_files.path, learner.step, figures)
 
 
 def _check_finite(arrays: Mapping[str, np.ndarray], step: int) -> None:
@@ -218,7 +219,7 @@ class _Judge:
         rows = evaluation.EPISODES
         return VectorEnv(run.body, run.task, rows, self._threads, AutoresetMode.DISABLED, task_kwargs=run.task_kwargs)
 
-    def __call__(self, run_files: RunFolder, learner: Learner, evaluated: Callable) -> float:
+    def __call__(self, run_files: RunFolder, learner: Learner) -> float:
         run, task = self._run, self._environment.task
         policy = Network(tuple(learner.policy()), run.robot, task.name, dict(run.task_kwargs), dict(task.blocks))
         network.save(run_files.path / network.FILE, policy)
@@ -226,9 +227,7 @@ class _Judge:
         for seed, episode in enumerate(episodes):
             figures = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
             run_files.append("evaluations", {"step": learner.step, **figures})
-        total = float(np.mean([episode.total for episode in episodes]))
-        evaluated(run_files.path, learner.step, {"return": total})
-        return total
+        return float(np.mean([episode.total for episode in episodes]))
 
     def close(self) -> None:
         if "_environment" in vars(self):

@@ -1,25 +1,32 @@
-"""Train a policy: an algorithm, a body and a task, from nothing to a folder that every program takes.
+"""Train a policy, from nothing to a folder that every program takes.
 
 Killed at any moment, the same command goes on, to the same bits. The folder holds tables of returns
-and losses, a checkpoint and the policy; `--policy FOLDER` has it walk in every program.
+and losses, a checkpoint, the policy, and a picture of its returns, which grows while it learns;
+`--policy FOLDER` has it walk in every program.
 
   arc-suite train --robot tick --algorithm sac --steps 200000
   arc-suite train --robot tick --algorithm ppo --minutes 10
-  arc-suite train --robot queen --algorithm imitation --row preset=tuned
+  arc-suite train --robot queen --task steer --algorithm imitation
+  arc-suite train --robot queen --task steer --algorithm finetune --row start=runs/queen-steer-imitation-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --spec examples/spider.json --algorithm speq --row phase_updates=7500
   arc-suite evaluate --robot tick --policy runs/tick-walk-sac-0
 """
 
+import contextlib
+import importlib.util
 import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from absl import flags
 
-from arc_suite.agents import algorithms
+from arc_suite import evaluation, files
+from arc_suite.agents import algorithms, run_folder
 from arc_suite.agents.training import Run, train
 from arc_suite.cli.flags import bodies, define_body, define_task, task
 from arc_suite.cli.program import progress
+from arc_suite.policies import network, onnx_file
 from arc_suite.robots import ROBOTS
 
 FLAGS = flags.FLAGS
@@ -38,6 +45,7 @@ flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithm
 flags.DEFINE_integer("evaluate_every", None, "Steps between evaluations. [default: the algorithm's]", lower_bound=1)
 flags.DEFINE_float("minutes", None, "Stop after so many minutes; the same command goes on.", lower_bound=0.0)
 flags.DEFINE_integer("threads", 1, "Threads to simulate on; the run does not depend on it.", lower_bound=1)
+flags.DEFINE_bool("tensorboard", False, "Write figures for TensorBoard too, into the folder of the run.")
 flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TASK-ALGORITHM-SEED]", short_name="o")
 
 # One thread a run: two runs on two cores learn twice as much, two threads in a run hardly more than one.
@@ -56,8 +64,61 @@ def main() -> None:
     steps = FLAGS.steps or definition.steps
     run = Run(body, FLAGS.algorithm, definition, *task(), FLAGS.seed, steps, FLAGS.prior, FLAGS.evaluate_every)
     folder = Path(FLAGS.output or run.folder())
-    try:
-        finished = train(run, folder, FLAGS.minutes, FLAGS.threads, progress)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; the same command goes on with {folder}") from None
+    with contextlib.ExitStack() as stack:
+        listeners = [picture(run, folder), *([stack.enter_context(events(folder))] if FLAGS.tensorboard else [])]
+
+        def told(step, figures):
+            for listener in listeners:
+                listener(step, figures)
+
+        try:
+            finished = train(run, folder, FLAGS.minutes, FLAGS.threads, progress, told)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"interrupted; the same command goes on with {folder}") from None
+    if finished and importlib.util.find_spec("onnx"):
+        onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {'finished' if finished else 'stopped; the same command goes on'}")
+
+
+def picture(run: Run, folder: Path) -> Callable:
+    """Return what draws the returns anew after each evaluation; nothing without matplotlib."""
+    if not importlib.util.find_spec("matplotlib"):
+        return lambda step, figures: None
+    from arc_suite.agents import plots
+
+    expert = None if run.task_kwargs else evaluation.expert_return(run.task, run.body.name)
+    lines = {} if expert is None else {"the paper's demonstrator": expert}
+
+    def draw(step, figures):
+        if "return" in figures:
+            figure = plots.returns({run.algorithm: [run_folder.table(folder, "evaluations")]}, folder.name, lines)
+            with files.writing(folder / "curve.png") as temporary:
+                figure.savefig(temporary)
+
+    return draw
+
+
+@contextlib.contextmanager
+def events(folder: Path) -> Iterator[Callable]:
+    """Yield what writes figures for TensorBoard.
+
+    Raises:
+        ValueError: tensorboardX is not installed; one line.
+    """
+    try:
+        from tensorboardX import SummaryWriter
+    except ImportError as error:
+        raise ValueError(f"--tensorboard needs tensorboardX: pip install 'arc_suite[tensorboard]' ({error})") from None
+    writers = []
+
+    def write(step, figures):
+        if not writers:  # what was written after the checkpoint from which the run goes on is purged
+            writers.append(SummaryWriter(str(folder / "tensorboard"), purge_step=step))
+        for name, value in figures.items():
+            writers[0].add_scalar(name, value, step)
+
+    try:
+        yield write
+    finally:
+        for writer in writers:
+            writer.close()

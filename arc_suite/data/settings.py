@@ -12,10 +12,11 @@ import mujoco
 import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from arc_suite import checks, registry, versions
+from arc_suite import checks, policies, registry, versions
 from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.envs.scene import prepared
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import network
 from arc_suite.registration import importable
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -94,7 +95,8 @@ class Settings(NamedTuple):
     def provenance(self) -> dict:
         """Return, JSON-able, the settings, the versions of what computes, and the sha256 of the compiled model.
 
-        The settings hold the task's version, and the sha256 of every preset's numbers, beside the names.
+        The settings hold the task's version, and the sha256 of every preset's numbers, or of the policy's file,
+        beside the names.
         """
         task, presets = registry.task_of(self.task), presets_of(self.body) if self.presets else {}
         settings = self._asdict() | {
@@ -105,6 +107,8 @@ class Settings(NamedTuple):
             "task_version": task.version,
             "task_kwargs": json.loads(self._settings_text()),
         }
+        if policies.is_file(self.policy):
+            settings["policy_sha256"] = network.digest(self.policy)
         return {
             "settings": settings,
             "versions": versions.recorded(),

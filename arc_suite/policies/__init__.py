@@ -1,6 +1,6 @@
 """Policies: one protocol of acting, and policies by name."""
 
-from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, policy, preset_names
+from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, is_file, policy, preset_names
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
 
 __all__ = [
@@ -14,6 +14,7 @@ __all__ = [
     "Script",
     "Sum",
     "alone",
+    "is_file",
     "policy",
     "preset_names",
 ]

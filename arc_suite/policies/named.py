@@ -18,6 +18,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks import Task
 
+_ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
 
 
@@ -47,8 +48,9 @@ def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
 POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
-    f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or module:attribute, which makes a "
-    "policy from a robot's name, or from the Body of what is no robot of the suite."
+    f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
+    "saved, whose pickles are run; or module:attribute, which makes a policy from a robot's name, or from the Body of "
+    "what is no robot of the suite."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
 
@@ -71,8 +73,9 @@ def policy(
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
             episode's seed; the path of a run's folder, or of a policy file (.npz), see `network`;
-            or `module:attribute`, a function on Python's path that makes a function
-            from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
+            that of a zip of stable-baselines3, see `sb3_file`; or `module:attribute`, a function on
+            Python's path that makes a function from a `TimeStep` to an action, from the name of a
+            robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
         presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
             that take turns from seed to seed.
@@ -113,11 +116,18 @@ def _noise(body: Body, deviation: float, rows: int) -> Policy:
     return Script(draw, rows, joints)
 
 
+def is_file(name: str) -> bool:
+    """Return whether a policy's name is that of a folder of a run that is there, or of a zip."""
+    return name not in POLICIES and ((Path(name) / network.FILE).is_file() or name.endswith(_ZIP))
+
+
 def _is_path(name: str) -> bool:
-    return name not in POLICIES and (name.endswith(network.EXTENSION) or os.sep in name or Path(name).is_dir())
+    return is_file(name) or name.endswith((network.EXTENSION, _ZIP)) or (os.sep in name and ":" not in name)
 
 
 def _from_file(path: Path, body: Body) -> Policy:
+    if path.suffix == _ZIP:
+        return _from_zip(path, body)
     made = network.load(path)
     if made.robot != body.name and made.robot != body_to_json(body):
         name = "another body" if made.robot.startswith("{") else made.robot
@@ -125,6 +135,15 @@ def _from_file(path: Path, body: Body) -> Policy:
     if made.joints != len(body.joint_names):
         raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
     return made
+
+
+def _from_zip(path: Path, body: Body) -> Policy:
+    try:
+        from arc_suite.policies import sb3_file
+    except ImportError as error:
+        advice = "pip install 'arc_suite[sb3]'"
+        raise ValueError(f"policy {path}: zips need stable-baselines3: {advice} ({error})") from None
+    return sb3_file.Saved(path, body)
 
 
 def _from_path(path: str, body: Body, rows: int) -> Policy:

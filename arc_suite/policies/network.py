@@ -8,6 +8,7 @@ A policy file is an archive of arrays with one JSON text, which tells for what t
 It holds no pickle and no code, so that files of others are data.
 """
 
+import hashlib
 import json
 import os
 import zipfile
@@ -169,6 +170,12 @@ def load(path: str | os.PathLike) -> Network:
         raise OSError(f"cannot read {path}: no such file") from None
     except _DAMAGES as error:
         raise ValueError(f"{path}: no policy, or a damaged one: {' '.join(str(error).split())[:200]}") from None
+
+
+def digest(path: str | os.PathLike) -> str:
+    """Return the sha256 of a policy file, or of that of a run's folder."""
+    path = Path(path)
+    return hashlib.sha256((path / FILE if path.is_dir() else path).read_bytes()).hexdigest()
 
 
 _KINDS_OF_FIELDS = {"robot": str, "task": str, "task_kwargs": dict, "blocks": dict}

@@ -51,7 +51,8 @@ def source(name: str, preset: str = "medium") -> Source:
     """Open a source, told by its form.
 
     Args:
-        name: a policy, as `policies.policy` takes it, of which there is a track for every seed; a file
+        name: a policy, as `policies.policy` takes it, of which there is a track for every seed, but for a
+            policy's file by its name alone; a file
             of tracks, path/to/file.npz, or the id of a dataset, arc_suite/queen/walk/cpg-medium-v0,
             whose first episodes there are, as many as seeds, or all.
         preset: of the demonstrator.
@@ -64,6 +65,8 @@ def source(name: str, preset: str = "medium") -> Source:
         OSError: a file cannot be read; one line.
     """
     checks.name(preset, policies.preset_names(), "preset")
+    if policies.is_file(name):
+        return _played(name, preset)
     if name.endswith(".npz"):
         return _saved(name)
     if ":" not in name and re.search(r"/|-v\d+$", name):

@@ -14,7 +14,8 @@ from arc_suite.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-TASKED = ("render", "animate", "evaluate", "style", "collect", "tune_cpg", "census")
+TASKED = ("render", "animate", "evaluate", "style", "collect", "tune_cpg", "train", "census")
+WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS}
 TOOLS |= {"census": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_suite" / "doctor.py"}
@@ -77,14 +78,16 @@ def test_help_of_a_program(program):
     assert f"\n  arc-suite {program}" in text
     names = re.findall(r"^(-\S*?):", text, re.MULTILINE)
     assert "--[no]version" in names
-    assert ("-o,--output" in names) == (program in ("build_model", "render", "animate", "style", "tune_cpg"))
+    assert ("-o,--output" in names) == (
+        program in ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
+    )
     assert "--output" not in names
     assert {"--task", "--set"} & set(names) == ({"--task", "--set"} if program in TASKED else set())
 
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, *(["--", "a.json"] if program == "check" else []), "stray")
+    done = run(program, *(["--", "a.json"] if program in ("check", "export") else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 

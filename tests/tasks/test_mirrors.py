@@ -28,14 +28,24 @@ def look_into_the_mirror(task):
         memory = begun.memory
         if "schedule" in memory._fields:
             memory = memory._replace(schedule=mirrors.PLANAR(memory.schedule))
-        return begun._replace(qpos=poses(begun.qpos), qvel=velocities(begun.qvel), memory=memory)
+        qpos = poses(begun.qpos)
+        if "lane" in memory._fields:
+            qpos[1] += 2.0 * memory.lane  # a lane is mirrored about its middle
+        return begun._replace(qpos=qpos, qvel=velocities(begun.qvel), memory=memory)
 
     vars(task)["start"] = mirrored
     vars(task)["clock"] = clock._replace(circle=sign * clock.circle, stance=clock.stance[:, image.legs])
 
 
-@pytest.mark.parametrize("task", ["walk", "steer"])
-@pytest.mark.parametrize("body", BODIES, ids=name_of)
+@pytest.mark.parametrize(
+    ("body", "task"),
+    [
+        *((body, task) for task in ("walk", "steer") for body in BODIES),
+        # Of steps, which are the same left and right; the triangles of a height field are not.
+        *(("queen", task) for task in ("stairs", "gaps")),
+    ],
+    ids=name_of,
+)
 def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
     one, other = (arc_suite.load(body, task, {"random": 0}) for _ in range(2))
     definition = one.task.definition

@@ -1,0 +1,51 @@
+"""The guide to adding an algorithm: its code runs."""
+
+import importlib.util
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[2]
+GUIDE = (ROOT / "docs" / "adding_an_algorithm.md").read_text()
+MY_ROWS, RANDOM_SEARCH = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+TRAIN_ROW, TRAIN_SEARCH, EVALUATE = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Runs the guide's commands beside its files, with other flags at the end."""
+    (tmp_path / "my_rows.py").write_text(MY_ROWS)
+    (tmp_path / "random_search.py").write_text(RANDOM_SEARCH)
+    environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+
+    def command(text, *flags):
+        arguments = [sys.executable, "-m", *text.replace("arc-suite", "arc_suite").split(), *flags]
+        done = subprocess.run(arguments, env=environ, cwd=tmp_path, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return command
+
+
+def test_a_learner_of_its_own(run, tmp_path):
+    """It needs no JAX, goes on to the same bits, and every program takes its policy."""
+    short = ["--row=directions=2", "--row=horizon=20", "--evaluate_every=80", "--set", "time_limit=2"]
+    for folder, steps in (("whole", []), ("broken", ["--minutes=0"]), ("broken", [])):
+        run(TRAIN_SEARCH, *short, "--steps=160", "-o", f"runs/{folder}", *steps)
+    whole, broken = ((tmp_path / "runs" / name / "checkpoint.npz") for name in ("whole", "broken"))
+    with np.load(whole) as one, np.load(broken) as other:
+        assert one["generation"] == other["generation"] == 2
+        assert np.array_equal(one["weight"], other["weight"]) and one["weight"].any()
+    (tmp_path / "runs" / "whole").rename(tmp_path / "runs" / "search")
+    assert "\nleaper " in run(EVALUATE, "--episodes=1", "--set", "time_limit=2")
+
+
+@pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="of the extra agents: make check-agents")
+def test_a_row(run, tmp_path):
+    out = run(TRAIN_ROW, "--steps=50", "--row=hidden=8", "--row=batch=4", "--set", "time_limit=2")
+    assert out == "runs/patient: finished\n"

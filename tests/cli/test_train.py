@@ -1,0 +1,127 @@
+"""arc-suite train and export, run as a user runs them."""
+
+import importlib.util
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import programs
+import pytest
+
+HAS_JAX = importlib.util.find_spec("jax") is not None
+ROOT = pathlib.Path(__file__).parents[2]
+TINY = ["--robot=tick", "--algorithm=sope_eo", "--set", "time_limit=2", "--steps=200", "--evaluate_every=100"]
+for number in ("hidden=16", "batch=8", "random_steps=20", "phase_every=100", "phase_updates=60", "check_every=20"):
+    TINY += ["--row", number]
+
+
+def run(*arguments, cwd):
+    return programs.run("-m", "arc_suite", *arguments, cwd=cwd, path=ROOT)
+
+
+def one_line(done, line):
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(line), done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("flags", "line"),
+    [
+        (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
+        (["--robot=all"], "arc-suite train: --robot=all: a run has one robot"),
+        (["--row=batsch=3"], "arc-suite train: unknown number of the row 'batsch'; did you mean 'batch'? "),
+        (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
+        (["--task=wlak"], "arc-suite train: unknown task 'wlak'; did you mean 'walk'?"),
+    ],
+)
+def test_errors_are_one_line(flags, line, tmp_path):
+    one_line(run("train", *flags, cwd=tmp_path), line)
+    assert not list(tmp_path.rglob("*.csv"))
+
+
+@pytest.mark.skipif(HAS_JAX, reason="JAX is installed")
+def test_without_jax_it_says_what_to_install(tmp_path):
+    one_line(run("train", cwd=tmp_path), "arc-suite train: training needs JAX: pip install 'arc_suite[agents]' (")
+
+
+def test_export_of_what_is_no_run(tmp_path):
+    one_line(run("export", "runs/none", cwd=tmp_path), "arc-suite export: cannot read runs/none: no such file")
+    one_line(run("export", cwd=tmp_path), "arc-suite export: expected the folder of a run; see --help")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """That of a run, which one command has trained."""
+    path = tmp_path_factory.mktemp("trained")
+    done = run("train", *TINY, "--tensorboard", cwd=path)
+    assert (done.returncode, done.stdout) == (0, "runs/tick-walk-sope_eo-0: finished\n"), done.stderr
+    return path / "runs" / "tick-walk-sope_eo-0"
+
+
+@pytest.mark.skipif(not HAS_JAX, reason="of the extra agents: make check-agents")
+class TestRun:
+    """One command from nothing to a policy that every program takes."""
+
+    def test_files(self, folder):
+        names = {path.name for path in folder.iterdir()}
+        assert names >= {"config.json", "checkpoint.npz", "policy.npz", "policy.onnx", "curve.png", "tensorboard"}
+        assert names >= {"evaluations.csv", "training.csv", "times.csv"}
+        assert json.loads((folder / "config.json").read_text())["row"]["phase_updates"] == 60
+
+    def test_the_same_command_has_nothing_left_to_do(self, folder):
+        before = (folder / "evaluations.csv").read_bytes()
+        done = run("train", *TINY, cwd=folder.parents[1])
+        assert (done.returncode, done.stdout) == (0, "runs/tick-walk-sope_eo-0: finished\n")
+        assert (folder / "evaluations.csv").read_bytes() == before
+
+    def test_another_command_is_refused(self, folder):
+        done = run("train", *TINY, "--row=dropout=0.02", cwd=folder.parents[1])
+        line = "runs/tick-walk-sope_eo-0: of another run, whose row.dropout is 0.01, and not 0.02;"
+        one_line(done, f"arc-suite train: {line} write to another folder")
+
+    @pytest.mark.parametrize(
+        "command",
+        [
+            ["evaluate", "--episodes=2", "--set", "time_limit=2"],
+            ["style", "--episodes=1", "--set", "time_limit=2"],
+            ["collect", "--episodes=2", "--steps=20", "--id=arc_suite/tick/walk/learnt-v0"],
+        ],
+        ids=lambda command: command[0],
+    )
+    def test_every_program_takes_it(self, command, folder, monkeypatch, tmp_path):
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+        done = run(*command, "--robot=tick", "--policy=runs/tick-walk-sope_eo-0", cwd=folder.parents[1])
+        assert (done.returncode, done.stderr) == (0, "")
+        done = run(*command, "--robot=queen", "--policy=runs/tick-walk-sope_eo-0", cwd=folder.parents[1])
+        line = "policy runs/tick-walk-sope_eo-0: made for tick, and not for queen"
+        one_line(done, f"arc-suite {command[0]}: {line}")
+
+    def test_evaluation_is_that_of_the_table(self, folder, tmp_path):
+        command = ["evaluate", "--robot=tick", "--set", "time_limit=2", f"--policy={folder}", "--json=a.json"]
+        assert run(*command, cwd=tmp_path).returncode == 0
+        episodes = json.loads((tmp_path / "a.json").read_text())["robots"]["tick"]["episodes"]
+        lines = (folder / "evaluations.csv").read_text().splitlines()[-10:]
+        assert [float(line.split(",")[2]) for line in lines] == [episode["total"] for episode in episodes]
+
+    def test_export(self, folder, tmp_path):
+        done = run("export", str(folder), "-o", "tick.onnx", cwd=tmp_path)
+        size = (tmp_path / "tick.onnx").stat().st_size
+        assert done.stdout == f"wrote tick.onnx: 199 observations, 18 actions, {size} bytes\n"
+
+    def test_ctrl_c_is_one_line_and_goes_on(self, tmp_path):
+        command = [sys.executable, "-m", "arc_suite", "train", *TINY, "--steps=100000", "-o", "run"]
+        process = subprocess.Popen(
+            command, cwd=tmp_path, text=True, stderr=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)}
+        )
+        while not (tmp_path / "run" / "checkpoint.npz").exists():
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate()
+        assert process.returncode == 130
+        assert errors.splitlines()[-1] == "arc-suite train: interrupted; the same command goes on with run"
