@@ -5,6 +5,7 @@ import itertools
 import math
 import pathlib
 import pickle
+import re
 
 import gymnasium
 import numpy as np
@@ -108,7 +109,7 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
 )
 @every_body
 def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
-    """Over three episodes, through kicks and limping, among rows that start at other times, and through a pickle."""
+    """Over three episodes with kicks and limping, a snapshot and a pickle, among rows that start at other times."""
     length = 50 * prepared(BODIES[body], "walk")[0].scene.control_timestep
     settings = CASES[case] | {"time_limit": length}
     names = {"domain_name": BODIES[body], "task_name": task_name, "task_kwargs": settings}
@@ -124,6 +125,11 @@ def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, bo
         action = random.uniform(-0.4, 0.4, rows.single_action_space.shape).astype(np.float32)
         if step == 20:
             rows.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
+        if step == 30:
+            again = VectorEnv(num_envs=3, num_threads=threads, **names)
+            again.restore(rows.snapshot())
+            rows.close()
+            rows = again
         if step == 45:
             rows, single = pickle.loads(pickle.dumps(rows)), copy.deepcopy(single)
         observations, rewards, terminated, truncated, infos = rows.step(np.stack([0.1 * action, action, -action]))
@@ -434,3 +440,17 @@ def test_a_wrong_modifier_is_one_line(settings, message):
         assert str(error.value).startswith(message) and "\n" not in str(error.value)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
         modified.modified(prepared("tick", "walk")[0], {"kick": 1.0})
+
+
+GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()
+
+
+def test_the_guide_runs_and_names_every_modifier():
+    there = {}
+    for block in re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL):
+        exec(compile(block, "modifiers.md", "exec"), there)
+    there["environment"].reset()
+    there["environments"].reset(seed=0)
+    there["environments"].close()
+    assert there["Ice"].modifiers == {"friction": (0.05, 0.2)}
+    assert tuple(re.findall(r"^\| `(\w+)` \|", GUIDE, re.MULTILINE)) == NAMES
