@@ -266,7 +266,8 @@ class Modified(Task):
     def after(self, memory, readings: Readings) -> Any:
         """Return the other task's memory, how the joints are, and whether the body has fallen."""
         memory = self._felt(self.task.after(memory, readings), readings)
-        return memory._replace(terminated=self.task.ended(memory, readings)[0])
+        terminated, _ = self.task.ended(memory, readings)
+        return memory._replace(terminated=(memory.terminated & False) | terminated)  # in every row, were it one for all
 
     def terms(self, memory, readings: Readings) -> dict:
         """Return the other task's terms."""

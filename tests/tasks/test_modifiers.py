@@ -7,6 +7,7 @@ import pathlib
 import pickle
 import re
 
+import gaitless
 import gymnasium
 import numpy as np
 import pytest
@@ -382,6 +383,20 @@ def test_a_fall_is_told():
     assert environment.task.progress["fell"] == 1.0
 
 
+def test_a_task_that_prescribes_no_gait_takes_modifiers():
+    settings = ALL | {"without": "posture", "observation_noise": {"velocities": 1.0}, "time_limit": 2.0}
+    with gaitless.registered():
+        names = {"domain_name": "tick", "task_name": "stay", "task_kwargs": settings}
+        rows, single = VectorEnv(num_envs=2, **names), gymnasium.make("arc_suite/queen-walk-v0", **names)
+        rows.reset(seed=3), single.reset(seed=4)
+        for action in np.random.RandomState(0).uniform(-0.3, 0.3, (30, 18)):
+            observations, *_, infos = rows.step(np.stack([action, action]))
+            observation, *_, info = single.step(action)
+            assert_array_equal(observations[1], observation)
+            assert info["progress_fell"] == infos["progress_fell"][1] == 0.0
+        rows.close()
+
+
 def test_named_rows_are_steer_with_modifiers_that_callers_can_change():
     for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"limp": True})):
         named, spelt = load("tick", name), load("tick", "steer", **settings)
@@ -408,7 +423,7 @@ def test_live_commands_reach_the_task():
         ({"limp": "left"}, "limp: expected an integer from 0 to 5, got 'left'"),
         (
             {"motor_strength": -0.1},
-            "motor_strength: expected a number from 0 to 10, or two of them, the lower first, got",
+            "motor_strength: expected a number from 0 to 1, or two of them, the lower first, got",
         ),
         ({"friction": (1.0, 0.5)}, "friction: expected a number from 0 to 100, or two of them, the lower first, got"),
         (
