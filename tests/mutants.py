@@ -111,6 +111,24 @@ MUTANTS = (
     Mutant("a schedule that does not end", "memory.steps % memory.ends[..., -1]", "memory.steps"),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
+    # Modifiers.
+    Mutant("a leg limp from the start", "memory.elapsed >= LIMP_FROM", "memory.elapsed >= 0"),
+    Mutant("kicks a step late", "% last + 1 == memory.kick_steps", "% last == memory.kick_steps"),
+    Mutant("weak motors give all", "ctrl = memory.strength * inputs.ctrl", "ctrl = inputs.ctrl"),
+    Mutant("actions not delayed", "memory, asked = _delayed(memory, action)", "memory, _ = _delayed(memory, action)"),
+    Mutant("the same noise in every step", "key ^ (step * _GOLDEN)", "key"),
+    Mutant("positions held without damping", "- damping * memory.speeds", "- 0.0 * memory.speeds"),
+    Mutant(
+        "the reward sees what weak motors give",
+        "self.task.before(memory, asked)",
+        "self.task.before(memory, memory.strength * asked)",
+    ),
+    Mutant("a changed model stays so", "if self._unchanged:", "if False:"),
+    Mutant(
+        "the last substep of rows on the compiled model",
+        "set_models(self._own)\n            simulations.step(rows)",
+        "set_models(None)\n            simulations.step(rows)",
+    ),
     # Environments.
     Mutant("dropped clip of the action", "return array.clip(-1.0, 1.0)", "return array"),
     Mutant("NaN let through", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
