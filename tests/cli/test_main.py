@@ -31,7 +31,7 @@ def test_help_lists_the_programs(arguments):
     lines = done.stdout.splitlines()
     assert lines[0] == "arc-suite PROGRAM [flags]"
     assert [line.split()[0] for line in lines if line.startswith("  ")] == list(main.PROGRAMS)
-    assert "  render       Render a robot that walks: a picture (.png) or a film (.mp4, .gif)." in lines
+    assert "  census       Let random bodies walk and count those that do." in lines
     assert max(map(len, lines)) <= 100
 
 
