@@ -5,7 +5,7 @@
 # make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make web     bundles the viewer that pages are made of, and three.js; needs Node
-# make check-web  plays pages in Chromium, in an environment of its own
+# make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
@@ -74,6 +74,8 @@ check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) tools/check_clients.py
 
+ENGINES := out/engines
+
 # What it makes is not committed, and goes into wheels.
 VIEWER := arc_suite/export/web/viewer.js
 web: $(VIEWER)
@@ -89,8 +91,11 @@ check-web: setup.cfg $(VIEWER)
 	tools/ensure_packages.sh chromium
 	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
 	$(VENV)/bin/python -m pytest tests/export/test_pages.py
+	$(VENV)/bin/python tests/engines/make_files.py $(ENGINES) few
+	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
+		--outfile=$(ENGINES)/loader.js --log-level=warning
+	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
 
-ENGINES := out/engines
 
 check-glb: $(INSTALLED)
 	mkdir -p .node-glb

@@ -14,7 +14,7 @@ from arc_suite.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-TASKED = ("render", "animate", "evaluate", "style", "collect", "tune_cpg", "census")
+TASKED = ("render", "animate", "view", "evaluate", "style", "collect", "tune_cpg", "census")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS}
 TOOLS |= {"census": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_suite" / "doctor.py"}
