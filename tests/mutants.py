@@ -65,7 +65,7 @@ MUTANTS = (
         "np.random.RandomState(self.seed)",
     ),
     Mutant("feet may sink", "return memory.sinking >= SINKING", "return memory.sinking < 0"),
-    Mutant("levels never fall", "max(carry.level - 1, 0) if carry.distance < DOWN else carry.level", "carry.level"),
+    Mutant("levels never fall", "max(carry.level - 1, 0) if carry.outcome < down else carry.level", "carry.level"),
     Mutant("the highest level for ever", "return carry.level if stays < STAYS else other", "return carry.level"),
     Mutant(
         "a scan that does not turn",
