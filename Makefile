@@ -4,6 +4,8 @@
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
 # make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
+# make web     bundles the viewer that pages are made of, and three.js; needs Node
+# make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
@@ -19,7 +21,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-clients check-glb check-blender check-godot check-jax check-agents bench census soak fuzz mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench census soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -74,6 +76,27 @@ check-clients: $(INSTALLED)
 	$(PYTHON) tools/check_clients.py
 
 ENGINES := out/engines
+
+# What it makes is not committed, and goes into wheels.
+VIEWER := arc_suite/export/web/viewer.js
+web: $(VIEWER)
+$(VIEWER): $(wildcard web/*)
+	mkdir -p .node-web $(dir $@)
+	cp web/package.json web/package-lock.json .node-web/
+	npm ci --prefix .node-web --no-audit --no-fund --silent
+	NODE_PATH=$(CURDIR)/.node-web/node_modules node web/build.js $@
+
+check-web: VENV := .venv-web
+check-web: setup.cfg $(VIEWER)
+	tools/ensure_venv.sh $(VENV)
+	tools/ensure_packages.sh chromium
+	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
+	$(VENV)/bin/python -m pytest tests/export/test_pages.py
+	$(VENV)/bin/python tests/engines/make_files.py $(ENGINES) few
+	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
+		--outfile=$(ENGINES)/loader.js --log-level=warning
+	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
+
 
 check-glb: $(INSTALLED)
 	mkdir -p .node-glb

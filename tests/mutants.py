@@ -52,7 +52,28 @@ MUTANTS = (
         "contacts of a giant as hard as a mite's", '"solref": (simulation.contact_time, 1.0)', '"solref": (0.02, 1.0)'
     ),
     # Arenas.
-    Mutant("triangles of the ground exchanged", "numpy.where(u > v, right, left)", "numpy.where(u > v, left, right)"),
+    Mutant("triangles of the ground exchanged", "right = u > v", "right = u < v"),
+    Mutant("stairs without their fourth tread", "(steps + 1.0).clip(0.0, 4.0)", "(steps + 1.0).clip(0.0, 3.0)"),
+    Mutant(
+        "ground under the torso's middle alone",
+        "for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)",
+        "for x in (0.0,) for y in (0.0,)",
+    ),
+    Mutant(
+        "lanes all alike",
+        "np.random.RandomState((self.seed, KINDS.index(kind), before))",
+        "np.random.RandomState(self.seed)",
+    ),
+    Mutant("feet may sink", "return memory.sinking >= SINKING", "return memory.sinking < 0"),
+    Mutant("levels never fall", "max(carry.level - 1, 0) if carry.distance < DOWN else carry.level", "carry.level"),
+    Mutant("the highest level for ever", "return carry.level if stays < STAYS else other", "return carry.level"),
+    Mutant(
+        "a scan that does not turn",
+        "x = position[..., 0:1] + cosine * forward - sine * left",
+        "x = position[..., 0:1] + forward",
+    ),
+    Mutant("a command along the torso", "-numpy.sin(heading), turn", "numpy.sin(heading), turn"),
+    Mutant("who lies is healthy", "return high & ~lies & ", "return high & "),
     # Simulations.
     Mutant("no sensors, so no contact forces", "option.disableflags = flags\n", "pass\n"),
     Mutant("one substep too few", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
@@ -111,6 +132,24 @@ MUTANTS = (
     Mutant("a schedule that does not end", "memory.steps % memory.ends[..., -1]", "memory.steps"),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
+    # Modifiers.
+    Mutant("a leg limp from the start", "memory.elapsed >= LIMP_FROM", "memory.elapsed >= 0"),
+    Mutant("kicks a step late", "% last + 1 == memory.kick_steps", "% last == memory.kick_steps"),
+    Mutant("weak motors give all", "ctrl = memory.strength * inputs.ctrl", "ctrl = inputs.ctrl"),
+    Mutant("actions not delayed", "memory, asked = _delayed(memory, action)", "memory, _ = _delayed(memory, action)"),
+    Mutant("the same noise in every step", "key ^ (step * _GOLDEN)", "key"),
+    Mutant("positions held without damping", "- damping * memory.speeds", "- 0.0 * memory.speeds"),
+    Mutant(
+        "the reward sees what weak motors give",
+        "self.task.before(memory, asked)",
+        "self.task.before(memory, memory.strength * asked)",
+    ),
+    Mutant("a changed model stays so", "if self._unchanged:", "if False:"),
+    Mutant(
+        "the last substep of rows on the compiled model",
+        "set_models(self._own)\n            simulations.step(rows)",
+        "set_models(None)\n            simulations.step(rows)",
+    ),
     # Environments.
     Mutant("dropped clip of the action", "return array.clip(-1.0, 1.0)", "return array"),
     Mutant("NaN let through", "invalid = np.isnan(array)", "invalid = np.zeros(array.shape, bool)"),
@@ -157,7 +196,7 @@ MUTANTS = (
     ),
     # Searches and datasets.
     Mutant("all legs lead alike", "offset + leads[rank]", "offset + leads[0]"),
-    Mutant("the fallen go on earning", "totals += rewards * upright", "totals += rewards"),
+    Mutant("the fallen go on earning", "totals += rewards * counted", "totals += rewards"),
     Mutant("a search is told its worst", "[-value for value in fitness]", "fitness"),
     Mutant("a damaged episode is read", "!= value:", "is value:"),
 )

@@ -130,7 +130,7 @@ _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 _OFF_POLICY = "arc_suite.agents.off_policy"
 
-# The paper's six, as its published code runs them, and three that are not the paper's: docs/agents.md.
+# The paper's six, as its published code runs them, and what goes beyond the paper: docs/agents.md.
 ALGORITHMS = {
     "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
     "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
@@ -156,6 +156,14 @@ ALGORITHMS = {
     ),
     "ppo": Algorithm(
         "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
+    ),
+    # Small steps about a policy that is good already: the noise of learning from nothing would undo it.
+    "finetune": Algorithm(
+        "arc_suite.agents.on_policy",
+        ProximalPolicy(first_std=0.1, last_std=0.04, first_divergence=0.008, policy_rate=1e-5, warm_up=320),
+        "proximal policy optimisation from the policy of another run, --row start=FOLDER",
+        evaluate_every=100_000,
+        steps=500_000,
     ),
     "imitation": Algorithm(
         "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600

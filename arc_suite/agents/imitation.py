@@ -21,6 +21,7 @@ from arc_suite.agents.learner import Stage, environment_arrays, generator, resto
 from arc_suite.agents.normaliser import Moments
 from arc_suite.agents.rows import Imitation
 from arc_suite.cpg.demonstrator import Demonstrator, presets_of
+from arc_suite.policies import Positioned
 from arc_suite.policies.network import Layer, forward
 
 ACTIVATION = "elu"
@@ -91,7 +92,8 @@ class Imitator:
         task = self._environment.task
         self._joints = self._environment.single_action_space.shape[0]
         preset = row.preset or best(stage.body, task)
-        self._teacher = Demonstrator(stage.body, preset)
+        teacher = Demonstrator(stage.body, preset)
+        self._teacher = Positioned(teacher, task) if task.actions == "position" else teacher
         layers = networks.mlp(
             generator(stage.seed, "networks", 0),
             (task.size, row.hidden, row.hidden, self._joints),

@@ -21,7 +21,13 @@ from arc_suite.policies.network import Layer
 
 
 def begin(row: ProximalPolicy, stage: Stage) -> "OnPolicy":
-    """Return the learner; see `arc_suite.agents`."""
+    """Return the learner; see `arc_suite.agents`.
+
+    Raises:
+        ValueError: a row that starts from a policy, and none is given, or one that does not fit; one line.
+    """
+    if row.warm_up and not row.start:
+        raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     return OnPolicy(row, stage)
 
 
@@ -62,7 +68,7 @@ class OnPolicy:
         done = min(self.step / stage.steps, 1.0)
         std = row.first_std * (row.last_std / row.first_std) ** done
         wanted = row.first_divergence * (row.last_divergence / row.first_divergence) ** done
-        warming_up = bool(row.start) and self._iterations * row.horizon < row.warm_up
+        warming_up = self._iterations * row.horizon < row.warm_up
         seen, earned = self._acted(std)
         batch = self._batch(seen)
         count = len(batch.returns)

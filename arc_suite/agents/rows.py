@@ -71,7 +71,7 @@ class ProximalPolicy:
         gradient_norm: the largest that an update follows.
         normalising: share of the run in which the observations' moments are updated; of a policy that learning
             starts from they stay.
-        warm_up: control steps of each row in which values alone learn, where learning starts from a policy.
+        warm_up: control steps of each row in which values alone learn; 0 unless learning starts from a policy.
         hidden: units of each of the two hidden layers.
     """
 
@@ -92,7 +92,7 @@ class ProximalPolicy:
     value_rate: float = 5e-4
     gradient_norm: float = 1.0
     normalising: float = 0.7
-    warm_up: int = 320
+    warm_up: int = 0
     hidden: int = 256
 
     def __post_init__(self):

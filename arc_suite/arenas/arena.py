@@ -43,5 +43,8 @@ class Arena(ABC):
 
     @property
     def lists_contacts(self) -> bool:
-        """Return whether a list of all pairs of geoms that may touch is faster than a search: where geoms are few."""
+        """Return whether a list of all pairs of geoms that may touch is faster than a search: where geoms are few.
+
+        Planes and height fields are listed in any case.
+        """
         return True

@@ -96,29 +96,27 @@ class Terrain(Arena):
             halves = (0.5 * (nodes.shape[1] - 1) * _CELL, 0.5 * WIDTH * self._fields)
             size = np.array((*halves, self._highest, _THICKNESS)) * unit
             field.add(root, nodes, size, ((halves[0] - BACK) * unit, middle, 0.0), **contact)
-        count = 0
-        for lane, heights in enumerate(self._profiles, self._fields):
-            edges = np.flatnonzero(np.diff(heights, prepend=np.nan, append=np.nan))
-            for first, last in zip(edges[:-1], edges[1:], strict=True):
-                if heights[first] == -_TRENCH:
-                    continue
-                middle = (0.5 * (first + last) * _GRAIN - BACK, 0.0, heights[first] - 0.5 * _THICKNESS)
-                size = (0.5 * (last - first) * _GRAIN, 0.5 * WIDTH, 0.5 * _THICKNESS)
-                root.worldbody.add(
-                    "geom",
-                    name=f"floor_{count}",
-                    type="box",
-                    size=np.array(size) * unit,
-                    pos=np.array(middle) * unit + (0.0, self.start(lane), 0.0),
-                    conaffinity=1,
-                    **contact,
-                )
-                count += 1
+        boxes = (box for lane, heights in enumerate(self._profiles, self._fields) for box in self._boxes(lane, heights))
+        for number, (size, pos) in enumerate(boxes):
+            root.worldbody.add("geom", name=f"floor_{number}", type="box", size=size, pos=pos, conaffinity=1, **contact)
         if any(kind == "gaps" for kind, _ in self.lanes):
             bottom = (0.0, 0.0, -_TRENCH * unit)
             root.worldbody.add(
                 "geom", name="floor_bottom", type="plane", size=(0.0, 0.0, 1.0), pos=bottom, conaffinity=1, **contact
             )
+
+    def _boxes(self, lane: int, heights: np.ndarray):
+        """Yield size and place, (3,) m each, of the boxes of stairs or trenches.
+
+        A box is as long as the ground is nowhere lower than its top: higher steps stand in lower ones,
+        since every box less is time saved.
+        """
+        for top in np.unique(heights[heights > -_TRENCH]):
+            edges = np.flatnonzero(np.diff(heights >= top, prepend=False, append=False))
+            for first, last in edges.reshape(-1, 2) * _GRAIN:
+                size = np.array((0.5 * (last - first), 0.5 * WIDTH, 0.5 * _THICKNESS)) * self.unit
+                middle = np.array((0.5 * (first + last) - BACK, 0.0, top - 0.5 * _THICKNESS)) * self.unit
+                yield size, middle + (0.0, self.start(lane), 0.0)
 
     def height(self, x, y):
         """Return the height (...) of the ground under points, as collisions meet it, m."""

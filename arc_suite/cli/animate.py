@@ -16,16 +16,15 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, export, files, policies
-from arc_suite.cli.flags import bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
 from arc_suite.cli.program import VERSION, progress
-from arc_suite.robots import ROBOTS
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{', '.join(ROBOTS)}.")
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: tuned, or medium where there is none]")
 flags.DEFINE_list("clips", list(export.DEFAULT), f"Which, with commas between them: {', '.join(export.CLIPS)}.")

@@ -7,6 +7,7 @@ The body is a robot of the suite, a spec file, or one made to order:
   arc-suite build_model --legs 5 --layout radial --scale 2 --json --output starfish.json
   arc-suite build_model --seed 7 --summary --render random.png
   arc-suite build_model --spec examples/spider.json --summary
+  arc-suite build_model --robot tick --task stairs --set difficulty=1 --output stairs.xml
 """
 
 import contextlib
@@ -15,14 +16,17 @@ import imageio.v3 as imageio
 from absl import flags
 
 from arc_suite import files, models
-from arc_suite.cli.flags import define_body, made_body
+from arc_suite.arenas import FLAT, Arena
+from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
+from arc_suite.envs.scene import prepared
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 
 FLAGS = flags.FLAGS
 define_body()
+define_task()
 flags.DEFINE_enum("robot", None, list(ROBOTS), "A robot of the suite.")
 flags.DEFINE_integer("seed", None, "A random body; with --legs or --links, of that many.", lower_bound=0)
 flags.DEFINE_enum(
@@ -47,14 +51,15 @@ flags.DEFINE_string("render", None, "File to write a picture of the standing bod
 def main() -> None:
     """Build the body and write what is asked for."""
     body = _body()
+    arena = _arena(body)
     with contextlib.ExitStack() as stack:
         if FLAGS.output is not None:
-            stack.enter_context(files.writing(FLAGS.output)).write_text(_text(body))
+            stack.enter_context(files.writing(FLAGS.output)).write_text(_text(body, arena))
         elif not FLAGS.summary and FLAGS.render is None:
-            print(_text(body), end="")
+            print(_text(body, arena), end="")
         if FLAGS.render is not None:
             path = stack.enter_context(files.writing(FLAGS.render))
-            physics = Physics.from_body(body)
+            physics = Physics.from_body(body, arena)
             physics.forward()
             imageio.imwrite(path, physics.render(camera_id="portrait"))
         if FLAGS.summary:
@@ -78,7 +83,15 @@ def _body() -> Body:
     return body if FLAGS.scale is None else generator.scaled(body, FLAGS.scale)
 
 
-def _text(body: Body) -> str:
+def _arena(body: Body) -> Arena:
+    """Return where the task takes place that the flags ask for; a floor if they ask for none."""
+    if not (FLAGS["task"].present or FLAGS["set"].present):
+        return FLAT
+    task_name, task_kwargs = task()
+    return prepared(body, task_name, task_kwargs)[0].scene.arena
+
+
+def _text(body: Body, arena: Arena) -> str:
     if FLAGS.json:
         return spec_files.body_to_json(body)
-    return models.assemble(body, decorated=FLAGS.looks).to_xml_string()
+    return models.assemble(body, arena, decorated=FLAGS.looks).to_xml_string()

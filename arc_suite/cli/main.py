@@ -13,6 +13,7 @@ PROGRAMS = (
     "check",
     "render",
     "animate",
+    "view",
     "evaluate",
     "style",
     "collect",

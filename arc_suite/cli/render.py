@@ -1,32 +1,35 @@
-"""Render a robot that walks: a picture (.png) or a film (.mp4, .gif).
+"""Render a robot that walks: a picture (.png), a film (.mp4, .gif) or a page (.html).
 
   arc-suite render --robot queen --policy cpg --output queen.png
   arc-suite render --robot all --output robots.mp4
   arc-suite render --legs 8 --links 4 --output walker.gif
   arc-suite render --robot tick --set gait=ripple --output ripple.mp4
+  arc-suite render --robot queen --preset tuned --output walk.html
 
 A PNG of one robot under the demonstrator shows one cycle of its gait; any other PNG, and one after
---steps=0, shows one moment. A film plays in real time. The program prints each robot's return up to
-then, and the file it wrote. No display is needed.
+--steps=0, shows one moment. A film plays in real time. A page plays in any browser, with a camera to
+turn, footfalls and rewards; several robots walk side by side. The program prints each robot's return up
+to then, and the file it wrote. No display is needed.
 """
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 from absl import flags
 
 import arc_suite
-from arc_suite import checks, files
+from arc_suite import checks, files, style
 from arc_suite.cli import films
 from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
 from arc_suite.cli.program import progress
+from arc_suite.export import pages
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
-from arc_suite.policies import HELP, PRESET_HELP, alone, policy
+from arc_suite.policies import HELP, PRESET_HELP, Policy, alone, policy
 
-_STEPS = {".png": 60, ".mp4": 200, ".gif": 80}
+_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".html": 400}
 _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
 _CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
 
@@ -44,10 +47,10 @@ flags.DEFINE_integer(
     "steps",
     None,
     "Control steps, of 0.05 s for the four robots: the length of a film, or how long to walk before a picture. "
-    "[default: 200, in a GIF 80, before a picture 60]",
+    "[default: 200, in a GIF 80, on a page 400, before a picture 60]",
     lower_bound=0,
 )
-flags.DEFINE_string("output", None, "File to write: .png, .mp4 or .gif. Required.", short_name="o")
+flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif or .html. Required.", short_name="o")
 
 
 def main() -> None:
@@ -59,27 +62,43 @@ def main() -> None:
         name: arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed}) for name, body in walkers.items()
     }
     policies = {
-        name: alone(policy(FLAGS.policy, body, FLAGS.preset, task=environments[name].task.definition), FLAGS.seed)
+        name: policy(FLAGS.policy, body, FLAGS.preset, task=environments[name].task.definition)
         for name, body in walkers.items()
     }
     if not FLAGS.output:
-        raise ValueError("no file to write; say --output=FILE.png, .mp4 or .gif")
-    extension = checks.name(Path(FLAGS.output).suffix.lower(), films.WRITERS, "extension")
+        raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif or .html")
+    extension = checks.name(Path(FLAGS.output).suffix.lower(), _STEPS, "extension")
     steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
-    size = (FLAGS.width or _SIZES[extension][0], FLAGS.height or _SIZES[extension][1])
 
     with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:
-        takes = []
-        for name, environment in environments.items():
-            takes.append(films.Take(name, environment, policies[name], camera, size))
-            stack.callback(takes[-1].close)
-        takes[0].view()  # finds out at once whether there is OpenGL
-        stride = films.steps_per_frame(takes[0].control_timestep)
-        frames = still(takes, steps) if extension == ".png" else film(takes, steps, stride)
-        films.WRITERS[extension](temporary, frames, stride * takes[0].control_timestep)
-    for take in takes:
-        print(f"{take.robot}: return {take.earned:.1f} in {take.steps} steps")
+        if extension == ".html":
+            write_page(temporary, environments, policies, steps)
+        else:
+            size = (FLAGS.width or _SIZES[extension][0], FLAGS.height or _SIZES[extension][1])
+            takes = []
+            for name, walker in policies.items():
+                takes.append(films.Take(name, environments[name], alone(walker, FLAGS.seed), camera, size))
+                stack.callback(takes[-1].close)
+            takes[0].view()  # finds out at once whether there is OpenGL
+            stride = films.steps_per_frame(takes[0].control_timestep)
+            frames = still(takes, steps) if extension == ".png" else film(takes, steps, stride)
+            films.WRITERS[extension](temporary, frames, stride * takes[0].control_timestep)
+            for take in takes:
+                print(f"{take.robot}: return {take.earned:.1f} in {take.steps} steps")
     print(f"wrote {FLAGS.output}")
+
+
+def write_page(path: Path, environments: Mapping, policies: Mapping[str, Policy], steps: int) -> None:
+    """Record an episode of each policy and write the page that plays them side by side."""
+    if steps < 1:
+        raise ValueError(f"--steps={steps}: expected 1 or more for a page")
+    pages.viewer()  # finds out at once whether there is one
+    tracks = {}
+    for name, walker in progress(policies.items(), "walking", leave=False):
+        tracks[name] = style.record(environments[name], walker, FLAGS.seed, steps)
+    path.write_text(pages.page(tracks), encoding="utf-8")
+    for name, track in tracks.items():
+        print(f"{name}: return {track.rewards.sum():.1f} in {len(track.times)} steps")
 
 
 def still(takes: list[films.Take], steps: int) -> Iterator[np.ndarray]:

@@ -7,7 +7,8 @@
   arc-suite style --policy arc_suite/queen/walk/cpg-medium-v0 --compare arc_suite/queen/walk/random-v0
 
 `--output` writes gait.png, reward.png, speed.png and path.png of the first episode; no gait.png where
-the task prescribes no gait. What every metric means is written in arc_suite/style/metrics.py.
+the task prescribes no gait. `--page` writes a page that plays it, and the one it is compared with, in any
+browser. What every metric means is written in arc_suite/style/metrics.py.
 """
 
 import contextlib
@@ -19,6 +20,7 @@ from absl import flags
 from arc_suite import evaluation, files, policies, style, versions
 from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
 from arc_suite.cli.program import progress
+from arc_suite.export import pages
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
@@ -38,6 +40,7 @@ flags.DEFINE_string(
     "Folder to write pictures to, made if need be; of several robots, a folder in it for each.",
     short_name="o",
 )
+flags.DEFINE_string("page", None, "File to write a page to that plays the first episodes side by side (.html).")
 flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz).")
 
 
@@ -138,6 +141,21 @@ def pictures(robots: list[str]):
 
 
 @contextlib.contextmanager
+def playing():
+    """Yields a dictionary to fill with tracks by label, which the page plays side by side; ignored without `--page`."""
+    if FLAGS.page is None:
+        yield {}
+        return
+    if not FLAGS.page.endswith(".html"):
+        raise ValueError(f"--page={FLAGS.page}: expected a file that ends in .html")
+    pages.viewer()  # finds out at once whether there is one
+    with files.writing(FLAGS.page) as file:
+        tracks = {}
+        yield tracks
+        file.write_text(pages.page(tracks), encoding="utf-8")
+
+
+@contextlib.contextmanager
 def saving(robots: list[str]):
     """Yields a function that saves tracks; does nothing without `--save`."""
     if FLAGS.save is None:
@@ -164,7 +182,12 @@ def main() -> None:
         for robot, stage in stages.items()
     }
     robots = list(stages)
-    with files.writing_json(FLAGS.json) as file, pictures(robots) as draw, saving(robots) as save:
+    with (
+        files.writing_json(FLAGS.json) as file,
+        pictures(robots) as draw,
+        playing() as played,
+        saving(robots) as save,
+    ):
         reports = {}
         for robot, by_label in takes.items():
             tracks = {}
@@ -174,7 +197,9 @@ def main() -> None:
             save(next(iter(tracks.values())))
             reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
             print_report(robot, reports[robot])
-            draw(robot, {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()})
+            firsts = {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()}
+            draw(robot, firsts)
+            played.update(firsts)
         file.update(
             task=next(iter(stages.values())).task,
             task_kwargs=next(iter(stages.values())).task_kwargs,

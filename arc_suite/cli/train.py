@@ -6,7 +6,8 @@ and losses, a checkpoint, the policy, and a picture of its returns, which grows 
 
   arc-suite train --robot tick --algorithm sac --steps 200000
   arc-suite train --robot tick --algorithm ppo --minutes 10
-  arc-suite train --robot queen --algorithm imitation --row preset=tuned
+  arc-suite train --robot queen --task steer --algorithm imitation
+  arc-suite train --robot queen --task steer --algorithm finetune --row start=runs/queen-steer-imitation-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --spec examples/spider.json --algorithm speq --row phase_updates=7500
   arc-suite evaluate --robot tick --policy runs/tick-walk-sac-0

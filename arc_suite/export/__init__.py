@@ -1,4 +1,4 @@
-"""Walks to take away: animation clips for game engines."""
+"""Walks to take away: animation clips for game engines, and pages that play them."""
 
 from arc_suite.export.clips import CLIPS, DEFAULT, FPS, Clip, clips
 from arc_suite.export.creatures import RIGS, ROOT_MOTIONS, glb, sidecar

@@ -171,8 +171,10 @@ class _Draft(NamedTuple):
 def _taken(body: Body, shot: Shot, policy, preset, task, task_kwargs) -> _Take:
     """Record what a clip needs."""
     if shot.command is None:
-        actor = named_policy("cpg" if shot.preset else policy, body, shot.preset or preset)
-        recording = record(load(body, task, {"random": 0, **(task_kwargs or {})}), actor, _SETTLE, _RECORDED)
+        environment = load(body, task, {"random": 0, **(task_kwargs or {})})
+        name, chosen = "cpg" if shot.preset else policy, shot.preset or preset
+        actor = named_policy(name, body, chosen, task=environment.task.definition)
+        recording = record(environment, actor, _SETTLE, _RECORDED)
         cycle = motions.period(recording)
         if cycle is None:
             seconds = len(recording.qpos) * recording.step / 2.0

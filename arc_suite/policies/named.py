@@ -16,7 +16,7 @@ from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
-from arc_suite.tasks import Task
+from arc_suite.tasks import TASKS, Task
 
 _ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
@@ -95,7 +95,7 @@ def policy(
     checks.number("noise", noise, 0.0)
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
-        made = _from_file(Path(name), body)
+        made = _from_file(Path(name), body, task)
     elif isinstance(name, str) and ":" in name:
         made = _from_path(name, body, rows)
     else:
@@ -125,7 +125,7 @@ def _is_path(name: str) -> bool:
     return is_file(name) or name.endswith((network.EXTENSION, _ZIP)) or (os.sep in name and ":" not in name)
 
 
-def _from_file(path: Path, body: Body) -> Policy:
+def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     if path.suffix == _ZIP:
         return _from_zip(path, body)
     made = network.load(path)
@@ -134,6 +134,10 @@ def _from_file(path: Path, body: Body) -> Policy:
         raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
     if made.joints != len(body.joint_names):
         raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
+    learned = {**TASKS[made.task].modifiers, **made.task_kwargs} if made.task in TASKS else made.task_kwargs
+    actions = learned.get("actions", Task.actions)
+    if task is not None and actions != task.actions:
+        raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
     return made
 
 

@@ -79,11 +79,11 @@ class Positioned:
         """Take a policy, and the task with `actions="position"` that it is to act in."""
         self._policy, self._task = policy, task
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+    def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start the episodes of seeds in some rows."""
         self._policy.begin(rows, seeds)
 
-    def act(self, observation, rewards) -> np.ndarray:
+    def act(self, observation, rewards=None) -> np.ndarray:
         """Return the positions.
 
         Raises:

@@ -11,17 +11,18 @@ from arc_suite import models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.robots.spec import Body
 
+_LARGE = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_DAMPER | mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
 
 
 def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
     """Compile the model that simulations of a body in an arena step.
 
-    It is that of `models.assemble`, and simulates to the same bits, with two differences. Where the
-    arena says that it pays, contacts are a list of pairs of geoms, so that no step has to look for
-    what may touch; all `contype` and `conaffinity` are 0 then, and contacts take friction, solref,
-    solimp, margin and gap from `pair_*`, not from `geom_*`. Where it makes no difference, the
-    integrator is Euler's.
+    It is that of `models.assemble`, and simulates to the same bits, with two differences. Contacts
+    are a list of pairs of geoms, so that no step has to look for what may touch; `contype` and
+    `conaffinity` are 0 then, and contacts take friction, solref, solimp, margin and gap from `pair_*`,
+    not from `geom_*`. Where the arena has many geoms, only those with its planes and height fields are
+    listed. Where it makes no difference, the integrator is Euler's.
 
     Args:
         body: the spec; what it leaves open is sized.
@@ -37,9 +38,8 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
     spec = mujoco.MjSpec.from_string(models.assemble(body, arena).to_xml_string())
     model = spec.compile()
-    if arena.lists_contacts:
-        list_contacts(spec, model)
-        model = spec.compile()
+    list_contacts(spec, model, all_geoms=arena.lists_contacts)
+    model = spec.compile()
     if euler_suffices(model):
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
     return model
@@ -58,21 +58,27 @@ def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: muj
     mujoco.mj_setConst(model, scratch)
 
 
-def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel) -> None:
+def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel, all_geoms: bool = True) -> None:
     """Write explicit contact pairs in place of the masks `contype` and `conaffinity`.
 
     Args:
         spec: the model to change; every geom that touches another has a name.
         model: the same, compiled; no two geoms of moving bodies touch one another.
+        all_geoms: write those of all geoms; else only of planes and height fields, which are endless or large, so that
+            a search finds them near every body.
     """
     body = model.body_weldid[model.geom_bodyid]
+    large = np.isin(model.geom_type, _LARGE)
     touches = (model.geom_contype[:, None] & model.geom_conaffinity) != 0
     touches = np.triu((touches | touches.T) & (body[:, None] != body))
+    if not all_geoms:
+        touches &= large[:, None] | large
     for pair in np.argwhere(touches):
         first, second = (model.geom(index).name for index in pair)
         spec.add_pair(geomname1=first, geomname2=second, **_contact(model, *pair))
     for geom in spec.geoms:
-        geom.contype = geom.conaffinity = 0
+        if all_geoms or geom.type in _LARGE:
+            geom.contype = geom.conaffinity = 0
 
 
 def _contact(model: mujoco.MjModel, first: int, second: int) -> dict:

@@ -100,8 +100,11 @@ def has_display() -> bool:
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def require_window() -> None:
+def require_window(instead: str = "use render_mode 'rgb_array'") -> None:
     """Check that a window can be opened; MuJoCo's viewer would end the process if not.
+
+    Args:
+        instead: what does without one, for the error.
 
     Raises:
         RenderingUnavailable: it cannot; why, and the remedy.
@@ -112,7 +115,7 @@ def require_window() -> None:
         with _strict_glfw():
             glfw.init()
     except glfw.GLFWError as error:
-        raise RenderingUnavailable(f"cannot open a window: {error}; use render_mode 'rgb_array'") from None
+        raise RenderingUnavailable(f"cannot open a window: {error}; {instead}") from None
 
 
 def _loads(library: str) -> bool:

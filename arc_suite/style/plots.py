@@ -1,7 +1,7 @@
 """Pictures of tracks: footfalls against the schedule, reward by term, speed against target, path of the torso.
 
 Each function takes labelled tracks, one or two to compare, and returns a figure. Needs matplotlib
-(extra `plot`). Colours are Okabe and Ito's and Tol's, told apart by colour-blind eyes too.
+(extra `plot`).
 """
 
 import functools
@@ -13,22 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from arc_suite.style import metrics
+from arc_suite.style.colours import BLUE, FAINT, INK, PALE, TERM_COLOURS, VERMILION
 from arc_suite.style.tracks import Track
-
-BLUE, VERMILION = "#0072B2", "#D55E00"
-INK, FAINT, PALE = "#333333", "#8C8C8C", "#E3E3E3"
-TERM_COLOURS = {
-    "forward": BLUE,
-    "healthy": "#56B4E9",
-    "gait_bonus": "#009E73",
-    "gait_cost": VERMILION,
-    "control": "#E69F00",
-    "smoothness": "#F0E442",
-    "contact": "#CC79A7",
-    "angular_velocity": "#882255",
-    "vertical_velocity": "#332288",
-    "posture": "#999933",
-}
 
 _LOOK = {
     "font.size": 9.5,

@@ -15,8 +15,10 @@ import numpy as np
 
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
+from arc_suite.robots import mirror
 from arc_suite.tasks import noise
 from arc_suite.tasks.contract import Inputs, Start, Task
+from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.modifiers import LIMP_FROM, Modifiers, checked
 from arc_suite.tasks.readings import Readings
 
@@ -129,12 +131,23 @@ class Modified(Task):
     clock = property(lambda self: self.task.clock)
     parameters = property(lambda self: self.task.parameters)
     target_velocity = property(lambda self: self.task.target_velocity)
-    mirrors = property(lambda self: self.task.mirrors)
 
     @classmethod
     def fitted(cls, body, overrides):
         """Refuse, as the other task fits its own settings."""
         raise TypeError("a modified task is made by tasks.modified.modified, of a task that is fitted")
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """The other task's; what is drawn is as likely on either side.
+
+        Raises:
+            ValueError: a leg of one side is limp in every episode, or as the other task; one line.
+        """
+        leg = self.changes.limp
+        if not isinstance(leg, bool) and mirror.image(self.scene.body).legs[leg] != leg:
+            raise ValueError(f"limp: expected a leg that is drawn, or one on the midline, got {leg}")
+        return self.task.mirrors
 
     @functools.cached_property
     def blocks(self) -> Mapping[str, int]:
@@ -253,7 +266,8 @@ class Modified(Task):
     def after(self, memory, readings: Readings) -> Any:
         """Return the other task's memory, how the joints are, and whether the body has fallen."""
         memory = self._felt(self.task.after(memory, readings), readings)
-        return memory._replace(terminated=self.task.ended(memory, readings)[0])
+        terminated, _ = self.task.ended(memory, readings)
+        return memory._replace(terminated=(memory.terminated & False) | terminated)  # in every row, were it one for all
 
     def terms(self, memory, readings: Readings) -> dict:
         """Return the other task's terms."""

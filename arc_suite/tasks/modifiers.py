@@ -65,7 +65,7 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], 
     values = Modifiers()._asdict() | dict(settings)
     return Modifiers(
         kicks=checks.number("kicks", values["kicks"], 0.0, 100.0),
-        motor_strength=checks.span("motor_strength", values["motor_strength"], 0.0, 10.0),
+        motor_strength=checks.span("motor_strength", values["motor_strength"], 0.0, 1.0),
         limp=_limp(values["limp"], body),
         friction=checks.span("friction", values["friction"], 0.0, 100.0),
         mass=checks.span("mass", values["mass"], 0.01, 100.0),

@@ -50,6 +50,20 @@ def test_it_goes_on_to_the_bit(tmp_path, robot, task):
     assert whole.arrays()["ages"].max() == 10
 
 
+def test_where_positions_are_taken_they_are_what_is_imitated(tmp_path):
+    """The labels are those for which motors that hold positions give the demonstrator's torques."""
+    torques, positions = (
+        imitation.begin(SMALL, stage(tmp_path, steps=80, **settings)) for settings in ({}, {"actions": "position"})
+    )
+    learned(torques, 80), learned(positions, 80)
+    task, first = positions._environment.task, positions._observations[0]
+    angles, speeds = first[:, 5:17], first[:, 17 + 6 : 17 + 18]
+    assert_array_equal(first, torques._observations[0])
+    expected = task.positions(torques._labels[0].astype(float), angles, speeds)
+    np.testing.assert_allclose(positions._labels[0], expected, atol=1e-4)
+    assert abs(positions._labels[0] - torques._labels[0]).max() > 0.1
+
+
 def test_what_it_says_comes_near_to_what_the_demonstrator_does(tmp_path):
     row = dataclasses.replace(SMALL, hidden=64, updates=60, last_updates=200)
     figures = learned(imitation.begin(row, stage(tmp_path, steps=640)), 640)

@@ -19,7 +19,7 @@ from arc_suite.agents.training import Run, train
 from arc_suite.policies import network
 from arc_suite.robots import ROBOTS, generator
 
-SMALL = ProximalPolicy(rows=4, horizon=8, minibatch=16, epochs=2, hidden=16, warm_up=16)
+SMALL = ProximalPolicy(rows=4, horizon=8, minibatch=16, epochs=2, hidden=16)
 
 
 def stage(tmp_path, robot="leaper", task="walk", steps=320, **settings):
@@ -186,7 +186,7 @@ def test_standard_deviation_falls_and_what_is_seen_is_normalised_for_part_of_the
 
 
 def test_it_starts_from_a_policy_and_lets_values_learn_first(tmp_path, imitated):
-    row = dataclasses.replace(SMALL, start=str(imitated))
+    row = dataclasses.replace(SMALL, start=str(imitated), warm_up=16)
     learner, start = on_policy.begin(row, stage(tmp_path)), network.load(imitated)
     observations = np.random.default_rng(0).normal(size=(5, sum(start.blocks.values()))).astype(np.float32)
     for _ in range(2):  # the warm-up
@@ -207,6 +207,8 @@ def test_a_start_that_does_not_fit_is_refused_in_one_line(tmp_path, imitated):
         with pytest.raises(ValueError) as error:
             on_policy.begin(dataclasses.replace(row, start=str(imitated)), stage(tmp_path, task=task))
         assert str(error.value) == f"{imitated}: {message}"
+    with pytest.raises(ValueError, match=r"^start: expected the folder of a run whose policy is where learning "):
+        on_policy.begin(ALGORITHMS["finetune"].row, stage(tmp_path))
     with pytest.raises(OSError, match="no such file"):
         on_policy.begin(dataclasses.replace(SMALL, start=str(tmp_path / "none")), stage(tmp_path))
 

@@ -145,3 +145,15 @@ def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
         assert done.stderr == f"build_model.py: cannot write {path}: {reason}\n"
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_text() == "kept"
+
+
+def test_a_task_brings_its_ground(tmp_path):
+    path = tmp_path / "stairs.xml"
+    result = build_model("--robot=tick", "--task=stairs", "--set=difficulty=1", f"--output={path}")
+    assert (result.returncode, result.stderr) == (0, "")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert {"floor_0", "floor_10"} <= {model.geom(index).name for index in range(model.ngeom)}
+    rough = mujoco.MjModel.from_xml_string(build_model("--robot=tick", "--task=rough").stdout)
+    assert rough.nhfield == 1 and rough.hfield_data.max() == 1.0
+    wrong = build_model("--robot=tick", "--task=stairs", "--set=difficulty=2")
+    assert wrong.stderr == "build_model.py: difficulty: expected a number from 0 to 1, got 2\n"

@@ -14,7 +14,7 @@ from arc_suite.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-TASKED = ("render", "animate", "evaluate", "style", "collect", "tune_cpg", "train", "census")
+TASKED = ("build_model", "render", "animate", "view", "evaluate", "style", "collect", "tune_cpg", "train", "census")
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS}
@@ -32,7 +32,7 @@ def test_help_lists_the_programs(arguments):
     lines = done.stdout.splitlines()
     assert lines[0] == "arc-suite PROGRAM [flags]"
     assert [line.split()[0] for line in lines if line.startswith("  ")] == list(main.PROGRAMS)
-    assert "  render       Render a robot that walks: a picture (.png) or a film (.mp4, .gif)." in lines
+    assert "  census       Let random bodies walk and count those that do." in lines
     assert max(map(len, lines)) <= 100
 
 

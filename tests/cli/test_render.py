@@ -183,9 +183,9 @@ def test_a_take_stays_at_its_end():
             ["--camera=portait", "--output=a.png"],
             "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
         ),
-        (["--output=a.jpg"], "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif)"),
+        (["--output=a.jpg"], "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .html)"),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
-        ([], "no file to write; say --output=FILE.png, .mp4 or .gif"),
+        ([], "no file to write; say --output=FILE.png, .mp4, .gif or .html"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):

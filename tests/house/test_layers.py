@@ -73,9 +73,11 @@ THIRD_PARTY = {
     "agents.proximal_policy": {"numpy", "jax", "optax"},
     "agents.rows": set(),
     "style.metrics": {"numpy"},
+    "style.colours": set(),
     "export": {"numpy", "mujoco"},
     "export.gltf": {"numpy"},
     "export.shapes": {"numpy"},
+    "export.pages": {"numpy"},
     "export.motions": {"numpy"},
 }
 
@@ -103,6 +105,7 @@ INSIDE = {
     "cpg.presets": {"robots.gaits"},
     "evaluation.statistics": set(),
     "style.metrics": {"rotations", "style.tracks"},
+    "style.colours": set(),
     "export.gltf": set(),
     "export.shapes": set(),
 }

@@ -153,3 +153,12 @@ def test_a_pickle_is_refused(saved):
     np.savez(saved / "policy.npz", policy=np.array({"layers": []}, object))
     with pytest.raises(ValueError, match="Object arrays cannot be loaded"):
         policies.policy(str(saved), "tick")
+
+
+def test_a_policy_of_torques_is_refused_where_positions_are_taken(saved):
+    task = arc_suite.load("tick", "walk", {"actions": "position"}).task.definition
+    with pytest.raises(ValueError, match="its actions are a torque a joint, and walk takes a position$"):
+        policies.policy(str(saved), "tick", task=task)
+    assert policies.policy(str(saved), "tick", task=arc_suite.load("tick", "walk").task.definition) is not None
+    network.save(saved / "policy.npz", made()._replace(task_kwargs={"actions": "position"}))
+    assert policies.policy(str(saved), "tick", task=task) is not None

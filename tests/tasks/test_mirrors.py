@@ -28,14 +28,24 @@ def look_into_the_mirror(task):
         memory = begun.memory
         if "schedule" in memory._fields:
             memory = memory._replace(schedule=mirrors.PLANAR(memory.schedule))
-        return begun._replace(qpos=poses(begun.qpos), qvel=velocities(begun.qvel), memory=memory)
+        qpos = poses(begun.qpos)
+        if "lane" in memory._fields:
+            qpos[1] += 2.0 * memory.lane  # a lane is mirrored about its middle
+        return begun._replace(qpos=qpos, qvel=velocities(begun.qvel), memory=memory)
 
     vars(task)["start"] = mirrored
     vars(task)["clock"] = clock._replace(circle=sign * clock.circle, stance=clock.stance[:, image.legs])
 
 
-@pytest.mark.parametrize("task", ["walk", "steer"])
-@pytest.mark.parametrize("body", BODIES, ids=name_of)
+@pytest.mark.parametrize(
+    ("body", "task"),
+    [
+        *((body, task) for task in ("walk", "steer") for body in BODIES),
+        # Of steps, which are the same left and right; the triangles of a height field are not.
+        *(("queen", task) for task in ("stairs", "gaps")),
+    ],
+    ids=name_of,
+)
 def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
     one, other = (arc_suite.load(body, task, {"random": 0}) for _ in range(2))
     definition = one.task.definition
@@ -95,6 +105,7 @@ def test_a_gait_whose_sides_move_together_keeps_its_clock():
     [
         ("queen", {"phase_offsets": (0, 1, 2, 3, 4, 5)}, "phase_offsets: expected legs across from each other to move"),
         ("queen", {"default_angles": np.arange(18) / 9}, "default_angles: expected mirrored poses left and right"),
+        ("queen", {"limp": 1}, "limp: expected a leg that is drawn, or one on the midline, got 1"),
         (generator.random_body(0), {}, "phase_offsets: expected legs across from each other"),
         (generator.random_body(10), {}, "random_10 is not its own mirror image: no leg is across from leg1"),
     ],
@@ -117,3 +128,13 @@ def test_every_task_has_a_mirror(robot, task):
     observation, _ = arc_suite.symmetry(robot, task)
     size = arc_suite.load(robot, task).task.definition.size
     assert_array_equal(np.sort(observation.sources), np.arange(size))
+
+
+def test_modifiers_leave_a_task_its_mirror_image():
+    plain = arc_suite.symmetry("tick", "steer")
+    modified = arc_suite.symmetry("tick", "steer", {"limp": True, "kicks": 1.0, "actions": "position"})
+    for mine, other in zip(modified, plain, strict=True):
+        assert_array_equal(mine.sources, other.sources)
+        assert_array_equal(mine.signs, other.signs)
+    blind = arc_suite.symmetry("tick", "steer", {"without": "contact_forces"})
+    assert len(blind.observation.sources) == len(plain.observation.sources) - 150

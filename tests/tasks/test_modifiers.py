@@ -5,7 +5,9 @@ import itertools
 import math
 import pathlib
 import pickle
+import re
 
+import gaitless
 import gymnasium
 import numpy as np
 import pytest
@@ -108,7 +110,7 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
 )
 @every_body
 def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
-    """Over three episodes, through kicks and limping, among rows that start at other times, and through a pickle."""
+    """Over three episodes with kicks and limping, a snapshot and a pickle, among rows that start at other times."""
     length = 50 * prepared(BODIES[body], "walk")[0].scene.control_timestep
     settings = CASES[case] | {"time_limit": length}
     names = {"domain_name": BODIES[body], "task_name": task_name, "task_kwargs": settings}
@@ -124,6 +126,11 @@ def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, bo
         action = random.uniform(-0.4, 0.4, rows.single_action_space.shape).astype(np.float32)
         if step == 20:
             rows.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
+        if step == 30:
+            again = VectorEnv(num_envs=3, num_threads=threads, **names)
+            again.restore(rows.snapshot())
+            rows.close()
+            rows = again
         if step == 45:
             rows, single = pickle.loads(pickle.dumps(rows)), copy.deepcopy(single)
         observations, rewards, terminated, truncated, infos = rows.step(np.stack([0.1 * action, action, -action]))
@@ -376,6 +383,20 @@ def test_a_fall_is_told():
     assert environment.task.progress["fell"] == 1.0
 
 
+def test_a_task_that_prescribes_no_gait_takes_modifiers():
+    settings = ALL | {"without": "posture", "observation_noise": {"velocities": 1.0}, "time_limit": 2.0}
+    with gaitless.registered():
+        names = {"domain_name": "tick", "task_name": "stay", "task_kwargs": settings}
+        rows, single = VectorEnv(num_envs=2, **names), gymnasium.make("arc_suite/queen-walk-v0", **names)
+        rows.reset(seed=3), single.reset(seed=4)
+        for action in np.random.RandomState(0).uniform(-0.3, 0.3, (30, 18)):
+            observations, *_, infos = rows.step(np.stack([action, action]))
+            observation, *_, info = single.step(action)
+            assert_array_equal(observations[1], observation)
+            assert info["progress_fell"] == infos["progress_fell"][1] == 0.0
+        rows.close()
+
+
 def test_named_rows_are_steer_with_modifiers_that_callers_can_change():
     for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"limp": True})):
         named, spelt = load("tick", name), load("tick", "steer", **settings)
@@ -402,7 +423,7 @@ def test_live_commands_reach_the_task():
         ({"limp": "left"}, "limp: expected an integer from 0 to 5, got 'left'"),
         (
             {"motor_strength": -0.1},
-            "motor_strength: expected a number from 0 to 10, or two of them, the lower first, got",
+            "motor_strength: expected a number from 0 to 1, or two of them, the lower first, got",
         ),
         ({"friction": (1.0, 0.5)}, "friction: expected a number from 0 to 100, or two of them, the lower first, got"),
         (
@@ -434,3 +455,17 @@ def test_a_wrong_modifier_is_one_line(settings, message):
         assert str(error.value).startswith(message) and "\n" not in str(error.value)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
         modified.modified(prepared("tick", "walk")[0], {"kick": 1.0})
+
+
+GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()
+
+
+def test_the_guide_runs_and_names_every_modifier():
+    there = {}
+    for block in re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL):
+        exec(compile(block, "modifiers.md", "exec"), there)
+    there["environment"].reset()
+    there["environments"].reset(seed=0)
+    there["environments"].close()
+    assert there["Ice"].modifiers == {"friction": (0.05, 0.2)}
+    assert tuple(re.findall(r"^\| `(\w+)` \|", GUIDE, re.MULTILINE)) == NAMES

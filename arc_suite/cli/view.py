@@ -1,0 +1,68 @@
+"""Watch a robot live: pull at it with the mouse, steer it with the arrow keys.
+
+  arc-suite view --robot queen
+  arc-suite view --robot tick --task steer
+  arc-suite view --spec examples/spider.json --set arena=bumps
+
+Double-click a part and drag with Ctrl held to pull at it; drag without Ctrl to turn the camera. Space pauses,
+backspace restarts. In a task that takes a command, such as steer, the arrow keys set it: ahead and back, and
+turning left and right; until the first of them the task's own schedule holds. A fall begins the next episode.
+"""
+
+import math
+import queue
+
+import glfw
+import mujoco
+from absl import flags
+
+import arc_suite
+from arc_suite import policies
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
+from arc_suite.cli.live import Live, play
+from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.models.outline import outline
+from arc_suite.simulation import opengl
+
+_RATE = 60.0  # pictures a second, where the display does not tell its own
+_DISTANCE = 2.8  # of the camera, of the farthest that the body reaches
+
+FLAGS = flags.FLAGS
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
+flags.DEFINE_string("policy", "cpg", policies.HELP)
+flags.DEFINE_string(
+    "preset", None, f"{policies.PRESET_HELP} [default: steered where the task takes a command, else tuned or medium]"
+)
+flags.DEFINE_integer("seed", 0, "Seed of the start of the first episode and of the random policy.", 0, 2**32 - 1)
+
+
+def main() -> None:
+    """Open the window and play until it is closed."""
+    body, *others = bodies(_ROBOT).values()
+    if others:
+        raise ValueError(f"--robot={_ROBOT.value}: expected one robot")
+    name, settings = task()
+    environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings | {"random": FLAGS.seed})
+    steered = "command" in environment.task.definition.commands
+    usual = ("steered",) if steered else ("tuned", "medium")
+    preset = FLAGS.preset or next(preset for preset in usual if preset in presets_of(body))
+    policy = policies.policy(FLAGS.policy, body, preset, task=environment.task.definition)
+    live = Live(environment, policies.alone(policy, FLAGS.seed))
+    opengl.require_window("`arc-suite render -o walk.html` writes a page that plays in any browser")
+    from mujoco import viewer  # which initializes GLFW where there is a display, and complains where not
+
+    keys = queue.SimpleQueue()
+    model, data = live.shown.model.ptr, live.shown.data.ptr
+    with viewer.launch_passive(model, data, key_callback=keys.put, show_left_ui=False, show_right_ui=False) as window:
+        window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, model.body("torso").id
+        window.cam.distance = _DISTANCE * abs(outline(body)).max()
+        window.cam.azimuth, window.cam.elevation = 140.0, -15.0
+        play(window, live, keys, rate())
+
+
+def rate() -> float:
+    """Return how many pictures a second the display shows."""
+    monitor = glfw.get_primary_monitor()
+    return (monitor and glfw.get_video_mode(monitor).refresh_rate) or _RATE

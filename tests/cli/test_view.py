@@ -1,0 +1,212 @@
+"""The live view: what keys and the mouse do, its pace, and the real window where there is an X server to be had."""
+
+import contextlib
+import os
+import queue
+import shutil
+import subprocess
+import sys
+
+import glfw
+import mujoco
+import numpy as np
+import pytest
+
+import arc_suite
+from arc_suite.cli import live
+from arc_suite.policies import alone, policy
+
+
+def playing(task="steer"):
+    environment = arc_suite.load("tick", task, {"random": 0})
+    preset = "steered" if task == "steer" else "tuned"
+    return environment, live.Live(environment, alone(policy("cpg", "tick", preset)))
+
+
+class Window:
+    """Stands in for MuJoCo's, and is closed after some pictures; each takes a while to come."""
+
+    def __init__(self, pictures, seconds=1.0 / 60.0, at=None):
+        self.left, self.seconds, self.at = pictures, seconds, at or {}
+        self.time, self.texts, self.perturb = 0.0, [], mujoco.MjvPerturb()
+        self.shown = 0
+
+    def is_running(self):
+        return self.shown < self.left
+
+    def lock(self):
+        return contextlib.nullcontext()
+
+    def set_texts(self, text):
+        self.texts.append(text[2])
+
+    def sync(self):
+        self.shown += 1
+        self.time += self.seconds
+        self.at.get(self.shown, lambda: None)()
+
+
+def play(shown, window, keys=None):
+    live.play(window, shown, keys or queue.SimpleQueue(), clock=lambda: window.time, sleep=lambda seconds: None)
+
+
+def test_it_keeps_real_time():
+    for seconds in (1.0 / 60.0, 0.02, 0.3):
+        environment, shown = playing()
+        play(shown, Window(round(2.0 / seconds) + 1, seconds))
+        assert environment.physics.time() == pytest.approx(2.0, abs=0.35 if seconds > 0.05 else 0.051)
+
+
+def test_a_slow_machine_shows_slow_motion():
+    environment, shown = playing()
+    play(shown, Window(4, 5.0))
+    assert environment.physics.time() == pytest.approx(3 * 0.5)
+
+
+def test_pictures_lie_between_control_steps():
+    environment, shown = playing("walk")
+    for _ in range(20):
+        shown.step(np.zeros((environment.physics.model.nbody, 6)))
+    poses = []
+    for share in (0.0, 0.5, 1.0):
+        shown.pose(share)
+        poses.append(shown.shown.data.qpos.copy())
+    np.testing.assert_allclose(poses[2], environment.physics.data.qpos, atol=1e-12)
+    np.testing.assert_allclose(poses[1][:3], 0.5 * (poses[0] + poses[2])[:3], atol=1e-12)
+    np.testing.assert_allclose(poses[1][7:], 0.5 * (poses[0] + poses[2])[7:], atol=1e-12)
+    assert abs(poses[2] - poses[0]).max() > 1e-3
+
+
+def test_space_pauses_and_backspace_restarts():
+    environment, shown = playing()
+    keys = queue.SimpleQueue()
+    at = {
+        30: lambda: keys.put(glfw.KEY_SPACE),
+        90: lambda: keys.put(glfw.KEY_SPACE),
+        150: lambda: keys.put(glfw.KEY_BACKSPACE),
+    }
+    window = Window(152, at=at)
+    play(shown, window, keys)
+    assert window.texts[29].startswith("return") and "paused" not in window.texts[29]
+    assert len(set(window.texts[31:90])) == 1 and window.texts[60].endswith("paused")
+    assert window.texts[91:150][-1] != window.texts[91]
+    assert float(window.texts[-1].split()[3]) <= 0.1
+
+
+def test_arrows_command():
+    environment, shown = playing()
+    wanted = lambda: environment.task.definition.wanted(environment.task.memory)  # noqa: E731
+    assert shown.wanted is None  # the task's own schedule
+    for key in (glfw.KEY_UP, glfw.KEY_UP, glfw.KEY_LEFT):
+        shown.press(key)
+    np.testing.assert_array_equal(wanted(), (0.5, 0.0, 0.25))
+    assert "ahead +0.50, turn +0.25" in shown.text()
+    shown.restart()
+    np.testing.assert_array_equal(wanted(), (0.5, 0.0, 0.25))
+    for _ in range(9):
+        shown.press(glfw.KEY_DOWN)
+    for _ in range(2):
+        shown.press(glfw.KEY_RIGHT)
+    np.testing.assert_array_equal(wanted(), (-1.0, 0.0, -0.25))
+
+
+def test_arrows_do_nothing_where_the_task_takes_no_command():
+    _, shown = playing("walk")
+    shown.press(glfw.KEY_UP)
+    assert shown.wanted is None and "ahead" not in shown.text()
+
+
+def test_the_mouse_pulls_at_the_body():
+    environment, shown = playing("walk")
+    shown.pose(1.0)
+    model, data = shown.shown.model.ptr, shown.shown.data.ptr
+    perturb, scene = mujoco.MjvPerturb(), mujoco.MjvScene(model, 1000)
+    assert not live.pulls(shown.shown, perturb).any()
+    options, camera = mujoco.MjvOption(), mujoco.MjvCamera()
+    mujoco.mjv_updateScene(model, data, options, perturb, camera, mujoco.mjtCatBit.mjCAT_ALL, scene)
+    perturb.select = model.body("torso").id
+    mujoco.mjv_initPerturb(model, data, scene, perturb)
+    perturb.active, perturb.refselpos = mujoco.mjtPertBit.mjPERT_TRANSLATE, data.xipos[1] + (0.0, 0.5, 0.0)
+    forces = live.pulls(shown.shown, perturb)
+    assert forces[1, 1] > 0.0 and not forces[2:].any()
+    before = environment.physics.data.qpos[1]
+    for _ in range(10):
+        shown.step(live.pulls(shown.shown, perturb))
+        shown.pose(1.0)
+    assert environment.physics.data.qpos[1] - before > 0.01
+    perturb.active = 0
+    shown.step(live.pulls(shown.shown, perturb))
+    assert not environment.physics.data.xfrc_applied.any()
+
+
+def test_a_fall_begins_the_next_episode():
+    environment = arc_suite.load("tick", "walk", {"random": 0, "time_limit": 0.5})
+    shown = live.Live(environment, alone(policy("zero", "tick")))
+    for _ in range(10):
+        shown.step(np.zeros((environment.physics.model.nbody, 6)))
+    assert environment.physics.time() == pytest.approx(0.5)
+    shown.step(np.zeros((environment.physics.model.nbody, 6)))
+    assert environment.physics.time() == 0.0
+
+
+def run(code, **environment):
+    kept = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    command = [sys.executable, *code]
+    return subprocess.run(command, env=kept | environment, capture_output=True, text=True, timeout=300)
+
+
+def test_without_a_display_a_line_says_what_does_without():
+    done = run(["-m", "arc_suite", "view", "--robot=tick"])
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.count("\n") == 1 and "arc-suite render -o walk.html" in done.stderr
+
+
+IN_A_WINDOW = """
+import sys, time
+import glfw, mujoco.viewer, numpy as np
+from arc_suite.cli import program, view
+launch, seen = mujoco.viewer.launch_passive, []
+
+class Window:
+    def __init__(self, handle, keys):
+        self.handle, self.keys = handle, keys
+    def __enter__(self):
+        return self
+    def __exit__(self, *error):
+        self.handle.close()
+    def __getattr__(self, name):
+        return getattr(self.handle, name)
+    def sync(self):
+        self.handle.sync()
+        seen.append(self.handle.d.qpos.copy())
+        if len(seen) == 8:
+            self.keys(glfw.KEY_UP)
+        if len(seen) == 30:
+            self.handle.close()
+
+mujoco.viewer.launch_passive = lambda model, data, key_callback, **flags: Window(
+    launch(model, data, key_callback=key_callback, **flags), key_callback)
+try:
+    program.run(view.main, "view", ["--robot=tick", "--task=steer"])
+finally:
+    print(len(seen), abs(seen[-1] - seen[0]).max() > 0.01)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not shutil.which("Xvfb"), reason="no Xvfb here: Debian's package xvfb")
+def test_the_real_window():
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "640x480x24"], pass_fds=[write], stderr=subprocess.DEVNULL
+    )
+    try:
+        os.close(write)
+        display = os.read(read, 16).decode().strip()
+        done = run(["-c", IN_A_WINDOW], DISPLAY=f":{display}")
+    finally:
+        server.terminate()
+        server.wait()
+        os.close(read)
+    assert done.stdout == "30 True\n", done.stderr
+    assert done.returncode == 0

@@ -1,0 +1,220 @@
+"""Pages that play walks: what is in them, and in a browser that they show the track."""
+
+import base64
+import io
+import json
+import re
+import shutil
+import zlib
+
+import mujoco
+import numpy as np
+import programs
+import pytest
+from PIL import Image
+
+import arc_suite
+from arc_suite.export import pages
+from arc_suite.policies import policy
+from arc_suite.robots import ROBOTS
+from arc_suite.simulation.model import compiled
+from arc_suite.style import record
+
+STEPS = 60
+
+
+@pytest.fixture(scope="module")
+def tracks():
+    def track(preset):
+        return record(arc_suite.load("tick", "walk", {"random": 0}), policy("cpg", "tick", preset), 0, STEPS)
+
+    return {"tick, tuned": track("tuned"), "tick, <slow> & low": track("slow")}
+
+
+@pytest.fixture
+def bundle(monkeypatch):
+    """Something in place of the viewer, for tests of what is around it."""
+    monkeypatch.setattr(pages, "viewer", lambda: "window.viewer = null;")
+
+
+def walks_of(page):
+    (data,) = re.findall(r'<script id="data" type="text/plain">([^<]*)</script>', page)
+    return json.loads(zlib.decompress(base64.b64decode(data)))
+
+
+def qpos_of(track):
+    return np.concatenate([track.positions, track.quaternions, track.joint_angles], axis=-1)
+
+
+def test_a_page_holds_the_tracks(bundle, tracks):
+    page = pages.page(tracks)
+    assert "<title>tick, tuned, tick, &lt;slow&gt; &amp; low</title>" in page
+    first, second = walks_of(page)
+    assert (first["label"], second["label"]) == tuple(tracks)
+    track = tracks["tick, tuned"]
+    np.testing.assert_allclose(first["positions"], track.positions, atol=1e-6)
+    np.testing.assert_allclose(first["joints"], track.joint_angles, atol=1e-6)
+    assert [part["name"] for part in first["parts"]] == list(ROBOTS["tick"].part_names)
+    assert first["stance"] == track.stance.astype(int).tolist() != first["schedule"]
+    np.testing.assert_allclose(np.sum(list(first["terms"].values()), axis=0), track.rewards, atol=1e-5)
+    assert first["totals"][-1] == pytest.approx(track.rewards.sum(), abs=1e-5)
+    assert first["terms"].keys() == first["colours"].keys() and len(set(first["colours"].values())) == 10
+    assert first["terrain"] is None
+    assert pages.page(tracks) == page
+
+
+def test_the_ground_of_an_uneven_arena_comes_along(bundle):
+    environment = arc_suite.load("tick", "steer", {"random": 0, "arena": "bumps"})
+    (walk,) = walks_of(pages.page({"tick": record(environment, policy("cpg", "tick", "steered"), 0, 5)}))
+    terrain, arena = walk["terrain"], environment.task.definition.scene.arena
+    rows, columns = np.shape(terrain["heights"])
+    x, y = terrain["low"][0] + terrain["cell"] * (columns // 2), terrain["low"][1] + terrain["cell"] * (rows // 3)
+    assert terrain["heights"][rows // 3][columns // 2] == pytest.approx(
+        arena.height(np.array(x), np.array(y)), abs=1e-4
+    )
+
+
+def test_a_clone_without_the_viewer_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages.resources, "files", lambda package: tmp_path)
+    with pytest.raises(ValueError, match="^no viewer for pages in this clone: `make web` builds it, which needs Node$"):
+        pages.viewer()
+
+
+def test_programs_without_a_viewer_write_nothing(tmp_path):
+    if built():
+        pytest.skip("there is a viewer here")
+    for command in (("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1")):
+        done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
+        assert done.returncode == 1 and "make web" in done.stderr and done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def built():
+    try:
+        return pages.viewer()
+    except ValueError:
+        return None
+
+
+needs_viewer = pytest.mark.skipif(not built(), reason="no viewer here: make web")
+
+
+@needs_viewer
+def test_programs_write_pages(tmp_path):
+    done = programs.run("-m", "arc_suite", "render", "--robot=tick", "--steps=400", "-o", "walk.html", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.fullmatch(r"tick: return [0-9.]+ in 400 steps\nwrote walk.html\n", done.stdout)
+    page = (tmp_path / "walk.html").read_text()
+    assert len(page) < 1_300_000
+    assert "Permission is hereby granted, free of charge" in page  # three.js's licence
+    assert len(zlib.compress(pages.viewer().encode())) < 200_000
+    compare = ("--robot=tick", "--compare=zero", "--episodes=1", "--page=both.html")
+    done = programs.run("-m", "arc_suite", "style", *compare, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    labels = [walk["label"] for walk in walks_of((tmp_path / "both.html").read_text())]
+    assert labels == ["tick, cpg medium", "tick, zero"]
+
+
+@pytest.mark.parametrize(
+    ("command", "message"),
+    [
+        (("render", "--steps=0", "-o", "a.html"), "--steps=0: expected 1 or more for a page"),
+        (("style", "--page=a.htm"), "--page=a.htm: expected a file that ends in .html"),
+    ],
+)
+def test_errors_are_one_line(tmp_path, command, message):
+    done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (1, f"arc-suite {command[0]}: {message}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright here: make check-web")
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("no Chromium here: make check-web")
+    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card needed
+    with playwright.sync_playwright() as running:
+        opened = running.chromium.launch(executable_path=chromium, args=flags)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def shown(browser, tracks, tmp_path_factory):
+    """The page of both tracks, opened from disk, and all that it said and asked for."""
+    path = tmp_path_factory.mktemp("page") / "walk.html"
+    path.write_text(pages.page(tracks), encoding="utf-8")
+    tab, said, asked = browser.new_page(viewport={"width": 800, "height": 600}), [], []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(path.as_uri())
+    tab.wait_for_function("window.viewer", timeout=60_000)
+    yield tab
+    assert said == []
+    assert asked == [path.as_uri()]
+
+
+@pytest.mark.slow
+@needs_viewer
+def test_the_picture_is_the_track(shown, tracks):
+    """At the ends of control steps all parts are where MuJoCo has them, and halfway between two halfway."""
+    body = ROBOTS["tick"]
+    model = compiled(body)
+    data, parts = mujoco.MjData(model), [model.body(name).id for name in body.part_names]
+    shown.evaluate("viewer.pause(false)")
+    for row in (0, 7, 30, STEPS - 1):
+        time = float(tracks["tick, tuned"].times[row])
+        places = shown.evaluate(f"viewer.seek({time}), viewer.places()")
+        for track, walk in zip(tracks.values(), places, strict=True):
+            data.qpos[:] = qpos_of(track)[row]
+            mujoco.mj_kinematics(model, data)
+            np.testing.assert_allclose([walk[name] for name in body.part_names], data.xpos[parts], atol=1e-4)
+    track = tracks["tick, tuned"]
+    places = shown.evaluate(f"viewer.seek({track.times[9] + 0.5 * track.time_step}), viewer.places()")
+    np.testing.assert_allclose(places[0]["torso"], track.positions[9:11].mean(axis=0), atol=1e-5)
+
+
+@pytest.mark.slow
+@needs_viewer
+def test_keys_and_controls(shown, tracks):
+    step, end = tracks["tick, tuned"].time_step, STEPS * tracks["tick, tuned"].time_step
+    time = lambda: shown.evaluate("viewer.state.time")  # noqa: E731
+    shown.evaluate("viewer.pause(false)")
+    shown.keyboard.press("Home")
+    assert time() == 0.0
+    shown.keyboard.press("ArrowRight")
+    assert time() == pytest.approx(step)
+    shown.keyboard.press("End")
+    assert time() == pytest.approx(end)
+    shown.keyboard.press("ArrowLeft")
+    assert time() == pytest.approx(end - step)
+    shown.keyboard.press("ArrowDown")
+    assert shown.evaluate("viewer.state.speed") == 0.5
+    shown.keyboard.press("Home")
+    shown.keyboard.press(" ")
+    shown.wait_for_function("viewer.state.time > 0.1", timeout=60_000)
+    shown.keyboard.press(" ")
+    assert shown.evaluate("viewer.state.playing") is False
+    shown.fill("#time", "1.5")
+    assert time() == pytest.approx(1.5, abs=0.01)
+    assert shown.locator("section").count() == 2
+    assert shown.locator("h2").first.text_content().startswith("tick, tuned: return")
+
+
+@pytest.mark.slow
+@needs_viewer
+def test_something_is_drawn(shown):
+    """The creature stands out from the ground in the middle of its view, and moves over it in time."""
+    shown.evaluate("viewer.pause(false)")
+    pictures = []
+    for time in (0.5, 1.5):
+        shown.evaluate(f"viewer.seek({time})")
+        picture = shown.locator("canvas.view").first.screenshot()
+        pictures.append(np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"), dtype=float))
+    height, width = pictures[0].shape[:2]
+    middle = pictures[0][height // 4 : 3 * height // 4, width // 4 : 3 * width // 4]
+    assert middle.std() > 20.0
+    assert abs(pictures[0] - pictures[1]).mean() > 1.0

@@ -1,0 +1,46 @@
+"""tools/disturbances.py: rows of Markdown for every modifier, or for a task."""
+
+import pathlib
+import re
+
+import programs
+
+TOOL = pathlib.Path(__file__).parents[2] / "tools" / "disturbances.py"
+SHORT = ("--robots=tick", "--presets=steered", "--episodes=2")
+
+
+def test_a_table_of_every_modifier():
+    done = programs.run(TOOL, *SHORT, "--steps=42")
+    assert done.returncode == 0, done.stderr
+    head, _, *rows = done.stdout.strip().splitlines()
+    assert head == "| tick | steered |"
+    figures = {}
+    for row in rows:
+        name, distance, fell = re.fullmatch(r"\| (.*) \| (-?\d\.\d\d) \((\d+)%\) \|", row).groups()
+        figures[name] = float(distance), int(fell)
+    assert {
+        "none",
+        "kicks 1.5",
+        "motor_strength 0.25",
+        "friction 0.2",
+        "mass 2.5",
+        "limp 0",
+        "limp 2",
+    } <= figures.keys()
+    assert "limp 3" not in figures, "the right side is mirrored"
+    assert figures["none"][0] > figures["motor_strength 0.25"][0]
+    assert not any(fell for _, fell in figures.values())
+
+
+def test_a_table_of_a_task():
+    done = programs.run(TOOL, *SHORT, "--task=limp", "--steps=10")
+    assert done.returncode == 0, done.stderr
+    head, _, row = done.stdout.strip().splitlines()
+    assert head == "| limp | zero | steered |"
+    assert re.fullmatch(r"\| tick( \| \d+, \d\.\d\d \(0%\)){2} \|", row)
+
+
+def test_an_unknown_robot_is_one_line():
+    done = programs.run(TOOL, "--robots=tik")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("disturbances.py: unknown robot 'tik'; did you mean 'tick'?")

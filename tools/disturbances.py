@@ -1,0 +1,102 @@
+"""Measures how demonstrators fare under modifiers: how far they walk straight ahead, and how many fall.
+
+Each figure is the way along the first heading as a share of that at the target velocity, over whole
+episodes, with the share of episodes that ended in a fall in brackets. With --task, policies do the
+named task as it is: return, mean tracking, and the share of falls.
+
+Example:
+  python tools/disturbances.py --robots tick,leaper --episodes 10 --steps 400
+  python tools/disturbances.py --task shoved --steps 1000
+"""
+
+import contextlib
+
+import numpy as np
+from absl import flags
+
+from arc_suite import checks, policies, rotations
+from arc_suite.cli import program
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS
+
+FLAGS = flags.FLAGS
+flags.DEFINE_list("robots", list(ROBOTS), "Who walks.")
+flags.DEFINE_list("presets", ["tuned", "steered", "surefooted"], "Of the demonstrator.")
+flags.DEFINE_string("task", None, "Task to do as it is, in place of walking straight under one modifier after another.")
+flags.DEFINE_integer("episodes", 10, "How many of each.", lower_bound=1)
+flags.DEFINE_integer("steps", 400, "Control steps of an episode.", lower_bound=1)
+flags.DEFINE_integer("seed", 0, "Of the first episode.", lower_bound=0)
+
+AHEAD = (1.0, 0.0, 0.0)  # the command at the target velocity
+
+MODIFIERS = [
+    {},
+    *({"kicks": size} for size in (0.5, 1.0, 1.5)),
+    *({"motor_strength": share} for share in (0.6, 0.4, 0.25)),
+    *({"friction": share} for share in (0.4, 0.2)),
+    *({"mass": share} for share in (1.5, 2.5)),
+]
+
+
+def modifiers(body) -> list[dict]:
+    """Settings of the rows of a table: those of every body, and each leg of its left side limp."""
+    legs = [index for index, leg in enumerate(body.legs) if leg.foot_position[1] > 0.0]
+    return [*MODIFIERS, *({"limp": leg} for leg in legs)]
+
+
+def episodes(task: str, body, settings: dict, policy: str, preset: str, command=None) -> dict[str, np.ndarray]:
+    """Figures of episodes, (episodes,) each: return, the task's own at the end, and the distance ahead."""
+    count = FLAGS.episodes
+    rows = VectorEnv(body, task, count, autoreset_mode="Disabled", max_episode_steps=FLAGS.steps, task_kwargs=settings)
+    acting = policies.policy(policy, body, preset, count, task=rows.task)
+    seeds = range(FLAGS.seed, FLAGS.seed + count)
+    with contextlib.closing(rows):
+        observations, _ = rows.reset(seed=FLAGS.seed)
+        acting.begin(range(count), seeds)
+        if command is not None:
+            rows.command("command", command)
+        first, totals, rewards = rows.batch.data.qpos[:, :7].copy(), np.zeros(count), np.zeros(count)
+        figures, over = {}, np.zeros(count, bool)
+        while not over.all():
+            actions = acting.act(rows.task.split(observations), rewards)
+            observations, rewards, terminated, truncated, info = rows.step(actions)
+            totals += rewards
+            for name in (name for name in info if name.startswith("progress_")):
+                figures[name] = np.where(info[f"_{name}"], info[name], figures.get(name, 0.0))
+            over |= terminated | truncated
+        way = rotations.headed(rows.batch.data.qpos[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
+        asked = rows.task.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
+    return {"return": totals, "distance": way[:, 0] / asked} | figures
+
+
+def line(first: str, cells) -> str:
+    """A row of a Markdown table."""
+    return f"| {first} | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print a table for each robot, or one for the task."""
+    robots = {name: ROBOTS[checks.name(name, ROBOTS, "robot")] for name in FLAGS.robots}
+    if FLAGS.task is not None:
+        players = [("zero", "medium"), *(("cpg", preset) for preset in FLAGS.presets)]
+        print(line(FLAGS.task, ["zero", *FLAGS.presets]), line("---", ["---"] * len(players)), sep="\n")
+        for name, body in robots.items():
+            played = [episodes(FLAGS.task, body, {}, *player) for player in players]
+            names = "return", "progress_tracking", "progress_fell"
+            means = [[figures[name].mean() for name in names] for figures in played]
+            print(
+                line(name, [f"{total:.0f}, {tracking:.2f} ({fell:.0%})" for total, tracking, fell in means]), flush=True
+            )
+        return
+    for name, body in robots.items():
+        print(line(name, FLAGS.presets), line("---", ["---"] * len(FLAGS.presets)), sep="\n")
+        for settings in program.progress(modifiers(body), desc=name, leave=False):
+            played = [episodes("steer", body, settings, "cpg", preset, AHEAD) for preset in FLAGS.presets]
+            cells = [f"{p['distance'].mean():.2f} ({p['progress_fell'].mean():.0%})" for p in played]
+            words = ", ".join(f"{key} {value}" for key, value in settings.items()) or "none"
+            print(line(words, cells), flush=True)
+        print()
+
+
+if __name__ == "__main__":
+    program.run(main)
