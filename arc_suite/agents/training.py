@@ -143,6 +143,8 @@ def train(
                 due = min((state["evaluated"] // run.interval + 1) * run.interval, run.steps)
                 figures = learner.advance(due)
                 bar.update(learner.step - bar.n)
+                arrays = learner.arrays()
+                _check_finite(arrays, learner.step)
                 if figures is not None:
                     _record(run_files, learner, figures)
                     told(learner.step, figures)
@@ -152,8 +154,6 @@ def train(
                     state["evaluated"] = learner.step
                     told(learner.step, {"return": state["return"]})
                 clock.read(run_files, learner.step, write=figures is not None or learner.step >= due)
-                arrays = learner.arrays()
-                _check_finite(arrays, learner.step)
                 run_files.save(arrays, state)
     return True
 

@@ -97,7 +97,7 @@ def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     for method in ("append", "save"):
         monkeypatch.setattr(RunFolder, method, fragile(getattr(RunFolder, method)))
     for _ in range(BREAKS):
-        LEFT[:] = [random.integers(25)]
+        LEFT[:] = [random.integers(9)]
         with pytest.raises(BrokenOff):
             train(run, tmp_path / "broken", progress=silent)
     LEFT[:] = [np.inf]

@@ -1,0 +1,99 @@
+"""Snapshots of rows: another environment goes on from them to the bit, through a file without pickles."""
+
+import io
+
+import numpy as np
+import pytest
+from gymnasium.error import ResetNeeded
+
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.tasks import TASKS
+
+ROWS, LIMIT = 3, 1.5  # s: episodes end within a test
+
+
+def rows(task="walk", mode="SameStep", robot="tick", **settings):
+    return VectorEnv(robot, task, ROWS, 1, mode, task_kwargs={"time_limit": LIMIT} | settings)
+
+
+def through_a_file(arrays):
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    file.seek(0)
+    with np.load(file, allow_pickle=False) as stored:
+        return {name: stored[name] for name in stored.files}
+
+
+def assert_equal_steps(one, other, actions):
+    for action in actions:
+        for mine, theirs in zip(one.step(action)[:4], other.step(action)[:4], strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+@pytest.mark.parametrize("task", TASKS)
+def test_another_environment_goes_on_to_the_bit(task, mode):
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (100, ROWS, 18))
+    one, other = rows(task, mode, random=5), rows(task, mode)
+    one.reset()
+    for action in actions[:40]:  # so that levels and models of rows are no longer those of the start
+        one.step(action)
+    arrays = through_a_file(one.snapshot())
+    observations = one.step(actions[40])[0]
+    other.restore(arrays)
+    np.testing.assert_array_equal(other.step(actions[40])[0], observations)
+    assert_equal_steps(one, other, actions[41:])
+    assert other.np_random_seed == one.np_random_seed == (5, 6, 7)
+
+
+def test_an_environment_goes_back():
+    environment = rows(random=1)
+    environment.reset()
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (60, ROWS, 18))
+    arrays = environment.snapshot()
+    before = [environment.step(action)[0] for action in actions]
+    environment.restore(arrays)
+    np.testing.assert_array_equal([environment.step(action)[0] for action in actions], before)
+
+
+def test_rows_that_wait_or_rest():
+    one, other = rows(mode="Disabled", random=2), rows(mode="Disabled")
+    one.reset()
+    one.rest(np.array([False, True, False]))
+    for _ in range(10):
+        one.step(np.zeros((ROWS, 18)))
+    other.restore(one.snapshot())
+    assert_equal_steps(one, other, np.zeros((30, ROWS, 18)))
+
+
+def test_a_snapshot_does_not_change():
+    environment = rows(random=3)
+    environment.reset()
+    arrays = environment.snapshot()
+    before = {name: array.copy() for name, array in arrays.items()}
+    for _ in range(5):
+        environment.step(np.ones((ROWS, 18)))
+    assert all(np.array_equal(before[name], array, equal_nan=True) for name, array in arrays.items())
+
+
+def test_before_a_reset_there_is_none():
+    with pytest.raises(ResetNeeded, match=r"^cannot take a snapshot: no episode has begun; call reset first$"):
+        rows().snapshot()
+
+
+@pytest.mark.parametrize("other", [{"task": "steer"}, {"robot": "leaper"}])
+def test_of_another_task_or_body(other):
+    environment = rows()
+    environment.reset()
+    with pytest.raises(ValueError, match=r"^snapshot: of other rows or another task: ") as caught:
+        rows(**other).restore(environment.snapshot())
+    assert "\n" not in str(caught.value)
+
+
+def test_something_is_missing():
+    environment = rows()
+    environment.reset()
+    arrays = environment.snapshot()
+    del arrays["random/keys"]
+    with pytest.raises(ValueError, match=r"^snapshot: of other rows or another task: 'random/keys'$"):
+        rows().restore(arrays)
