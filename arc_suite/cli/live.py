@@ -124,10 +124,11 @@ def play(
         if not live.paused:
             ahead += min(now - last, _LONGEST)
         last = now
-        while ahead >= live.control_timestep:
-            live.step(pulls(live.shown, window.perturb))
-            ahead -= live.control_timestep
         with window.lock():
+            while ahead >= live.control_timestep:
+                live.pose(1.0)  # a pull ends where the body has come to, however seldom it is shown
+                live.step(pulls(live.shown, window.perturb))
+                ahead -= live.control_timestep
             live.pose(ahead / live.control_timestep)
         window.set_texts((None, mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, live.text(), None))
         window.sync()

@@ -139,6 +139,20 @@ def test_the_mouse_pulls_at_the_body():
     assert not environment.physics.data.xfrc_applied.any()
 
 
+def test_a_pull_follows_the_body_between_pictures():
+    """However slow the display is, the force is that of where the body stands at each control step."""
+    environment, shown = playing("walk")
+    forces, step = [], shown.step
+    shown.step = lambda pulled: (forces.append(pulled[1, 1]), step(pulled))
+    shown.pose(1.0)
+    window, model, data = Window(4, 0.4), shown.shown.model.ptr, shown.shown.data.ptr
+    window.perturb.select, window.perturb.active = model.body("torso").id, mujoco.mjtPertBit.mjPERT_TRANSLATE
+    window.perturb.refselpos, window.perturb.localmass = data.xipos[1] + (0.0, 0.2, 0.0), 0.08
+    play(shown, window)
+    assert len(forces) == 24
+    assert len(set(forces)) == 24
+
+
 def test_a_fall_begins_the_next_episode():
     environment = arc_suite.load("tick", "walk", {"random": 0, "time_limit": 0.5})
     shown = live.Live(environment, alone(policy("zero", "tick")))
