@@ -12,6 +12,7 @@
 # make check-agents  learners, ONNX and statistics beside their oracles, in the environment of check-jax
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make census  walks 500 random bodies and tells which do
+# make obedience  how well 100 random bodies follow ten commands; minutes
 # make soak    two million steps: memory, threads and files stay what they are
 # make fuzz    damages specs, tracks and datasets at random and reads them; minutes
 # make mutants plants mistakes and tells which test catches each; takes hours
@@ -21,7 +22,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench census soak fuzz mutants golden clean
+.PHONY: demo test check lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench census obedience soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -134,6 +135,9 @@ bench: $(INSTALLED)
 
 census: $(INSTALLED)
 	$(PYTHON) tools/walk_census.py --count 500
+
+obedience: $(INSTALLED)
+	$(PYTHON) tests/obedience.py
 
 soak: $(INSTALLED)
 	$(PYTHON) tests/soak.py
