@@ -65,7 +65,7 @@ MUTANTS = (
         "np.random.RandomState(self.seed)",
     ),
     Mutant("feet may sink", "return memory.sinking >= SINKING", "return memory.sinking < 0"),
-    Mutant("levels never fall", "max(carry.level - 1, 0) if carry.distance < DOWN else carry.level", "carry.level"),
+    Mutant("levels never fall", "max(carry.level - 1, 0) if carry.outcome < down else carry.level", "carry.level"),
     Mutant("the highest level for ever", "return carry.level if stays < STAYS else other", "return carry.level"),
     Mutant(
         "a scan that does not turn",
@@ -199,6 +199,21 @@ MUTANTS = (
     Mutant("the fallen go on earning", "totals += rewards * counted", "totals += rewards"),
     Mutant("a search is told its worst", "[-value for value in fitness]", "fitness"),
     Mutant("a damaged episode is read", "!= value:", "is value:"),
+    # Clips and pages.
+    Mutant("axes of glTF are a mirror", "_AXES = (1, 2, 0)", "_AXES = (0, 2, 1)"),
+    Mutant(
+        "the seam of a loop is left",
+        "joints = motion.joints - share * (motion.joints[-1] - motion.joints[0])",
+        "joints = motion.joints + 0.0 * share",
+    ),
+    Mutant("clips begin anywhere", "draft.motion.begun(downs[0])", "draft.motion.begun(0)"),
+    Mutant("soles of clips hover", "draft.motion.lowered(hover)", "draft.motion.lowered(0.0)"),
+    Mutant(
+        "sRGB written as linear",
+        "linear = np.where(colour <= 0.04045, colour / 12.92,",
+        "linear = np.where(True, colour,",
+    ),
+    Mutant("the mouse pulls at nothing", "data.xfrc_applied[:] = forces", "data.xfrc_applied[:] = 0.0"),
 )
 
 

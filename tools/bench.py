@@ -5,6 +5,7 @@ are worth nothing.
 
 Example:
   python tools/bench.py --plot docs/performance.png --document docs/performance.md
+  python tools/bench.py --tasks --robots queen
   python tools/bench.py --collect 128 --robots queen --rounds 3
 """
 
@@ -13,7 +14,7 @@ import json
 import os
 
 from absl import flags
-from benchmark import contestants, measurement, report
+from benchmark import contestants, measurement, report, tasks
 
 from arc_suite import checks, files
 from arc_suite.cli import program
@@ -28,6 +29,7 @@ flags.DEFINE_integer("steps", 60, "Control steps of one turn; a third of it wher
 flags.DEFINE_string("json", "out/bench.json", "Where to write all measurements.")
 flags.DEFINE_string("plot", "out/bench.png", "Where to write the plot.")
 flags.DEFINE_string("document", None, "A Markdown file between whose <!-- benchmark --> marks to put the tables.")
+flags.DEFINE_bool("tasks", False, "Measure a row's step of every task beside one of walk instead.")
 flags.DEFINE_integer("collect", None, "Measure the collecting of so many episodes instead.", lower_bound=1)
 
 
@@ -55,6 +57,10 @@ def main():
         print(collecting.measure(robots, FLAGS.collect, FLAGS.rounds))
         return
     threads = contestants.all_threads()
+    if FLAGS.tasks:
+        for robot in robots:
+            print(tasks.measure(robot, max(threads), FLAGS.rounds), end="\n\n")
+        return
     workers = numbers("workers") if FLAGS.workers else [factor * max(threads) for factor in (1, 2, 4)]
     rows = numbers("rows")
     document = FLAGS.document and report.document(FLAGS.document)

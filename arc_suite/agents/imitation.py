@@ -16,12 +16,12 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
+from arc_suite import policies
 from arc_suite.agents import networks
 from arc_suite.agents.learner import Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
 from arc_suite.agents.rows import Imitation
-from arc_suite.cpg.demonstrator import Demonstrator, presets_of
-from arc_suite.policies import Positioned
+from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.policies.network import Layer, forward
 
 ACTIVATION = "elu"
@@ -92,8 +92,7 @@ class Imitator:
         task = self._environment.task
         self._joints = self._environment.single_action_space.shape[0]
         preset = row.preset or best(stage.body, task)
-        teacher = Demonstrator(stage.body, preset)
-        self._teacher = Positioned(teacher, task) if task.actions == "position" else teacher
+        self._teacher = policies.policy("cpg", stage.body, preset, row.rows, task=task)
         layers = networks.mlp(
             generator(stage.seed, "networks", 0),
             (task.size, row.hidden, row.hidden, self._joints),
@@ -109,7 +108,6 @@ class Imitator:
         self._length = 0
         self._observation, _ = self._environment.reset()
         self._age = np.zeros(row.rows, int)
-        self._teacher.begin(range(row.rows))
 
     @property
     def step(self) -> int:
@@ -159,7 +157,6 @@ class Imitator:
         self._observation = restore_environment(self._environment, arrays)
         for observation, age in zip(self._observations[: self._length], self._ages, strict=False):
             self._taught(observation, age)
-        self._teacher.begin(np.flatnonzero(self._age == 0))
 
     def _act(self, random: np.random.Generator) -> float:
         """Act in all rows for a control step, take down what the demonstrator says, and return the mean reward."""
@@ -178,8 +175,9 @@ class Imitator:
 
     def _taught(self, observation: np.ndarray, age: np.ndarray) -> np.ndarray:
         """What the demonstrator would do, whose episodes begin in rows of age 0."""
-        self._teacher.begin(np.flatnonzero(age == 0))
-        return self._teacher.act(self._environment.task.split(observation))
+        rows = np.flatnonzero(age == 0).tolist()
+        self._teacher.begin(rows, [0] * len(rows))  # demonstrators are the same in all episodes
+        return self._teacher.act(self._environment.task.split(observation), np.zeros(len(age)))
 
     def _fitted(self, random: np.random.Generator, observations, labels, ends: bool) -> float:
         """Fit the network, longer and with a falling rate if this is the end, and return the mean squared error."""

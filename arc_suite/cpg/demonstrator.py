@@ -10,7 +10,8 @@ import numpy as np
 from arc_suite import checks, robots, rotations
 from arc_suite.cpg.law import Ahead, Pattern, felt, joint_targets, torques
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
-from arc_suite.cpg.steering import MANNERS, Manner, Steered
+from arc_suite.cpg.sighted import TREADS, Sighted, Tread
+from arc_suite.cpg.steering import STEERING, Manner, Steered
 from arc_suite.cpg.stride import Stride
 from arc_suite.models.sizing import control_timestep
 from arc_suite.models.soundness import flaws
@@ -21,13 +22,15 @@ from arc_suite.tasks.fitting import fitted_gait
 # Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
 FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
+MANNERS = (*STEERING, "sighted")  # presets that follow the command of a task; what is sighted needs to see the ground
+
 
 class Demonstrator:
     """A policy that walks one body by a preset, in one environment or in the rows of a batch.
 
     The presets slow, medium, fast, tuned and refined walk straight by a clock of their own, and take
     joint angles and velocities and the torso's orientation alone from the observation. Those of
-    `steering.MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
+    `MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
     of a batch by `begin` and `act`, as every policy does, and in one environment as a function of a
     `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
 
@@ -44,8 +47,7 @@ class Demonstrator:
             robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast; for the four robots also tuned, which earns most of what
                 the paper's law can earn in walk, and refined, which earns most of all, or numbers of
-                your own; steered or surefooted, which follow
-                the command of a task.
+                your own; steered, surefooted or sighted, which follow the command of a task.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, which have presets
                 alone.
@@ -77,6 +79,8 @@ class Demonstrator:
             self._law = OnClock(body, Prescribed.fit(body, preset, gait))
         elif gait is not None:
             raise ValueError("gait: expected none, as the preset walks in the gait of the task")
+        elif isinstance(preset, Tread):
+            self._law = Sighted(body, preset)
         else:
             self._law = Steered(body, preset)
 
@@ -146,7 +150,7 @@ class OnClock:
         return action
 
 
-def presets_of(body: Body) -> Mapping[str, Preset | float | Manner]:
+def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread]:
     """Return a body's presets by name: of a robot its numbers, of any other its speed as a share of sqrt(g h).
 
     Those that follow a command are the same for all.
@@ -154,7 +158,8 @@ def presets_of(body: Body) -> Mapping[str, Preset | float | Manner]:
     Raises:
         ValueError: a body of a robot's name that has other joints; one line.
     """
-    return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **MANNERS}
+    tread = robots.row(TREADS, body, "treads") or Tread()
+    return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **STEERING, "sighted": tread}
 
 
 class Prescribed(NamedTuple):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import robots, rotations
+from arc_suite.cpg.following import Following, phase
 from arc_suite.cpg.law import felt, torques
 from arc_suite.cpg.stride import lifted
 from arc_suite.models.sizing import control_timestep, position_gains, sized
@@ -38,7 +39,7 @@ class Manner(NamedTuple):
     attitude: float
 
 
-MANNERS = {
+STEERING = {
     "steered": Manner(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.3, attitude=0.0),
     "surefooted": Manner(lift=0.45, gain=(2.0, 2.0, 1.0), integral=0.6, attitude=0.3),
 }
@@ -72,8 +73,6 @@ BUILDS = {
 _ACROSS = 0.1  # how much it matters that a foot does not slip across its way
 _DAMPING = 0.1  # of the leg's largest Jacobian entry, for a joint with room for _ROOM
 _ROOM = 0.5  # rad
-_SMOOTHING = 0.25  # cycles over which a new command takes hold
-_ONSET = 1.0  # cycles over which the gait grows to its full size
 
 
 class _Leg(NamedTuple):
@@ -104,7 +103,7 @@ class Steered:
 
         Args:
             body: any body.
-            manner: how it walks, one of `MANNERS` or numbers of one's own.
+            manner: how it walks, one of `STEERING` or numbers of one's own.
             build: numbers for a body of another build; None for those of its name, or the usual ones.
         """
         self._manner = manner
@@ -122,13 +121,11 @@ class Steered:
         self._stance = parameters.duty_factor / parameters.gait_frequency  # s
         self._units = velocity_units(body, parameters.target_velocity)
         self._stiffness, self._damping = position_gains(body, pose.inertias)
-        self._state = None
+        self._following = Following(manner.gain, manner.integral, self._cycles)
 
     def begin(self, rows: Sequence[int]) -> None:
         """Start episodes in some rows, given by their indices."""
-        if self._state is not None:
-            for field in self._state:
-                field[rows] = 0.0
+        self._following.begin(rows)
 
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
@@ -136,22 +133,10 @@ class Steered:
         if missing := {"gait_clock", "command"} - observation.keys():
             raise ValueError(f"observation: expected a block {min(missing)}, as the task steer has")
         clock, commanded = (np.asarray(observation[name], dtype=float) for name in ("gait_clock", "command"))
-        rows = len(angles)
-        if self._state is None or len(self._state[0]) != rows:
-            self._state = np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros((rows, 1))
-        command, integral, size = self._state
-        wanted, motion = commanded[:, :3], commanded[:, 3:]
-        command += min(1.0, self._cycles / _SMOOTHING) * (wanted - command)
-        integral += self._manner.integral * self._cycles * (wanted - motion)
-        integral.clip(-1.0, 1.0, out=integral)
-        going = clock.any(axis=-1, keepdims=True)
-        integral *= going
-        size += np.where(going, 1.0, -1.0) * self._cycles / _ONSET
-        size.clip(0.0, 1.0, out=size)
-        asked = (command + integral + self._manner.gain * (command - motion)) * self._units
-        phase = np.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi)
-        sweeps, raised, lifts = self._directions(asked, quaternion)
-        targets, ahead = (size * (raised + self._swung(at, sweeps, lifts)) for at in (phase, phase + self._cycles))
+        asked, size = self._following.asked(clock, commanded)
+        sweeps, raised, lifts = self._directions(asked * self._units, quaternion)
+        now = phase(clock)
+        targets, ahead = (size * (raised + self._swung(at, sweeps, lifts)) for at in (now, now + self._cycles))
         speeds = (ahead - targets) / self._step
         return torques(self._neutral + targets, angles, velocities - speeds, self._stiffness, self._damping)
 

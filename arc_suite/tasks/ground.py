@@ -63,10 +63,16 @@ class Settings(NamedTuple):
 
 
 class Carry(NamedTuple):
-    """What an episode leaves to the next: its level, the share of the distance that it went, and whether it failed."""
+    """What an episode leaves to the next.
+
+    Attributes:
+        level: of a curriculum.
+        outcome: how much of what was asked for it achieved; NaN where there was none.
+        failed: whether it ended in failure.
+    """
 
     level: int | np.ndarray
-    distance: float | np.ndarray
+    outcome: float | np.ndarray
     failed: bool | np.ndarray
 
 
@@ -83,19 +89,21 @@ class Memory(NamedTuple("Memory", _FIELDS)):
     """
 
 
-def next_level(carry: Carry, stays: float, other: int) -> int:
+def next_level(carry: Carry, stays: float, other: int, down: float = DOWN, up: float = UP) -> int:
     """Return the level of the next episode.
 
     Args:
         carry: of the episode before.
         stays: drawn from 0 to 1.
         other: a level, drawn.
+        down: outcome below which the level falls.
+        up: outcome above which it rises, unless the episode failed.
     """
-    if carry.distance > UP and not carry.failed:
+    if carry.outcome > up and not carry.failed:
         if carry.level < LEVELS - 1:
             return carry.level + 1
         return carry.level if stays < STAYS else other
-    return max(carry.level - 1, 0) if carry.distance < DOWN else carry.level
+    return max(carry.level - 1, 0) if carry.outcome < down else carry.level
 
 
 class Lanes(steer.Steer):
@@ -104,9 +112,10 @@ class Lanes(steer.Steer):
     Attributes:
         kinds: of ground, in the order of `terrain.KINDS`, one of which is drawn for an episode.
         copies: lanes of each kind, and of each kind and level of a curriculum; boxes cost time, so there are fewer.
+        thresholds: outcomes below and above which a curriculum's level falls and rises.
     """
 
-    yaw, own_arena = 0.3, True
+    yaw, own_arena, thresholds = 0.3, True, (DOWN, UP)
     kinds: tuple[str, ...]
     copies = (8, 2)
 
@@ -153,7 +162,7 @@ class Lanes(steer.Steer):
 
     def first(self) -> Carry:
         """Return the level at which a stream begins, which it neither raises nor lowers."""
-        return Carry(self.settings.ground.level, DOWN, False)
+        return Carry(self.settings.ground.level, np.nan, False)
 
     def start(self, random: np.random.RandomState, carry: Carry) -> Start:
         """Draw kind, level (two draws), lane and place across it; then steer's start, nearly along the lane."""
@@ -161,7 +170,9 @@ class Lanes(steer.Steer):
         copies = self.copies[self.settings.ground.curriculum]
         lane, place = random.randint(copies), random.uniform(-SPREAD, SPREAD)
         start = super().start(random, carry)
-        level, levels = (next_level(carry, stays, other), LEVELS) if self.settings.ground.curriculum else (0, 1)
+        level, levels = 0, 1
+        if self.settings.ground.curriculum:
+            level, levels = next_level(carry, stays, other, *self.thresholds), LEVELS
         arena = self.scene.arena
         middle = arena.start((kind * levels + level) * copies + lane)
         start.qpos[1] += middle + place * arena.unit
@@ -217,18 +228,22 @@ class Lanes(steer.Steer):
         return figures | ({"level": memory.level * 1.0} if self.settings.ground.curriculum else {})
 
     def distance(self, memory: Memory):
-        """Return the way along the lane (...) as a share of that at the target velocity.
+        """Return the way along the lane (...) as a share of that at the target velocity; see `asked`."""
+        return memory.distance / (self.units[0] * self.scene.control_timestep * self.asked(memory))
 
-        Of the whole episode for who has failed, left the lane or reached its end; so far for all others.
-        """
+    def asked(self, memory: Memory):
+        """Return of how many steps (...) an episode is judged: of all where it is over, else of those so far."""
         numpy = memory.distance.__array_namespace__()
         over = memory.fell | self.sunk(memory) | self.left(memory)
-        steps = numpy.where(over, min(self.step_limit, STEPS), memory.steps + (memory.steps == 0))
-        return memory.distance / (self.units[0] * self.scene.control_timestep * steps)
+        return numpy.where(over, min(self.step_limit, STEPS), memory.steps + (memory.steps == 0))
 
     def carry(self, memory: Memory) -> Carry:
         """Return what the next level is drawn from."""
-        return Carry(memory.level, self.distance(memory), memory.fell | self.sunk(memory))
+        return Carry(memory.level, self.outcome(memory), memory.fell | self.sunk(memory))
+
+    def outcome(self, memory: Memory):
+        """Return by what a curriculum judges an episode (...)."""
+        return self.distance(memory)
 
 
 class Rough(Lanes):

@@ -8,11 +8,13 @@ from numpy.testing import assert_array_equal
 
 pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
+from arc_suite import policies
 from arc_suite.agents import imitation, run_folder
 from arc_suite.agents.algorithms import ALGORITHMS
 from arc_suite.agents.learner import Stage
 from arc_suite.agents.rows import Imitation
 from arc_suite.agents.training import Run, train
+from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
 from arc_suite.robots import ROBOTS, generator
@@ -80,9 +82,20 @@ def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path)
     labels, actions = learner.arrays()["labels"], np.array(acted)
     assert_array_equal(actions[:, :4].astype(np.float32), labels[:, :4])
     assert (abs(actions[:, 4:] - labels[:, 4:]).max(axis=-1) > 1e-3).all()
-    demonstrator = imitation.Demonstrator("leaper", "refined")
+    demonstrator = Demonstrator("leaper", "refined")
     for observation, label in zip(learner.arrays()["observations"], labels, strict=True):
         said = demonstrator.act(environment.task.split(observation))
+        assert_array_equal(said.astype(np.float32), label)
+
+
+def test_where_motors_hold_positions_it_learns_positions(tmp_path):
+    learner = imitation.begin(SMALL, stage(tmp_path, actions="position"))
+    learner.advance(80)
+    policy = policies.policy("cpg", "leaper", "refined", SMALL.rows, task=learner._environment.task)
+    policy.begin(range(8), [0] * 8)
+    arrays = learner.arrays()
+    for observation, label in zip(arrays["observations"], arrays["labels"], strict=True):
+        said = policy.act(learner._environment.task.split(observation), np.zeros(8))
         assert_array_equal(said.astype(np.float32), label)
 
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_array_equal
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.steering import MANNERS
+from arc_suite.cpg.demonstrator import MANNERS
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 
@@ -75,6 +75,63 @@ def test_rows_are_single_demonstrators():
         assert_array_equal(actions[1], alone(timestep._replace(observation=blocks)), err_msg=f"step {step}")
         observations, *_ = rows.step(actions)
         timestep = single.step(actions[1])
+
+
+@pytest.mark.parametrize("preset", ["surefooted", "sighted"])
+def test_rows_over_trenches_are_single_demonstrators(preset):
+    rows, policy = VectorEnv("queen", "gaps", 3), Demonstrator("queen", preset)
+    single, alone = arc_suite.load("queen", "gaps"), Demonstrator("queen", preset)
+    observations, timestep = rows.reset(seed=4)[0], single.reset(5)
+    for step in range(60):
+        actions = policy.act({name: block.astype(float) for name, block in rows.task.split(observations).items()})
+        blocks = {name: block.astype(np.float32) for name, block in timestep.observation.items()}
+        assert_array_equal(actions[1], alone(timestep._replace(observation=blocks)), err_msg=f"step {step}")
+        observations, *_ = rows.step(actions)
+        timestep = single.step(actions[1])
+
+
+def test_a_row_that_begins_again_does_as_the_first_time():
+    rows, policy = VectorEnv("tick", "gaps", 2), Demonstrator("tick", "sighted")
+
+    def walked():
+        observations = rows.reset(seed=4)[0]
+        policy.begin([0, 1])
+        for _ in range(20):
+            actions = policy.act(rows.task.split(observations))
+            observations = rows.step(actions)[0]
+        return actions
+
+    assert_array_equal(walked(), walked())
+
+
+def crossed(robot, preset, steps=400):
+    """Mean share of the distance over trenches of half a standing height, and of episodes that fell."""
+    rows = VectorEnv(robot, "gaps", 10, task_kwargs={"difficulty": 0.8}, autoreset_mode="Disabled")
+    policy, over = Demonstrator(robot, preset), np.zeros(10, bool)
+    step, observations = rows.task.scene.control_timestep, rows.reset(seed=100)[0]
+    policy.begin(list(range(10)))
+    way, fell = np.zeros(10), np.zeros(10, bool)
+    for _ in range(steps):
+        observations, _, terminated, truncated, _ = rows.step(policy.act(rows.task.split(observations)))
+        fell |= terminated & ~over
+        over |= terminated | truncated
+        way += ~over * rows.task.split(observations)["command"][:, 3] * step
+    rows.close()
+    return way.mean() / (steps * step), fell.mean()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["queen", "bastion", "tick"])
+def test_who_sees_crosses_trenches(robot):
+    (blind, _), (seeing, fell) = crossed(robot, "surefooted"), crossed(robot, "sighted")
+    assert seeing >= 0.75 and seeing >= blind + 0.15, (blind, seeing)
+    assert fell <= 0.4
+
+
+def test_sight_needs_a_scan():
+    environment = arc_suite.load("queen", "steer")
+    with pytest.raises(ValueError, match="^observation: expected a block scan, as the task rough has$"):
+        Demonstrator("queen", "sighted")(environment.reset())
 
 
 def test_what_it_needs_and_what_it_cannot_take_is_one_line():

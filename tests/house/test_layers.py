@@ -190,14 +190,18 @@ def test_tables_name_what_is_there():
 
 
 def test_only_tasks_and_registration_know_one_task_from_another():
-    """Whoever drives tasks gets them from the registry; registration and demonstrators know walk's rows of numbers."""
+    """Whoever drives tasks gets them from the registry; registration and demonstrators know walk's rows of numbers.
+
+    Those that see know where the ground is scanned.
+    """
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
     particular = texts - contract
     assert particular == {"tasks.walk", "tasks.steer", "tasks.ground", "tasks.disturbed"}
     for name in modules():
-        if room(name) != "tasks" and name not in ("registration", "cpg.steering"):
+        know = ("registration", "cpg.steering", "cpg.sighted", "cpg.footholds")
+        if room(name) != "tasks" and name not in know:
             assert not particular & set(inside(trees()[name])), name
 
 

@@ -118,7 +118,7 @@ def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
         memory, data = environment.task.memory, environment.physics.data.ptr
         lanes.add(float(memory.lane))
         assert abs(data.qpos[1] - memory.lane) < 6.5 * arena.unit
-        assert abs(memory.place[2]) < 0.5
+        assert abs(memory.place[2]) < (0.5 if name != "roam" else 3.2)
         assert (task.read(data).foot_heights - radii).min() > 0.0099 * arena.unit
     assert len(lanes) > 0.6 * min(40, len(arena.lanes))
     assert lanes <= {arena.start(lane) for lane in range(len(arena.lanes))}
@@ -308,3 +308,20 @@ def test_models_of_rows_and_of_one_environment_are_one():
 def test_the_scan_in_a_mirror():
     mirror = prepared("queen", "rough")[0].mirrors["scan"]
     assert_allclose(mirror(SCAN), SCAN * [[1.0], [-1.0]], atol=1e-15)
+
+
+def test_a_stream_begins_at_the_level_of_its_settings():
+    task = prepared("tick", "rough", {"curriculum": True, "level": 6})[0]
+    assert task.start(np.random.RandomState(0), task.first()).memory.level == 6
+
+
+def test_roaming_follows_commands_from_the_middle_of_the_lane():
+    environment, _, memory = opened("roam")
+    task = environment.task.definition.task  # without its kicks
+    middle = 0.5 * task.scene.arena.length * task.scene.arena.unit
+    assert abs(environment.physics.data.qpos[0] - middle) < 0.1 * middle
+    assert_array_equal(task.wanted(memory), memory.schedule[0])
+    assert "distance" not in environment.task.progress and "tracking" in environment.task.progress
+    walked = memory._replace(steps=200, tracking=np.float64(120.0))
+    assert task.carry(walked).outcome == pytest.approx(0.6)
+    assert task.carry(walked._replace(fell=np.True_)).outcome == pytest.approx(0.12)

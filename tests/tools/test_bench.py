@@ -8,11 +8,12 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
-from benchmark import growth, ordinary, report
+from benchmark import growth, ordinary, report, tasks
 from numpy.testing import assert_allclose
 from PIL import Image
 
 import arc_suite
+from arc_suite.tasks import TASKS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "bench.py"
 
@@ -124,3 +125,12 @@ def test_grown_bodies_have_their_legs_and_links(legs, links):
     assert len(body.legs) == legs
     assert len(body.joint_names) == legs * links
     assert len(body.part_names) == 1 + legs * (links + 1)
+
+
+def test_what_every_task_costs(monkeypatch):
+    for name, value in {"ROWS": 2, "_ONSET": 1, "_STEPS": 1}.items():
+        monkeypatch.setattr(tasks, name, value)
+    table = [line.strip("|").split("|") for line in tasks.measure("tick", 1, 1).splitlines()[2:]]
+    assert [cells[0].strip() for cells in table] == [*TASKS, "the scan of rough"]
+    assert all(float(cells[1]) > 0.0 for cells in table)
+    assert float(table[0][2]) == 1.0

@@ -1,0 +1,114 @@
+"""Kinematics of legs: where soles are at given angles of joints, and which angles bring them to places."""
+
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from arc_suite.robots.spec import Body
+
+_USED = 0.95  # share of a joint's range, about its middle, that targets may use
+# Cross products with the unit vectors, as matrices.
+_CROSS = np.array(
+    [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]]
+)
+
+
+class Legs(NamedTuple):
+    """Chains of links of all legs, in the torso's frame; shorter ones end in fixed links without length.
+
+    Attributes:
+        mounts: (legs, 3) where they begin, m.
+        turns: (legs, 3, 3) orientations there.
+        axes: (legs, links, 3) of the joint at the beginning of each link, unit vectors; 0 where it is fixed.
+        ends: (legs, links, 3) of links from their beginnings, m.
+        radii: (legs,) of the feet, m.
+        joints: (legs, links) indices; 0 where a link is fixed.
+        moves: (legs, links) whether a link has a joint.
+        low: (legs, links) bounds of targets, rad.
+        high: the same.
+    """
+
+    mounts: np.ndarray
+    turns: np.ndarray
+    axes: np.ndarray
+    ends: np.ndarray
+    radii: np.ndarray
+    joints: np.ndarray
+    moves: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    @classmethod
+    def of(cls, body: Body) -> Self:
+        """Return the legs of a body."""
+        shape = (len(body.legs), max(len(leg.links) for leg in body.legs))
+        axes, ends, joints = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape, int)
+        moves, low, high, count = np.zeros(shape, bool), np.zeros(shape), np.zeros(shape), 0
+        for i, leg in enumerate(body.legs):
+            for j, link in enumerate(leg.links):
+                ends[i, j] = link.end
+                if link.joint:
+                    axes[i, j] = np.array(link.joint.axis) / np.linalg.norm(link.joint.axis)
+                    joints[i, j], moves[i, j] = count, True
+                    first, last = np.radians(link.joint.range_deg)
+                    spare = 0.5 * (1.0 - _USED) * (last - first)
+                    low[i, j], high[i, j] = first + spare, last - spare
+                    count += 1
+        mounts, radii = np.array([leg.mount for leg in body.legs]), np.array([leg.foot.radius for leg in body.legs])
+        turns = _rotations(np.tile((0.0, 0.0, 1.0), (len(mounts), 1)), np.radians([leg.yaw_deg for leg in body.legs]))
+        return cls(mounts, turns, axes, ends, radii, joints, moves, low, high)
+
+    def by_leg(self, values) -> np.ndarray:
+        """Return values (..., joints) as (..., legs, links), 0 where a link is fixed."""
+        return np.where(self.moves, values[..., self.joints], 0.0)
+
+    def by_joint(self, values) -> np.ndarray:
+        """Return values (..., legs, links) as (..., joints)."""
+        return values[..., self.moves]
+
+    def soles(self, angles) -> tuple[np.ndarray, np.ndarray]:
+        """Return the places (..., legs, 3) of the soles, m, and their Jacobians (..., legs, 3, links).
+
+        Args:
+            angles: (..., legs, links) rad.
+        """
+        frame, place, joints = self.turns, self.mounts, []
+        for link in range(angles.shape[-1]):
+            joints.append(((frame @ self.axes[:, link, :, None])[..., 0], place))
+            frame = frame @ _rotations(self.axes[:, link], angles[..., link])
+            place = place + (frame @ self.ends[:, link, :, None])[..., 0]
+        sole = place - self.radii[:, None] * (0.0, 0.0, 1.0)
+        return sole, np.stack([np.cross(axis, sole - anchor) for axis, anchor in joints], axis=-1)
+
+    def reached(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
+        """Return the angles (..., legs, links), by damped least squares from given ones, that bring soles near goals.
+
+        Args:
+            angles: (..., legs, links) to begin with, rad.
+            goals: (..., legs, 3) places of the soles, m.
+            weights: (..., legs, 3, 3) by which what is missing is turned and weighed.
+            damping: m.
+            steps: of the search.
+        """
+        for _ in range(steps):
+            place, jacobian = self.soles(angles)
+            missing, weighed = weights @ (goals - place)[..., None], weights @ jacobian
+            change = _least(weighed, missing, damping)
+            # Joints at their bounds must not hold the others up.
+            bound = (angles <= self.low) & (change < 0.0) | (angles >= self.high) & (change > 0.0)
+            change = _least(np.where(bound[..., None, :], 0.0, weighed), missing, damping)
+            angles = (angles + change).clip(self.low, self.high)
+        return angles
+
+
+def _least(jacobian, missing, damping: float) -> np.ndarray:
+    """The least changes of angles (..., n), with damping, that make up for what is missing (..., 3, 1)."""
+    across = np.swapaxes(jacobian, -1, -2)
+    return (across @ np.linalg.solve(jacobian @ across + damping**2 * np.eye(3), missing))[..., 0]
+
+
+def _rotations(axes, angles) -> np.ndarray:
+    """Rotations (..., 3, 3) by angles (...) about unit axes (..., 3), after Rodrigues; none about an axis of 0."""
+    cross = sum(axes[..., i, None, None] * _CROSS[i] for i in range(3))
+    sine, cosine = np.sin(angles)[..., None, None], np.cos(angles)[..., None, None]
+    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
