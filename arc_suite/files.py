@@ -54,6 +54,10 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         yield temporary
         if temporary.exists():
             temporary.replace(target)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -86,7 +86,10 @@ class RunFolder:
             file.close()
 
     def _write(self, table: str, line: str) -> None:
-        self._files[table].write(f"{line}\n".encode())
+        try:
+            self._files[table].write(f"{line}\n".encode())
+        except OSError as error:
+            raise OSError(f"cannot write {self.path / table}.csv: {error.strerror.lower()}") from None
 
 
 @contextlib.contextmanager

@@ -5,10 +5,13 @@ import pytest
 
 pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
-from conftest import small
+from conftest import SHORT, small
 
+from arc_suite import data
 from arc_suite.agents import off_policy
 from arc_suite.agents import soft_actor_critic as sac
+from arc_suite.agents.learner import Stage
+from arc_suite.robots import ROBOTS
 
 
 @pytest.fixture
@@ -180,3 +183,36 @@ def test_prior_data_that_do_not_fit(name, stage, line, learner):
     with pytest.raises(ValueError, match=line) as caught:
         learner(small(name), **stage)
     assert "\n" not in str(caught.value)
+
+
+def test_prior_data_of_another_robot(prior, tmp_path):
+    stage = Stage(ROBOTS["queen"], "walk", SHORT, 0, 100, tmp_path / "run", prior)
+    with pytest.raises(ValueError, match=rf"^prior '{prior}': of tick, and not of queen$"):
+        small("sope").module.begin(small("sope").row, stage)
+
+
+def test_runs_share_the_files_of_prior_data(learner, tmp_path):
+    """Read once, beside the folders of the runs."""
+    first = learner(small("sope"), folder=tmp_path / "one")
+    (folder,) = tmp_path.glob("prior-*")
+    before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    second = learner(small("sacfd"), folder=tmp_path / "two")
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
+    every = np.arange(len(first._prior))
+    for mine, theirs in zip(first._prior.at(every), second._prior.at(every), strict=True):
+        assert np.array_equal(mine, theirs)
+
+
+def test_prior_data_are_those_of_the_dataset(learner, prior):
+    """Every transition, with its next observation; time limits go on, falls do not."""
+    found = learner(small("sope"))._prior
+    batch, start = found.at(np.arange(len(found))), 0
+    for episode in data.open(prior):
+        part = slice(start, start + episode.length)
+        assert np.array_equal(batch.observations[part], episode.observations[:-1])
+        assert np.array_equal(batch.next_observations[part], episode.observations[1:])
+        assert np.array_equal(batch.actions[part], episode.actions)
+        assert np.array_equal(batch.rewards[part], episode.rewards.astype(np.float32))
+        assert np.array_equal(batch.goes_on[part], 1.0 - episode.terminations)
+        start += episode.length
+    assert start == len(found)

@@ -110,7 +110,7 @@ def test_a_full_disk_keeps_the_checkpoint(path, monkeypatch):
     before = (path / "checkpoint.npz").read_bytes()
     with opened(path, CONFIG) as folder:
         monkeypatch.setattr(np, "savez", full)
-        with pytest.raises(OSError, match="No space left"):
+        with pytest.raises(OSError, match=r"^cannot write .*checkpoint\.npz: no space left on device$"):
             folder.save({"count": np.zeros(3)}, {})
     assert (path / "checkpoint.npz").read_bytes() == before
     assert sorted(each.name for each in path.iterdir()) == sorted(
