@@ -9,30 +9,55 @@ distance of the feet from their centre.
 import heapq
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite.arenas.pillars import RADIUS
-from arc_suite.cpg.steering import MANNERS, Steered
+from arc_suite.cpg.steering import STEERING, Manner, Steered
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.navigate import FAR, RAYS, SIGHT
 
-ROOM = 0.3  # between feet and pillars, where there is room
-LEAST = 0.8  # of the extent of the feet, the least that the torso keeps from pillars
-NEARNESS = 3.0  # what a unit of missing room costs, in units of way
-AHEAD = 1.0  # along the way, of the point that is steered for
+_SEEN = 0.95  # share of their farthest at which ranges are taken for pillars
 _POINTS = 12  # about a pillar, through which ways lead
 _OUTSIDE = 1.06 / math.cos(math.pi / _POINTS)  # of what a pillar takes up, at which these are: sides clear it too
 _ANGLES = 2.0 * np.pi * np.arange(_POINTS) / _POINTS
 
 
-class Planned:
-    """Goes to the goal of the task navigate, around the pillars that its ranges tell of."""
+class Plan(NamedTuple):
+    """How a way is planned and followed.
 
-    def __init__(self, body: Body):
+    Attributes:
+        room: between feet and pillars, where there is room, R.
+        least: that the torso keeps from pillars, as a share of the extent of the feet.
+        nearness: what a unit of missing room costs, in units of way.
+        aim: how far along the way the point is that is steered for, R.
+        ahead: velocity that is asked for, in target velocities.
+        back: likewise backwards, at most.
+        aside: likewise sideways, at most.
+        manner: in which the body walks.
+    """
+
+    room: float = 0.3
+    least: float = 0.8
+    nearness: float = 6.0
+    aim: float = 0.6
+    ahead: float = 1.2
+    back: float = 0.6
+    aside: float = 0.7
+    manner: Manner = STEERING["steered"]
+
+
+PLANS = {"planned": Plan()}
+
+
+class Planned:
+    """Goes to the goal of the task navigate, around the pillars that its ranges tell of, in the rows of a batch."""
+
+    def __init__(self, body: Body, plan: Plan):
         """Fit the law that steers to a body."""
-        self._steered = Steered(body, MANNERS["steered"])
+        self._plan, self._steered = plan, Steered(body, plan.manner)
         self._extent = self._steered.extent / reach(body)
 
     def begin(self, rows: Sequence[int]) -> None:
@@ -47,15 +72,15 @@ class Planned:
         for row, (goal, ranges) in enumerate(zip(observation["goal"], observation["ranges"], strict=True)):
             circles = seen(np.asarray(ranges, dtype=float))
             goal = FAR * float(goal[2]) * np.asarray(goal[:2], dtype=float)
-            x, y = ahead(way(goal, circles, self._extent) or [goal], AHEAD)
-            command[row, :3] = toward(math.atan2(y, x))
+            x, y = along(way(goal, circles, self._extent, self._plan) or [goal], self._plan.aim)
+            command[row, :3] = toward(math.atan2(y, x), self._plan)
         return self._steered.act({**observation, "command": command})
 
 
-def toward(bearing: float) -> tuple[float, float, float]:
+def toward(bearing: float, plan: Plan) -> tuple[float, float, float]:
     """Return the command that leads to a bearing, rad: a turn to it, and a walk there meanwhile."""
-    turn = min(max(bearing, -1.0), 1.0)
-    return max(math.cos(bearing), 0.0), 0.5 * math.sin(bearing), turn
+    forward = max(plan.ahead * math.cos(bearing), -plan.back)
+    return forward, plan.aside * math.sin(bearing), min(max(bearing, -1.0), 1.0)
 
 
 def seen(ranges: np.ndarray) -> np.ndarray:
@@ -64,34 +89,36 @@ def seen(ranges: np.ndarray) -> np.ndarray:
     Two neighbouring rays that meet one pillar tell exactly where it is; a ray alone, that it is about
     as far behind as its radius.
     """
-    hits = np.flatnonzero(ranges < 1.0)
-    points = (SIGHT * ranges * RAYS).T
-    middles = {}
-    for hit in hits:
-        other = (hit + 1) % len(ranges)
-        across = points[other] - points[hit]
+    points, met = (SIGHT * ranges * RAYS).T, ranges < _SEEN
+    exact, rough = [], []
+    for ray in np.flatnonzero(met):
+        rough.append(points[ray] + RADIUS * RAYS[:, ray])
+        across = points[(ray + 1) % len(ranges)] - points[ray]
         half = 0.5 * math.hypot(*across)
-        if ranges[other] < 1.0 and half < RADIUS:
-            middle, normal = points[hit] + 0.5 * across, np.array((across[1], -across[0])) / (2.0 * half)
-            middles[hit] = middles[other] = middle + math.sqrt(RADIUS**2 - half**2) * normal
-    for hit in hits:
-        middles.setdefault(hit, points[hit] + RADIUS * RAYS[:, hit])
-    return np.array(list(middles.values())).reshape(-1, 2)
+        if met[(ray + 1) % len(ranges)] and half < RADIUS:
+            normal = np.array((across[1], -across[0])) / (2.0 * half)
+            exact.append(points[ray] + 0.5 * across + math.sqrt(RADIUS**2 - half**2) * normal)
+    middles = []
+    for middle in exact + rough:
+        if all(math.hypot(*(middle - other)) > 2.0 * RADIUS for other in middles):
+            middles.append(middle)
+    return np.array(middles).reshape(-1, 2)
 
 
-def way(goal: np.ndarray, circles: np.ndarray, extent: float) -> list[np.ndarray]:
+def way(goal: np.ndarray, circles: np.ndarray, extent: float, plan: Plan) -> list[np.ndarray]:
     """Return the corners of a shortest way from the torso to a goal around circles, by A*; none if there is no way.
 
     Args:
         goal: (2,) forward and left of the torso.
         circles: (n, 2) their middles.
-        extent: of the body about the torso.
+        extent: of the feet about the torso.
+        plan: how near it may lead to them.
 
     Returns:
         Points (2,), the goal the last of them.
     """
     distances = np.hypot(*circles.T)
-    least, wanted = np.minimum(RADIUS + LEAST * extent, 0.99 * distances), RADIUS + extent + ROOM
+    least, wanted = np.minimum(RADIUS + plan.least * extent, 0.99 * distances), RADIUS + extent + plan.room
     points = np.concatenate([np.zeros((1, 2)), goal[None], _between(circles, wanted), _around(circles, wanted)])
     apart = np.hypot(*np.moveaxis(points[:, None] - circles, -1, 0))
     points = points[(apart >= least).all(axis=-1) | (np.arange(len(points)) < 2)]
@@ -109,7 +136,10 @@ def way(goal: np.ndarray, circles: np.ndarray, extent: float) -> list[np.ndarray
         if done[point]:
             continue
         done[point] = True
-        cost = costs[point] + _cost(points[point], points, circles, least, wanted)
+        cost = costs[point] + np.hypot(*(points - points[point]).T)
+        nearest = _nearest(points[point], points, circles)
+        cost += plan.nearness * (wanted - nearest).clip(0.0).sum(axis=-1)
+        cost[(nearest < least).any(axis=-1)] = np.inf
         better = np.flatnonzero(cost < costs)
         costs[better], before[better] = cost[better], point
         for index in better:
@@ -133,26 +163,15 @@ def _between(circles: np.ndarray, distance: float) -> np.ndarray:
     return 0.5 * (circles[first] + circles[second])[near]
 
 
-def _cost(start: np.ndarray, ends: np.ndarray, circles: np.ndarray, least: np.ndarray, wanted: float) -> np.ndarray:
-    """Costs (n,) of straight ways from a point to others (n, 2): length, and what they come too near to circles.
-
-    Args:
-        start: (2,)
-        ends: (n, 2)
-        circles: (circles, 2) their middles.
-        least: (circles,) distance from them, below which there is no way.
-        wanted: distance from them, below which it costs.
-    """
-    way = ends - start
-    apart = circles - start
+def _nearest(start: np.ndarray, ends: np.ndarray, circles: np.ndarray) -> np.ndarray:
+    """How near straight ways from a point (2,) to others (n, 2) lead to circles' middles: (n, circles)."""
+    way, apart = ends - start, circles - start
     share = (way @ apart.T / np.maximum((way**2).sum(axis=-1), 1e-12)[:, None]).clip(0.0, 1.0)
-    nearest = share[..., None] * way[:, None] - apart
-    nearest = np.hypot(nearest[..., 0], nearest[..., 1])
-    cost = np.hypot(*way.T) + NEARNESS * (wanted - nearest).clip(0.0).sum(axis=-1)
-    return np.where((nearest >= least).all(axis=-1), cost, np.inf)
+    between = share[..., None] * way[:, None] - apart
+    return np.hypot(between[..., 0], between[..., 1])
 
 
-def ahead(corners: Sequence[np.ndarray], distance: float) -> np.ndarray:
+def along(corners: Sequence[np.ndarray], distance: float) -> np.ndarray:
     """Return the point (2,) at a distance along a way from the torso; its end, if it is shorter."""
     place = np.zeros(2)
     for corner in corners:

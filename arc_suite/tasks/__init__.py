@@ -7,9 +7,6 @@ from arc_suite.tasks.navigate import Navigate
 from arc_suite.tasks.steer import Steer
 from arc_suite.tasks.walk import Walk
 
-TASKS = {
-    task.name: task
-    for task in (Walk, Steer, Rough, Slopes, Stairs, Gaps, Course, Shoved, Limp, Roam, Navigate)
-}
+TASKS = {task.name: task for task in (Walk, Steer, Rough, Slopes, Stairs, Gaps, Course, Shoved, Limp, Roam, Navigate)}
 
 __all__ = ["TASKS", "Task"]

@@ -19,6 +19,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import steer
 from arc_suite.tasks.contract import Start
 from arc_suite.tasks.fitting import reach
+from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.readings import Readings
 
 GOALS = 16  # of a chain; at its end it goes back
@@ -83,6 +84,13 @@ class Navigate(steer.Steer):
     def blocks(self) -> Mapping[str, int]:
         """Steer's, where the goal is, and how far pillars are all around."""
         return {**super().blocks, "goal": 3, "ranges": RAYS.shape[1]}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """Steer's; goals and ranges on the left are on the right."""
+        rays = np.arange(RAYS.shape[1])
+        ranges = Mirror(-rays % len(rays), np.ones(len(rays), np.int8))
+        return {**super().mirrors, "goal": Mirror.signed(1, -1, 1), "ranges": ranges}
 
     def start(self, random: np.random.RandomState, carry: Any) -> Start:
         """Draw steer's start, then where pillars stand, then the chain of goals."""
