@@ -13,7 +13,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks import TASKS
+from arc_suite.tasks import TASKS, ground
 from arc_suite.tasks.contract import Inputs
 from arc_suite.tasks.walk import Walk
 
@@ -156,7 +156,7 @@ SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take
 @every_task
 def test_settings_check_themselves(task_name):
     own = f"arena: task {task_name} has a ground of its own, expected none" if TASKS[task_name].own_arena else None
-    kind = task_name if own else "walk"
+    kind = task_name if issubclass(TASKS[task_name], ground.Lanes) else "walk"
     for settings, message in (
         ({"targt_velocity": 1.0}, f"unknown setting of {kind} 'targt_velocity'; did you mean 'target_velocity'?"),
         ({"weights": {"helthy": 1.0}}, "unknown weight 'helthy'; did you mean 'healthy'?"),
