@@ -39,7 +39,7 @@ class Pillars(Flat):
             pillar = root.worldbody.add("body", name=name, mocap=True, pos=place)
             # A capsule whose ends' middles are at the floor and at the top: as a cylinder between them.
             size = (RADIUS * self.unit, 0.5 * self.top)
-            pillar.add("geom", name=name, type="capsule", size=size, conaffinity=1, **contact)
+            pillar.add("geom", name=name, type="capsule", size=size, mass=0.0, conaffinity=1, **contact)
 
     def places(self, shifts: np.ndarray) -> np.ndarray:
         """Return where pillars stand, their middles (COUNT, 3), m.

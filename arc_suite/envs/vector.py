@@ -370,7 +370,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _render_row(self, row: int) -> np.ndarray:
         scene = self.task.scene
-        return pictures.picture(scene.body, scene.arena, self.batch.data.qpos[row], **self._picture)
+        qpos, mocap_pos = self.batch.data.qpos[row], self.batch.mocap_pos[row]
+        return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, **self._picture)
 
     def _begin(self, rows: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some rows, (num_envs,) booleans, and put their observations among the others."""
