@@ -55,8 +55,8 @@ class Batch:
         """Positions (rows, nmocap, 3) of the arena's movable bodies, live."""
         return self._simulations.bind("mocap_pos")
 
-    def part(self, rows: np.ndarray) -> types.SimpleNamespace:
-        """Return a copy of `data` for some rows alone, (rows,) booleans."""
+    def part(self, rows: np.ndarray | int) -> types.SimpleNamespace:
+        """Return `data` of some rows alone: a copy for (rows,) booleans, views without that axis for one's index."""
         return types.SimpleNamespace(**{name: array[rows] for name, array in vars(self.data).items()})
 
     def step(self, nstep: int, rows: np.ndarray) -> np.ndarray:

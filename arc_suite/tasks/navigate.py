@@ -15,6 +15,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.arenas import Arena
 from arc_suite.arenas.pillars import CELLS, COUNT, PITCH, RADIUS, Pillars
+from arc_suite.marks import Mark
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import steer
 from arc_suite.tasks.contract import Start
@@ -29,6 +30,8 @@ FAR = 7.0  # distance of a goal from which on it is observed as far
 
 # Directions (2, 24) of the ranges, forward and left: all around, ahead first, then to the left.
 RAYS = np.stack([function(math.radians(15.0) * np.arange(24)) for function in (np.cos, np.sin)])
+
+FLAT, GOAL = 0.02, (0.2, 0.9, 0.4, 0.6)  # thickness, in R, and colour of the disc that shows a goal
 
 _MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
 _OWN = ("pillars", "goals", "reached", "arrived", "gained", "touched", "collisions")
@@ -120,12 +123,15 @@ class Navigate(steer.Steer):
             collisions=memory.collisions + collided,
         )
 
-    def to_goal(self, memory: Memory):
-        """Return where the goal is from the torso (..., 2), forward and left, m."""
+    def goal(self, memory: Memory):
+        """Return where the present goal is (..., 2), m."""
         numpy, end = memory.place.__array_namespace__(), GOALS - 1
         number = end - abs(end - memory.reached % (2 * end))
-        goal = numpy.take_along_axis(memory.goals, numpy.asarray(number)[..., None, None], axis=-2)[..., 0, :]
-        return rotations.headed(goal - memory.place[..., :2], memory.place[..., 2])
+        return numpy.take_along_axis(memory.goals, numpy.asarray(number)[..., None, None], axis=-2)[..., 0, :]
+
+    def to_goal(self, memory: Memory):
+        """Return where the goal is from the torso (..., 2), forward and left, m."""
+        return rotations.headed(self.goal(memory) - memory.place[..., :2], memory.place[..., 2])
 
     def distance(self, memory: Memory):
         """Return how far the goal is from the torso (...), m."""
@@ -175,6 +181,13 @@ class Navigate(steer.Steer):
         chord = RADIUS * RADIUS - (x * left - y * forward) ** 2
         hit = numpy.where((chord >= 0.0) & (along >= 0.0), along - numpy.sqrt(chord.clip(0.0)), SIGHT)
         return (hit.min(axis=-1) / SIGHT).clip(0.0, 1.0)
+
+    def marks(self, memory: Memory, readings: Felt) -> list[Mark]:
+        """Return steer's arrows, and the goal as a disc within which it is reached."""
+        unit = self.scene.arena.unit
+        middle = np.array((*self.goal(memory), 0.0))
+        disc = Mark("cylinder", middle, middle + (0.0, 0.0, FLAT * unit), NEAR * unit, GOAL)
+        return [*super().marks(memory, readings), disc]
 
     def progress(self, memory: Memory) -> dict:
         """Return how many `goals` were reached, on how many ways a pillar was hit, and steer's figures."""

@@ -196,6 +196,23 @@ def test_rows_are_single_environments_and_carry_on_after_a_copy():
     rows.close()
 
 
+def test_pictures_show_the_goal_and_pillars():
+    rows = VectorEnv("tick", "navigate", 2, 1, render_mode="rgb_array", height=60, width=80)
+    single = arc_suite.load("tick", "navigate")
+    rows.reset(seed=4), single.reset(seed=5)
+    for _ in range(3):
+        rows.step(np.zeros(rows.action_space.shape)), single.step(np.zeros(18))
+    shown = single.physics.render(60, 80)
+    assert_array_equal(rows.render()[1], shown)
+    task, memory = single.task.definition, single.task.memory
+    disc = task.marks(memory, task.read(single.physics.data.ptr))[-1]
+    assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.reach)
+    assert_array_equal(disc.start[:2], memory.goals[0])
+    single.physics.data.mocap_pos[:, :2] += 100.0
+    assert not np.array_equal(single.physics.render(60, 80), shown)
+    rows.close()
+
+
 @pytest.mark.slow
 def test_the_same_shape_finds_its_way_at_any_size():
     figures = []
