@@ -31,7 +31,7 @@ FAR = 7.0  # distance of a goal from which on it is observed as far
 # Directions (2, 24) of the ranges, forward and left: all around, ahead first, then to the left.
 RAYS = np.stack([function(math.radians(15.0) * np.arange(24)) for function in (np.cos, np.sin)])
 
-FLAT, GOAL = 0.02, (0.2, 0.9, 0.4, 0.6)  # thickness, in R, and colour of the disc that shows a goal
+FLAT, GOAL = 0.02, (0.2, 0.9, 0.4, 1.0)  # thickness, in R, and colour of the disc that shows a goal
 
 _MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
 _OWN = ("pillars", "goals", "reached", "arrived", "gained", "touched", "collisions")
