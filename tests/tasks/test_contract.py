@@ -26,7 +26,15 @@ PLACES = [
     for name, task in TASKS.items()
     for settings in ([{}] if task.own_arena else [{"arena": "flat"}, {"arena": "bumps"}, {"arena": "stairs"}])
 ]
-every_place = pytest.mark.parametrize(("task_name", "settings"), PLACES)
+# Bodies take turns from place to place in `make check`; `make test` takes all pairs.
+_PAIRS = [(name, settings, body) for name, settings in PLACES for body in BODIES]
+every_place_and_body = pytest.mark.parametrize(
+    ("task_name", "settings", "body"),
+    [
+        pytest.param(*pair, marks=() if index // len(BODIES) % len(BODIES) == index % len(BODIES) else pytest.mark.slow)
+        for index, pair in enumerate(_PAIRS)
+    ],
+)
 
 
 def frozen(memory):
@@ -58,8 +66,7 @@ def read_only(batch, task):
     return types.SimpleNamespace(**fields)
 
 
-@every_place
-@every_body
+@every_place_and_body
 def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings):
     task, _ = prepared(BODIES[body], task_name, settings)
     batch, memory = started(task)
@@ -122,8 +129,7 @@ class Counting(np.random.RandomState):
         return drawn
 
 
-@every_place
-@every_body
+@every_place_and_body
 @pytest.mark.parametrize("threads", [1, 3])
 def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
     """Over several episodes, among rows that fall or stand still at other times."""
