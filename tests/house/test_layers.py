@@ -70,6 +70,7 @@ THIRD_PARTY = {
     "agents.off_policy": {"numpy", "jax"},
     "agents.soft_actor_critic": {"numpy", "jax", "optax"},
     "agents.imitation": {"numpy", "jax", "optax"},
+    "agents.cloning": {"numpy", "jax", "optax"},
     "agents.on_policy": {"numpy", "jax"},
     "agents.proximal_policy": {"numpy", "jax", "optax"},
     "agents.rows": set(),
