@@ -56,7 +56,13 @@ def _least(values: Sequence[float | None]) -> float | None:
 
 
 def _metric(name: str) -> Callable[[Result], float]:
-    return lambda result: float(np.abs(result.style[name]).mean()) if name in result.style else np.nan
+    """The mean size of a metric of style over the episodes in which it is finite; NaN where there is none."""
+
+    def figure(result):
+        sizes = np.abs(result.style.get(name, np.empty(0)))
+        return float(sizes[np.isfinite(sizes)].mean()) if np.isfinite(sizes).any() else np.nan
+
+    return figure
 
 
 def _final(result: Result) -> float:
@@ -161,7 +167,7 @@ _IMPROVEMENT = (
 _STYLE = "Mean size over ten episodes of the latest policy of each seed: docs/style.md says what is measured."
 _CLAIMS = (
     "How far each sentence is from being false, in its own unit: above zero it holds. The paper's figure is from its "
-    "table of final returns after 1,000,000 steps, where that has one."
+    "final returns after 1,000,000 steps, where those tell. Ours are of finished runs alone, at the steps they have."
 )
 _LEADERBOARD = (
     "Of all studies whose tables lie here, written by `arc-suite study NAME --report`. Return: mean of the latest "
@@ -267,13 +273,18 @@ def _style(groups: Groups) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            cells = [f"{np.mean([_metric(name)(each) for each in seeds]):.3f}" for name in names]
+            cells = [_size(name, seeds) for name in names]
             lines.append((place, kind, *cells))
     return _table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
 
 
+def _size(name: str, seeds: Sequence[Result]) -> str:
+    size = np.mean([_metric(name)(each) for each in seeds])
+    return "-" if np.isnan(size) else f"{size:.3f}"
+
+
 def _claims(found: Sequence[Result]) -> str:
-    own = [each for each in found if _is_papers(each)]
+    own = [each for each in found if _is_papers(each) and each.steps[-1] >= each.row.steps]
     lines = []
     for claim in CLAIMS:
 
@@ -284,7 +295,7 @@ def _claims(found: Sequence[Result]) -> str:
         paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
         ours = {robot: claim.compared(robot, measured) for robot in PAPER}
         lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
-    return _table(("sentence", "paper's figure", "holds there", "ours, at the steps reached", "holds here"), lines)
+    return _table(("sentence", "paper's figure", "holds there", "ours", "holds here"), lines)
 
 
 def _leads(figures: Mapping[str, float | None]) -> str:
@@ -308,7 +319,7 @@ def _leaderboard(folder: Path) -> str:
     for name, seeds in lines:
         row, values = seeds[0].row, study_results.scores(seeds)
         tracking = np.mean([np.mean(next(iter(each.progress.values()))) for each in seeds])
-        style = [f"{np.mean([_metric(m)(each) for each in seeds]):.3f}" for m in ("gait_compliance", "heading_error")]
+        style = [_size(name, seeds) for name in ("gait_compliance", "heading_error", "torso_pitch")]
         command = shlex.join(["arc-suite", *row.arguments(Path("runs", name, row.name))])
         steps = f"{min(each.steps[-1] for each in seeds):,} of {row.steps:,}"
         cpu = f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}"
@@ -317,5 +328,6 @@ def _leaderboard(folder: Path) -> str:
         cells.append(
             (row.place, row.kind, result, _iqm(values), f"{tracking:.3f}", *style, steps, cpu, link, f"`{command}`")
         )
-    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "speed, m/s", "gait compliance", "heading error, rad")
+    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "speed, m/s", "gait compliance")
+    heads += ("heading error, rad", "torso pitch, rad")
     return _table((*heads, "steps", "CPU min", "study", "command of seed 0"), cells)

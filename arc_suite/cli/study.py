@@ -7,6 +7,7 @@ enough to be committed, and the report is made of that folder alone.
   arc-suite study first-steps
   arc-suite study first-steps --report
   arc-suite study paper --jobs 8 --shard 3/16
+  arc-suite study paper --submit 16 --hours 24
   arc-suite study my_studies:MINE
 """
 
@@ -25,6 +26,9 @@ from arc_suite.cli.program import progress
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
 flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth, from the ith on, which counts from 0.")
+flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
+flags.DEFINE_float("hours", 24.0, "Of a job; it comes back until its share is done.", lower_bound=0.1)
+flags.DEFINE_string("partition", None, "Of the cluster. [default: the cluster's]")
 flags.DEFINE_bool("report", False, "Write the report in place of making runs.")
 flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
 flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
@@ -45,6 +49,8 @@ def main(name: str | None = None) -> int:
         study_runner.publish_all(rows, folder, results)
         print(study_report.write(name, study, results))
         return 0
+    if FLAGS.submit is not None:
+        return submit(name, folder, results)
     jobs = FLAGS.jobs or os.cpu_count()
     states = study_runner.run(rows, folder, results, jobs, shown(jobs), progress)
     print(table(states, jobs))
@@ -52,6 +58,23 @@ def main(name: str | None = None) -> int:
     for run in failed:
         print(f"{folder / run}.log: {last_line(folder / f'{run}.log')}", file=sys.stderr)
     return 1 if failed else 0
+
+
+def submit(name: str, folder: Path, results: Path) -> int:
+    """Submit the study to a cluster, and print the jobs.
+
+    Raises:
+        ValueError: submitit is not installed; one line.
+    """
+    try:
+        from arc_suite.agents import cluster
+    except ImportError as error:
+        raise ValueError(f"--submit needs submitit: pip install 'arc_suite[cluster]' ({error})") from None
+    arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
+    parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
+    for job in cluster.submit(arguments, FLAGS.submit, FLAGS.hours, folder / "jobs", **parameters):
+        print(f"submitted {job.job_id}")
+    return 0
 
 
 def shard(text: str) -> tuple[int, int]:

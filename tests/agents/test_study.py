@@ -188,3 +188,28 @@ def test_rows_of_the_table_are_runs(name):
         arguments = row.arguments("folder")
         assert f"--seed={row.seed}" in arguments
         assert [f"--row={key}={value}" in arguments for key, value in row.numbers.items()] == [True] * len(row.numbers)
+
+
+def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
+    """By submitit's executor that runs jobs here; a job that is broken off comes back as it was."""
+    pytest.importorskip("submitit", reason="of the extra cluster: make check-agents")
+    from arc_suite.agents import cluster
+
+    commands = []
+    monkeypatch.setattr(cluster.subprocess, "run", lambda command, check: commands.append(command))
+    jobs = cluster.submit(("study", "first-steps"), 3, 2.0, tmp_path / "jobs", cluster="debug")
+    for job in jobs:
+        job.result()
+    assert [command[1:] for command in commands] == [
+        ["-m", "arc_suite", "study", "first-steps", f"--shard={part}/3", "--jobs=1"] for part in range(3)
+    ]
+    share = cluster.Share(("study", "first-steps"))
+    assert share.checkpoint().function == share
+
+
+@pytest.mark.skipif(importlib.util.find_spec("submitit") is not None, reason="submitit is installed")
+def test_without_submitit_it_says_what_to_install(tmp_path):
+    done = programs.run("-m", "arc_suite", "study", "paper", "--submit=2", cwd=tmp_path)
+    line = "arc-suite study: --submit needs submitit: pip install 'arc_suite[cluster]' ("
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(line) and done.stderr.count("\n") == 1

@@ -75,6 +75,7 @@ THIRD_PARTY = {
     "agents.proximal_policy": {"numpy", "jax", "optax"},
     "agents.rows": set(),
     "agents.studies": set(),
+    "agents.cluster": {"submitit"},
     "agents.study_runner": {"numpy", "gymnasium", "tqdm"},
     "agents.study_results": {"numpy"},
     "agents.study_report": {"numpy"},
