@@ -127,7 +127,7 @@ check-jax: setup.cfg
 check-agents: VENV := .venv-jax
 check-agents: setup.cfg
 	tools/ensure_venv.sh $(VENV)
-	$(VENV)/bin/python -m pip install -q -e '.[test,agents,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
+	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
 	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)

@@ -9,7 +9,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from arc_suite import checks
-from arc_suite.agents.rows import Imitation, ProximalPolicy
+from arc_suite.agents.rows import Cloning, Imitation, ProximalPolicy
 
 
 class Algorithm(NamedTuple):
@@ -167,6 +167,10 @@ ALGORITHMS = {
     ),
     "imitation": Algorithm(
         "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
+    ),
+    # Its steps are updates.
+    "cloning": Algorithm(
+        "arc_suite.agents.cloning", Cloning(), "behaviour cloning of a dataset", evaluate_every=2500, steps=5000
     ),
 }
 

@@ -1,6 +1,7 @@
 """Pictures of training: returns of evaluations over environment steps."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -34,18 +35,55 @@ def returns(runs: Mapping[str, Sequence[Mapping[str, np.ndarray]]], title: str, 
         low, high = (drawn.low, drawn.high) if len(by_run) > 1 else (f(by_run[0][1], axis=1) for f in (np.min, np.max))
         axis.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0)
         axis.plot(steps, drawn.iqm, color=colour, label=name, marker="." if count < 15 else None)
+    _finish(axis, title, lines)
+    axis.set_ylabel("return of an evaluation")
+    if len(runs) > 1:
+        axis.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def study(
+    groups: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]], lines: Mapping[str, Mapping[str, float]]
+) -> Figure:
+    """Draw the learning curves of a study: a row for each place, two pictures of the same numbers in it.
+
+    On the left the mean over runs with their standard deviation, as in the paper; on the right the
+    interquartile mean with its 95 % bootstrap interval.
+
+    Args:
+        groups: steps (points,) and mean returns (runs, points) by place and kind of run. Of one run, the returns of
+            an evaluation's episodes (episodes, points).
+        lines: returns to compare with, by place and name.
+    """
+    figure = Figure(figsize=(12.0, 3.6 * len(groups)), dpi=110, layout="constrained")
+    axes = figure.subplots(len(groups), 2, squeeze=False, sharey="row")
+    colours = dict(
+        zip(dict.fromkeys(kind for kinds in groups.values() for kind in kinds), cycle(_COLOURS), strict=False)
+    )
+    for (left, right), (place, kinds) in zip(axes, groups.items(), strict=True):
+        for kind, (steps, returns) in kinds.items():
+            mean, deviation, robust = returns.mean(axis=0), returns.std(axis=0), curve([returns])
+            bands = (left, mean, mean - deviation, mean + deviation), (right, robust.iqm, robust.low, robust.high)
+            for axis, middle, low, high in bands:
+                axis.fill_between(steps, low, high, color=colours[kind], alpha=0.15, linewidth=0)
+                axis.plot(steps, middle, color=colours[kind], label=kind, marker="." if len(steps) < 15 else None)
+        for axis, title in ((left, "mean, standard deviation"), (right, "interquartile mean, 95 % interval")):
+            _finish(axis, f"{place}: {title}", lines.get(place, {}))
+        right.legend(frameon=False, fontsize=8)
+        left.set_ylabel("return of an evaluation")
+    return figure
+
+
+def _finish(axis, title: str, lines: Mapping[str, float]) -> None:
+    """Draw returns to compare with, and label the picture."""
     for name, value in lines.items():
         axis.axhline(value, color=_GREY, linestyle="--", linewidth=1.0)
         axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=_GREY)
     axis.set_xlabel("environment steps")
-    axis.set_ylabel("return of an evaluation")
     axis.set_title(title, loc="left", fontweight="bold")
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))
     axis.set_xlim(left=0.0)
     axis.spines[["top", "right"]].set_visible(False)
-    if len(runs) > 1:
-        axis.legend(frameon=False, fontsize=8)
-    return figure
 
 
 def _by_step(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:

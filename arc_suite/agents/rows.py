@@ -1,4 +1,4 @@
-"""Rows of numbers of imitation and of proximal policy optimisation. Nothing here needs JAX."""
+"""Rows of numbers of imitation, of behaviour cloning and of proximal policy optimisation. Nothing here needs JAX."""
 
 import dataclasses
 
@@ -45,6 +45,31 @@ class Imitation:
         for name in ("batch", "hidden"):
             checks.integer(name, getattr(self, name), 1)
         checks.number("noise", self.noise, 0.0, 10.0)
+        checks.number("learning_rate", self.learning_rate, 0.0, 1.0)
+
+
+@dataclasses.dataclass(frozen=True)
+class Cloning:
+    """The numbers of behaviour cloning.
+
+    Attributes:
+        batch: transitions of an update.
+        hidden: units of each of the two hidden layers.
+        learning_rate: of Adam, at first; it falls to 0.
+    """
+
+    batch: int = 256
+    hidden: int = 256
+    learning_rate: float = 1e-3
+
+    def __post_init__(self):
+        """Check the numbers.
+
+        Raises:
+            ValueError: one that does not fit; one line.
+        """
+        for name in ("batch", "hidden"):
+            checks.integer(name, getattr(self, name), 1)
         checks.number("learning_rate", self.learning_rate, 0.0, 1.0)
 
 

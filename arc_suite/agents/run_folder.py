@@ -16,7 +16,7 @@ import json
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -134,8 +134,37 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
     return config
 
 
+def progress_of(path: str | os.PathLike) -> dict[str, Any]:
+    """Return what `RunFolder.save` was last given as progress; nothing where there is no checkpoint.
+
+    Raises:
+        ValueError: the checkpoint is damaged; one line.
+    """
+    return _checkpoint(Path(path) / CHECKPOINT)[1]
+
+
+def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
+    """Compare a configuration with that of a folder.
+
+    Args:
+        path: of the folder.
+        config: all that the run depends on, plain values.
+        left_out: names in it that may differ.
+
+    Raises:
+        ValueError: the folder belongs to another run, or to none; one line.
+    """
+    for name, was, wanted in _differences(config_of(path), config):
+        if name.partition(".")[0] not in left_out:
+            raise ValueError(
+                f"{path}: of another run, whose {name} is {was!r}, and not {wanted!r}; write to another folder"
+            )
+
+
 def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
-    """Return a table of a run's folder: columns by name; whatever of a line is being written is left out.
+    """Return a table of a run's folder: columns by name, none as long as there is no line.
+
+    Whatever of a line is being written is left out.
 
     Raises:
         ValueError: the folder has no such table, or a damaged one; one line.
@@ -143,9 +172,11 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     path = Path(path) / f"{name}.csv"
     try:
         text = path.read_text()
-        header, *lines = text[: text.rfind("\n") + 1].splitlines()
-        columns = np.array([line.split(",") for line in lines], float).reshape(len(lines), -1).T
-        return dict(zip(header.split(","), columns, strict=True)) if lines else {}
+        header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
+        if not lines:
+            return {}
+        columns = np.array([line.split(",") for line in lines], float).T
+        return dict(zip(header.split(","), columns, strict=True))
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: no table of a run: {' '.join(str(error).split())}") from None
 
@@ -159,10 +190,7 @@ def _check(path: Path, config: dict[str, Any]) -> None:
         with files.writing_json(path / CONFIG) as file:
             file.update(config)
         return
-    for name, was, wanted in _differences(config_of(path), config):
-        raise ValueError(
-            f"{path}: of another run, whose {name} is {was!r}, and not {wanted!r}; write to another folder"
-        )
+    check(path, config)
 
 
 def _differences(was: Mapping, wanted: Mapping, above: str = "") -> Iterator[tuple[str, Any, Any]]:

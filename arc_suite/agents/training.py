@@ -14,14 +14,15 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import checks, evaluation, registry, versions
+from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.agents import run_folder
 from arc_suite.agents.algorithms import Algorithm
 from arc_suite.agents.learner import ENVIRONMENT, MOST_SEEDS, Diverged, Learner, Stage
 from arc_suite.agents.run_folder import RunFolder
 from arc_suite.data.settings import model_sha256
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import network
+from arc_suite.policies import checkpoints, network
+from arc_suite.policies.checkpoints import Agent
 from arc_suite.policies.network import Network
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -223,11 +224,15 @@ class _Judge:
         run, task = self._run, self._environment.task
         policy = Network(tuple(learner.policy()), run.robot, task.name, dict(run.task_kwargs), dict(task.blocks))
         network.save(run_files.path / network.FILE, policy)
+        kept = files.folder(run_files.path / checkpoints.FOLDER / str(learner.step))
+        network.save(kept / network.FILE, policy)
         episodes = evaluation.episodes_in_rows(self._environment, policy)
         for seed, episode in enumerate(episodes):
             figures = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
             run_files.append("evaluations", {"step": learner.step, **figures})
-        return float(np.mean([episode.total for episode in episodes]))
+        mean = float(np.mean([episode.total for episode in episodes]))
+        checkpoints.save(kept, Agent(run.algorithm, learner.step, run.seed, mean))
+        return mean
 
     def close(self) -> None:
         if "_environment" in vars(self):

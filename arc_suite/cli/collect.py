@@ -6,10 +6,14 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
   arc-suite collect --robot queen --policy cpg --preset medium --episodes 1000
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1
   arc-suite collect --spec examples/spider.json --policy my_package.policies:make
+  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --checkpoint 200000
+  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --grade medium
   arc-suite collect --verify arc_suite/queen/walk/cpg-medium-v0
 
 --verify imports no module that the dataset names: --task and --set name those that it needs, as in collecting.
 """
+
+import pathlib
 
 import numpy as np
 from absl import flags
@@ -17,6 +21,7 @@ from absl import flags
 from arc_suite import checks, policies
 from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
 from arc_suite.cli.program import progress
+from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
 FLAGS = flags.FLAGS
@@ -24,6 +29,14 @@ define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all in turn.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
+flags.DEFINE_integer("checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", 0)
+flags.DEFINE_enum(
+    "grade",
+    None,
+    checkpoints.GRADES,
+    "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of what "
+    "the best one does; expert, the latest; replay, all checkpoints in turn.",
+)
 flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
 flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1)
@@ -58,9 +71,10 @@ def main() -> None:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(walkers)}")
     presets = tuple(checks.name(preset, policies.preset_names(), "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
+    policy, label = chosen()
     for body in walkers.values():
-        settings = data.Settings(body, FLAGS.policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
-        dataset_id = FLAGS.id or settings.dataset_id()
+        settings = data.Settings(body, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
+        dataset_id = FLAGS.id or settings.dataset_id(label)
         missing = data.collect(
             dataset_id,
             settings,
@@ -83,3 +97,22 @@ def main() -> None:
             f"{dataset_id}: {len(dataset)} episodes, return {np.mean(returns):.1f} +- {np.std(returns):.1f}, "
             f"length {np.mean(lengths):.1f}, {dataset.metadata['dataset_size']} MB in {dataset.path}"
         )
+
+
+def chosen() -> tuple[str, str]:
+    """Return the policy, and what the dataset's id calls it: "" for the policy's name.
+
+    Raises:
+        ValueError: --checkpoint and --grade together, or a run without the checkpoints asked for; one line.
+    """
+    if FLAGS.checkpoint is None and FLAGS.grade is None:
+        return FLAGS.policy, ""
+    if FLAGS.checkpoint is not None and FLAGS.grade is not None:
+        raise ValueError("expected one of --checkpoint and --grade, got both")
+    run = pathlib.Path(FLAGS.policy)
+    if FLAGS.checkpoint is not None:
+        policy, grade = str(checkpoints.at(run, FLAGS.checkpoint)), str(FLAGS.checkpoint)
+    else:
+        policy, grade = checkpoints.graded(run, FLAGS.grade), FLAGS.grade
+    agent = checkpoints.agents(run / checkpoints.FOLDER)[-1]
+    return policy, f"{agent.algorithm}-{agent.seed}-{grade}"

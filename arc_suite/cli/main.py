@@ -19,6 +19,7 @@ PROGRAMS = (
     "collect",
     "tune_cpg",
     "train",
+    "study",
     "export",
     "census",
     "doctor",

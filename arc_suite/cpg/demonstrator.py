@@ -9,6 +9,7 @@ import numpy as np
 
 from arc_suite import checks, robots, rotations
 from arc_suite.cpg.law import Ahead, Pattern, felt, joint_targets, torques
+from arc_suite.cpg.planner import PLANS, Plan, Planned
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
 from arc_suite.cpg.sighted import TREADS, Sighted, Tread
 from arc_suite.cpg.steering import STEERING, Manner, Steered
@@ -30,9 +31,9 @@ class Demonstrator:
 
     The presets slow, medium, fast, tuned and refined walk straight by a clock of their own, and take
     joint angles and velocities and the torso's orientation alone from the observation. Those of
-    `MANNERS` follow the command that they observe, by the gait's clock. All act in the rows
-    of a batch by `begin` and `act`, as every policy does, and in one environment as a function of a
-    `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
+    `MANNERS` follow the command that they observe, by the gait's clock, and planned one of its own. All
+    act in the rows of a batch by `begin` and `act`, as every policy does, and in one environment as a
+    function of a `TimeStep` with named blocks, whose first of an episode restarts the demonstrator.
 
     An observation tells little of whose it is: one of another number of joints or rigid bodies is
     refused, and one whose episode starts at less than half or more than twice the height at which the
@@ -47,7 +48,8 @@ class Demonstrator:
             robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast; for the four robots also tuned, which earns most of what
                 the paper's law can earn in walk, and refined, which earns most of all, or numbers of
-                your own; steered, surefooted or sighted, which follow the command of a task.
+                your own; steered, surefooted or sighted, which follow the command of a task; planned, which
+                finds its way among the pillars of a task.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, which have presets
                 alone.
@@ -81,6 +83,8 @@ class Demonstrator:
             raise ValueError("gait: expected none, as the preset walks in the gait of the task")
         elif isinstance(preset, Tread):
             self._law = Sighted(body, preset)
+        elif isinstance(preset, Plan):
+            self._law = Planned(body, preset)
         else:
             self._law = Steered(body, preset)
 
@@ -150,7 +154,7 @@ class OnClock:
         return action
 
 
-def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread]:
+def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread | Plan]:
     """Return a body's presets by name: of a robot its numbers, of any other its speed as a share of sqrt(g h).
 
     Those that follow a command are the same for all.
@@ -159,7 +163,7 @@ def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread]:
         ValueError: a body of a robot's name that has other joints; one line.
     """
     tread = robots.row(TREADS, body, "treads") or Tread()
-    return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **STEERING, "sighted": tread}
+    return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **STEERING, "sighted": tread, **PLANS}
 
 
 class Prescribed(NamedTuple):

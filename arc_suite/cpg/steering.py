@@ -96,7 +96,11 @@ class _Leg(NamedTuple):
 
 
 class Steered:
-    """Follows the block `command` of a task in the rows of a batch, by the gait that the block `gait_clock` tells."""
+    """Follows the block `command` of a task in the rows of a batch, by the gait that the block `gait_clock` tells.
+
+    Attributes:
+        extent: of the feet from the centre of mass in the neutral pose, m.
+    """
 
     def __init__(self, body: Body, manner: Manner, build: Build | None = None):
         """Fit the law to a body.
@@ -122,6 +126,8 @@ class Steered:
         self._units = velocity_units(body, parameters.target_velocity)
         self._stiffness, self._damping = position_gains(body, pose.inertias)
         self._following = Following(manner.gain, manner.integral, self._cycles)
+        feet = [np.hypot(*leg.foot) + spec.foot.radius for leg, spec in zip(self._legs, body.legs, strict=True)]
+        self.extent = float(max(feet))
 
     def begin(self, rows: Sequence[int]) -> None:
         """Start episodes in some rows, given by their indices."""

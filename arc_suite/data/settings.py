@@ -5,6 +5,7 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -16,7 +17,7 @@ from arc_suite import checks, policies, registry, versions
 from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.envs.scene import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import network
+from arc_suite.policies import checkpoints, network
 from arc_suite.registration import importable
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -52,9 +53,13 @@ class Settings(NamedTuple):
         """Return the preset of the episode with this seed."""
         return self.presets[seed % len(self.presets)] if self.presets else None
 
-    def dataset_id(self) -> str:
-        """Return the id under which such a dataset lies if no other is given."""
-        parts = [self.policy, *self.presets]
+    def dataset_id(self, label: str = "") -> str:
+        """Return the id under which such a dataset lies if no other is given.
+
+        Args:
+            label: in place of the policy's name.
+        """
+        parts = [label or self.policy, *self.presets]
         if self.noise:
             parts.append(f"noise{self.noise:g}")
         if self.steps != STEPS:
@@ -96,7 +101,7 @@ class Settings(NamedTuple):
         """Return, JSON-able, the settings, the versions of what computes, and the sha256 of the compiled model.
 
         The settings hold the task's version, and the sha256 of every preset's numbers, or of the policy's file,
-        beside the names.
+        beside the names; of checkpoints of a run also their algorithm, environment steps, seed and mean return.
         """
         task, presets = registry.task_of(self.task), presets_of(self.body) if self.presets else {}
         settings = self._asdict() | {
@@ -109,6 +114,7 @@ class Settings(NamedTuple):
         }
         if policies.is_file(self.policy):
             settings["policy_sha256"] = network.digest(self.policy)
+            settings["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]
         return {
             "settings": settings,
             "versions": versions.recorded(),

@@ -214,7 +214,7 @@ class TaskRun(control.Task):
         data.qpos[:], data.qvel[:] = start.qpos, start.qvel
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
-        physics.shown_reward = None
+        physics.shown_reward, physics.marker = None, self.marks
         self.memory, self._starting = start.memory, True
 
     def before_step(self, action, physics):
@@ -225,7 +225,7 @@ class TaskRun(control.Task):
         """
         action = checked_action(action, self._motors)
         self.memory, inputs = self.definition.before(self.memory, action)
-        data = physics.data.ptr
+        data, physics.marker = physics.data.ptr, self.marks  # which a copy of the simulation has not
         data.ctrl[:] = inputs.ctrl
         if inputs.kick is not None:
             data.qvel[:] += inputs.kick
@@ -266,6 +266,10 @@ class TaskRun(control.Task):
         terminated, truncated = self.definition.ended(self.memory, self._latest(physics))
         self._readings = None  # nobody asks once more before the simulation moves, but for users who have moved it
         return 0.0 if terminated else 1.0 if truncated else None
+
+    def marks(self, physics):
+        """Return what pictures show of what the task asks for now."""
+        return self.definition.marks(self.memory, self._latest(physics))
 
     def _latest(self, physics):
         """The readings of the latest step."""

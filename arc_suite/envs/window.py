@@ -2,12 +2,14 @@
 
 import contextlib
 import time
+from collections.abc import Iterable
 
 import glfw
 import mujoco
 from gymnasium.envs.mujoco.mujoco_rendering import WindowViewer
 
-from arc_suite.simulation import opengl
+from arc_suite.marks import Mark
+from arc_suite.simulation import opengl, pictures
 
 
 class _Viewer(WindowViewer):
@@ -42,13 +44,17 @@ class Window:
             self._viewer.cam.type, self._viewer.cam.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
         self._due = time.monotonic()
 
-    def show(self, duration: float) -> None:
-        """Draw the present state, and returns `duration` seconds after the last picture was due."""
+    def show(self, duration: float, marks: Iterable[Mark] = ()) -> None:
+        """Draw the present state and marks, and return `duration` seconds after the last picture was due."""
         if self._viewer is None:
             return
         if glfw.window_should_close(self._viewer.window):
             self.close()
             return
+        for mark in marks:
+            geom = pictures.geom_of(mark)
+            shape = {"type": geom.type, "size": geom.size, "pos": geom.pos, "mat": geom.mat.ravel(), "rgba": geom.rgba}
+            self._viewer.add_marker(**shape)
         with _current(self._viewer):
             self._viewer.render()
         time.sleep(max(0.0, self._due - time.monotonic()))

@@ -7,6 +7,7 @@ import base64
 import html
 import itertools
 import json
+import string
 import zlib
 from collections.abc import Mapping
 from importlib import resources
@@ -23,49 +24,6 @@ from arc_suite.style.tracks import Track
 _DIGITS = 6  # behind the point: micrometres, microradians
 _TERRAIN = 0.25  # of the standing height, between points of uneven ground
 _MARGIN = 5.0  # standing heights of ground about the way
-
-_PAGE = """\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>{title}</title>
-<style>
-* {{ box-sizing: border-box; }}
-html, body {{ margin: 0; height: 100%; background: #1d232b; color: #d7dde5; font: 14px system-ui, sans-serif; }}
-body {{ display: flex; flex-direction: column; }}
-#walks {{ flex: 1; min-height: 0; display: grid; grid-auto-flow: column; grid-auto-columns: 1fr; gap: 2px; }}
-section {{ display: flex; flex-direction: column; min-width: 0; min-height: 0; }}
-h2 {{ margin: 0; padding: 6px 10px; font-size: 13px; font-weight: 600; }}
-canvas {{ display: block; width: 100%; }}
-.view {{ flex: 1; min-height: 0; touch-action: none; }}
-.gait {{ margin-top: 4px; }}
-.reward {{ height: 130px; margin-top: 4px; }}
-footer {{ display: flex; align-items: center; gap: 10px; padding: 8px 10px; }}
-footer input {{ flex: 1; }}
-button {{ width: 5em; }}
-#clock {{ font-variant-numeric: tabular-nums; }}
-small {{ color: #8791a0; }}
-</style>
-</head>
-<body>
-<div id="walks"></div>
-<footer>
-<button id="play">pause</button>
-<input id="time" type="range" min="0" value="0">
-<span id="clock"></span>
-<select id="speed"></select>
-<small>space, arrows, home, end; drag turns the view, the wheel zooms</small>
-</footer>
-<script id="data" type="text/plain">{data}</script>
-<script>
-{viewer}
-</script>
-</body>
-</html>
-"""
 
 
 def viewer() -> str:
@@ -88,7 +46,8 @@ def page(tracks: Mapping[str, Track]) -> str:
     """
     walks = json.dumps([_walk(label, track) for label, track in tracks.items()], separators=(",", ":"), allow_nan=False)
     data = base64.b64encode(zlib.compress(walks.encode(), 9)).decode()
-    return _PAGE.format(title=html.escape(", ".join(tracks)), data=data, viewer=viewer())
+    frame = string.Template(resources.files("arc_suite.export").joinpath("page.html").read_text(encoding="utf-8"))
+    return frame.substitute(title=html.escape(", ".join(tracks)), data=data, viewer=viewer())
 
 
 def _walk(label: str, track: Track) -> dict[str, Any]:

@@ -72,10 +72,10 @@ def policy(
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
-            episode's seed; the path of a run's folder, or of a policy file (.npz), see `network`;
-            that of a zip of stable-baselines3, see `sb3_file`; or `module:attribute`, a function on
-            Python's path that makes a function from a `TimeStep` to an action, from the name of a
-            robot, or from a body that is none.
+            episode's seed; the path of a run's folder, of a policy file (.npz), see `network`, or of a
+            folder of checkpoints, which take turns from seed to seed, see `checkpoints`; that of a zip of
+            stable-baselines3, see `sb3_file`; or `module:attribute`, a function on Python's path that makes
+            a function from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
         presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
             that take turns from seed to seed.
@@ -95,7 +95,9 @@ def policy(
     checks.number("noise", noise, 0.0)
     body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
-        made = _from_file(Path(name), body, task)
+        turns = network.checkpoint_files(Path(name))
+        several = [_from_file(path, body, task) for path in turns or [Path(name)]]
+        made = Mixture(several, rows) if turns else several[0]
     elif isinstance(name, str) and ":" in name:
         made = _from_path(name, body, rows)
     else:
@@ -117,8 +119,10 @@ def _noise(body: Body, deviation: float, rows: int) -> Policy:
 
 
 def is_file(name: str) -> bool:
-    """Return whether a policy's name is that of a folder of a run that is there, or of a zip."""
-    return name not in POLICIES and ((Path(name) / network.FILE).is_file() or name.endswith(_ZIP))
+    """Return whether a policy's name is that of a folder of a run or of checkpoints that is there, or of a zip."""
+    if name in POLICIES:
+        return False
+    return name.endswith(_ZIP) or (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
 
 
 def _is_path(name: str) -> bool:

@@ -173,9 +173,16 @@ def load(path: str | os.PathLike) -> Network:
 
 
 def digest(path: str | os.PathLike) -> str:
-    """Return the sha256 of a policy file, or of that of a run's folder."""
+    """Return the sha256 of a policy file, of that of a run's folder, or of all those of a folder of checkpoints."""
     path = Path(path)
-    return hashlib.sha256((path / FILE if path.is_dir() else path).read_bytes()).hexdigest()
+    files_of = [path / FILE] if (path / FILE).is_file() else checkpoint_files(path) if path.is_dir() else [path]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files_of)).hexdigest()
+
+
+def checkpoint_files(folder: Path) -> list[Path]:
+    """Return the policy files of a folder of checkpoints, `FOLDER/<step>/policy.npz`, by their steps."""
+    found = [path for path in folder.glob(f"*/{FILE}") if path.parent.name.isdecimal()]
+    return sorted(found, key=lambda path: int(path.parent.name))
 
 
 _KINDS_OF_FIELDS = {"robot": str, "task": str, "task_kwargs": dict, "blocks": dict}

@@ -50,8 +50,13 @@ class Batch:
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
 
-    def part(self, rows: np.ndarray) -> types.SimpleNamespace:
-        """Return a copy of `data` for some rows alone, (rows,) booleans."""
+    @property
+    def mocap_pos(self) -> np.ndarray:
+        """Positions (rows, nmocap, 3) of the arena's movable bodies, live."""
+        return self._simulations.bind("mocap_pos")
+
+    def part(self, rows: np.ndarray | int) -> types.SimpleNamespace:
+        """Return `data` of some rows alone: a copy for (rows,) booleans, views without that axis for one's index."""
         return types.SimpleNamespace(**{name: array[rows] for name, array in vars(self.data).items()})
 
     def step(self, nstep: int, rows: np.ndarray) -> np.ndarray:
@@ -110,7 +115,7 @@ class Batch:
         self._simulations.set_models(self._own)
         self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
         if mocap_pos is not None:
-            self._simulations.bind("mocap_pos")[rows] = mocap_pos
+            self.mocap_pos[rows] = mocap_pos
         self._simulations.forward(rows)
 
     def place(self, rows: np.ndarray, qpos: np.ndarray) -> None:

@@ -34,6 +34,7 @@ class Physics(dm_mujoco.Physics):
         arena: where.
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
             whatever glows; None leaves it its own colour.
+        marker: returns the marks that pictures show beside the body, given this simulation; None for none.
         divergence: how the physics diverged in the latest step, in one line, or None.
     """
 
@@ -50,7 +51,7 @@ class Physics(dm_mujoco.Physics):
         super()._reload_from_data(data)
         self._decorated = None
         self._unchanged, self._scratch = {}, None
-        self.shown_reward = None
+        self.shown_reward = self.marker = None
         self._forks = forks.count
         self._option = self.model.ptr.opt
 
@@ -134,7 +135,8 @@ class Physics(dm_mujoco.Physics):
 
     def _pose(self) -> dict:
         data = self.data.ptr
-        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos}
+        marks = self.marker(self) if self.marker else ()
+        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos, "marks": marks}
 
     def free(self) -> None:
         """Free the simulation, and what a window showed of it."""

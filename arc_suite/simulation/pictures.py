@@ -1,6 +1,7 @@
 """Pictures of a body in an arena: the decorated model, posed as a simulation stands."""
 
 import functools
+from collections.abc import Iterable
 
 import mujoco
 import numpy as np
@@ -8,14 +9,23 @@ from dm_control import mujoco as dm_mujoco
 
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.marks import Mark
 from arc_suite.models import looks
 from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl
 
+_SHAPES = {"arrow": mujoco.mjtGeom.mjGEOM_ARROW, "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER}
+
 
 class Decorated(dm_mujoco.Physics):
-    """A body with its looks in an arena; it takes poses, and nothing steps it."""
+    """A body with its looks in an arena; it takes poses, and nothing steps it.
+
+    Attributes:
+        marks: what pictures show beside it, but for those of depth or segments.
+    """
+
+    marks: Iterable[Mark] = ()
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> "Decorated":
@@ -26,7 +36,13 @@ class Decorated(dm_mujoco.Physics):
         buffer.offwidth = buffer.offheight = 1  # it grows with the pictures that are asked for
         return decorated
 
-    def pose(self, qpos: np.ndarray, share: float | None = None, mocap_pos: np.ndarray | None = None) -> None:
+    def pose(
+        self,
+        qpos: np.ndarray,
+        share: float | None = None,
+        mocap_pos: np.ndarray | None = None,
+        marks: Iterable[Mark] = (),
+    ) -> None:
         """Take a pose, and show a reward.
 
         Args:
@@ -34,8 +50,9 @@ class Decorated(dm_mujoco.Physics):
             share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None
                 leaves it its own colour.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
+            marks: to show beside it.
         """
-        model, data = self.model.ptr, self.data.ptr
+        model, data, self.marks = self.model.ptr, self.data.ptr, marks
         data.qpos[:] = qpos
         if mocap_pos is not None:
             data.mocap_pos[:] = mocap_pos
@@ -47,12 +64,30 @@ class Decorated(dm_mujoco.Physics):
         """Draw the pose; arguments as in dm_control."""
         buffer = self.model.vis.global_
         buffer.offheight, buffer.offwidth = max(height, buffer.offheight), max(width, buffer.offwidth)
-        return super().render(height, width, camera_id, **kwargs)
+        own = kwargs.pop("scene_callback", None)
+
+        def callback(physics, scene):
+            if not (kwargs.get("depth") or kwargs.get("segmentation")):
+                for mark in self.marks:
+                    scene.ngeom += 1
+                    geom_of(mark, scene.geoms[scene.ngeom - 1])
+            if own is not None:
+                own(physics, scene)
+
+        return super().render(height, width, camera_id, scene_callback=callback, **kwargs)
 
     @property
     def contexts(self):
         """The OpenGL contexts that draw all pictures of this process."""
         return opengl.contexts(self.model)
+
+
+def geom_of(mark: Mark, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
+    """Return a mark as a geom of a scene, a new one or the given one."""
+    geom, kind = geom or mujoco.MjvGeom(), _SHAPES[mark.shape]
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(mark.colour, np.float32))
+    mujoco.mjv_connector(geom, kind, mark.radius, mark.start, mark.end)
+    return geom
 
 
 # Drawn from by whoever asks for a picture of the same body; used in OpenGL's thread alone.
@@ -68,6 +103,7 @@ def picture(
     camera_id: int | str,
     share: float | None = None,
     mocap_pos: np.ndarray | None = None,
+    marks: Iterable[Mark] = (),
     **kwargs,
 ) -> np.ndarray:
     """Draw the decorated body in a pose.
@@ -81,6 +117,7 @@ def picture(
         camera_id: a camera's name or index, -1 for a free one.
         share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None for none.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
+        marks: to show beside it, but in pictures of depth or segments.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
@@ -95,7 +132,7 @@ def picture(
     def draw():
         decorated = _shared(body, arena)
         check_camera(decorated.model.ptr, camera_id)
-        decorated.pose(qpos, share, mocap_pos)
+        decorated.pose(qpos, share, mocap_pos, marks)
         return decorated.render(height, width, camera_id, **kwargs)
 
     return opengl.call(draw)

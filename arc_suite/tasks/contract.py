@@ -35,6 +35,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.marks import Mark
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
@@ -254,6 +255,10 @@ class Task(ABC):
     def progress(self, memory) -> dict:
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""
         return {}
+
+    def marks(self, memory, readings: Readings) -> list[Mark]:
+        """Return what pictures of one environment show of what is asked; no leading axes."""
+        return []
 
     def carry(self, memory) -> Any:
         """Return what the next episode of the stream starts from, given the memory at an episode's end."""

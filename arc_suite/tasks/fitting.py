@@ -72,8 +72,14 @@ def velocity_units(body: Body, target_velocity: float) -> np.ndarray:
 
     At the latter the feet move as fast when the body turns on the spot.
     """
-    pose, speed = standing(body), abs(target_velocity)
-    return np.array((speed, speed, speed / np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean()))
+    speed = abs(target_velocity)
+    return np.array((speed, speed, speed / reach(body)))
+
+
+def reach(body: Body) -> float:
+    """Return R, the mean horizontal distance of the feet from the centre of mass in the standing pose, m."""
+    pose = standing(body)
+    return float(np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean())
 
 
 @functools.lru_cache(maxsize=256)

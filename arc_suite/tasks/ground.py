@@ -155,11 +155,6 @@ class Lanes(steer.Steer):
         places = np.arange(SCAN.shape[1]).reshape(len(AHEAD), len(ASIDE))[:, ::-1].ravel()
         return {**super().mirrors, "scan": Mirror(places, np.ones(len(places), np.int8))}
 
-    @functools.cached_property
-    def reach(self) -> float:
-        """R, the mean distance of the feet from their centre, m."""
-        return self.units[0] / self.units[2]
-
     def first(self) -> Carry:
         """Return the level at which a stream begins, which it neither raises nor lowers."""
         return Carry(self.settings.ground.level, np.nan, False)

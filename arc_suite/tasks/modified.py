@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite.marks import Mark
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots import mirror
@@ -291,6 +292,10 @@ class Modified(Task):
         """Return the other task's figures, and whether the body `fell`, 0 or 1."""
         figures = self.task.progress(memory)
         return figures if "fell" in figures else figures | {"fell": memory.terminated * 1.0}
+
+    def marks(self, memory, readings: Readings) -> list[Mark]:
+        """Return the other task's."""
+        return self.task.marks(memory, readings)
 
     def carry(self, memory) -> Any:
         """Return the other task's."""

@@ -22,6 +22,7 @@ ANGULAR_VELOCITY = 0.05  # sqrt(g / h)
 JOINT_VELOCITY = 0.3  # sqrt(g / h)
 CONTACT_FORCE = 0.02  # of the range to which forces are clipped
 SCAN = 0.1  # h
+RANGES = 0.02  # of the farthest that is seen
 
 _GOLDEN = np.uint32(0x9E3779B9)  # 2^32 over the golden ratio: what is counted lies far apart
 
@@ -42,6 +43,7 @@ def half_widths(body: Body, blocks: Mapping[str, int]) -> dict[str, np.ndarray]:
         ),
         "contact_forces": np.full(6 * len(body.part_names), CONTACT_FORCE),
         "scan": np.full(blocks.get("scan", 0), SCAN),
+        "ranges": np.full(blocks.get("ranges", 0), RANGES),
     }
     return {name: widths for name, widths in measured.items() if blocks.get(name) == len(widths)}
 

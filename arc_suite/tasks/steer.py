@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.marks import Mark
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
 from arc_suite.tasks import mirrors, terms, walk
@@ -28,6 +29,8 @@ COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps th
 LOWEST = 0.3  # healthy height of the torso over the ground, in standing heights
 LYING = 0.5  # of the weight: who has it carried by the torso itself lies on the ground
 LEAST_UPRIGHT = 0.4  # healthy cosine of the torso's tilt
+OVER = 0.5  # height of the command's arrows over the torso, in standing heights
+GOING, TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colours
 # Walk's weights of rates in SI units, as Queen has them in units of her own.
 RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
 _OWN = [
@@ -93,6 +96,11 @@ class Steer(walk.Walk):
     def units(self) -> np.ndarray:
         """(3,) the target velocity, twice, m/s, and rad/s at which feet move as fast when turning on the spot."""
         return velocity_units(self.scene.body, self.parameters.target_velocity)
+
+    @functools.cached_property
+    def reach(self) -> float:
+        """R, the mean distance of the feet from their centre, m."""
+        return self.units[0] / self.units[2]
 
     @functools.cached_property
     def force_unit(self) -> np.ndarray:
@@ -196,6 +204,20 @@ class Steer(walk.Walk):
     def ended(self, memory: Memory, readings: Readings) -> tuple:
         """Return as terminated who fell; nobody is truncated."""
         return memory.fell, False
+
+    def marks(self, memory: Memory, readings: Readings) -> list[Mark]:
+        """Return arrows over the torso: the velocity that is asked for, and that to the side of what is R ahead.
+
+        The latter is what turns. At the target velocity an arrow is R long.
+        """
+        unit, (x, y, heading) = self.reach, memory.place
+        forward, left, turn = (unit * share for share in self.wanted(memory))
+        middle = np.array((x, y, readings.torso_position[2] + OVER * self.scene.body.torso.standing_height))
+        ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
+        aside = np.array((-ahead[1], ahead[0], 0.0))
+        arrows = (middle, forward * ahead + left * aside, GOING), (middle + unit * ahead, turn * aside, TURNING)
+        arrows = [Mark("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
+        return [Mark("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, GOING), *arrows]
 
     def progress(self, memory: Memory) -> dict:
         """Return the mean `tracking`, whether the body `fell`, and `gait_compliance`."""

@@ -32,6 +32,7 @@ def run(tmp_path):
     return command
 
 
+@pytest.mark.slow
 def test_a_learner_of_its_own(run, tmp_path):
     """It needs no JAX, goes on to the same bits, and every program takes its policy."""
     short = ["--row=directions=2", "--row=horizon=20", "--evaluate_every=80", "--set", "time_limit=2"]

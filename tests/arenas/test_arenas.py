@@ -16,8 +16,15 @@ every_arena = pytest.mark.parametrize("arena", ARENAS)
 every_body = pytest.mark.parametrize("body", BODIES)
 
 
-@every_arena
-@every_body
+@pytest.mark.parametrize(
+    ("arena", "body"),
+    [
+        # Bodies take turns in `make check`.
+        pytest.param(arena, body, marks=() if index == number % len(BODIES) else pytest.mark.slow)
+        for number, arena in enumerate(ARENAS)
+        for index, body in enumerate(BODIES)
+    ],
+)
 def test_height_is_that_of_rays(arena, body):
     body = BODIES[body]
     place, height = ARENAS[arena](body), body.torso.standing_height

@@ -11,6 +11,7 @@ def animate(*arguments, cwd=None):
     return programs.run("-m", "arc_suite", "animate", *arguments, cwd=cwd)
 
 
+@pytest.mark.slow
 def test_both_files_and_a_row_for_each_clip(tmp_path):
     arguments = ("--robot=tick", "--clips=walk,idle", "--fps=30", "-o", "tick.glb")
     done = animate(*arguments, cwd=tmp_path)

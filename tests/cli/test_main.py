@@ -87,7 +87,7 @@ def test_help_of_a_program(program):
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, *(["--", "a.json"] if program in ("check", "export") else []), "stray")
+    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study") else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 

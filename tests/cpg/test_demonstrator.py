@@ -11,6 +11,7 @@ import arc_suite
 from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of
+from arc_suite.cpg.planner import PLANS
 from arc_suite.cpg.presets import TUNINGS, Bend, Preset
 from arc_suite.cpg.sighted import Tread
 from arc_suite.cpg.steering import STEERING
@@ -189,7 +190,7 @@ def test_a_registered_robot_moves_at_the_frequency_that_its_preset_asks_for(heig
 def test_a_robots_numbers_go_by_its_name():
     queen = ROBOTS["queen"]
     heavier = queen.replace(density=10.001)
-    assert presets_of(heavier) == TUNINGS["queen"] | STEERING | {"sighted": Tread()}
+    assert presets_of(heavier) == TUNINGS["queen"] | STEERING | {"sighted": Tread()} | PLANS
     blocks = {name: block[None] for name, block in arc_suite.load("queen", "steer").reset(0).observation.items()}
     for preset in TUNINGS["queen"]:
         ours, theirs = (Demonstrator(body, preset) for body in (queen, heavier))

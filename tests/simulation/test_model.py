@@ -44,8 +44,11 @@ def fall(body):
     return np.concatenate([qpos, np.zeros(model.nv)]), random.uniform(-1.0, 1.0, (40, model.nu))
 
 
+FAST = ("flat", "bumps")  # in `make check`; the others are of the same kinds of geoms, or slow
+
+
 @pytest.mark.parametrize("course", [walk, fall])
-@pytest.mark.parametrize("arena", ARENAS)
+@pytest.mark.parametrize("arena", [a if a in FAST else pytest.param(a, marks=pytest.mark.slow) for a in ARENAS])
 @pytest.mark.parametrize("body", BODIES)
 def test_same_bits_as_the_written_model(body, arena, course):
     start, actions = course(BODIES[body])

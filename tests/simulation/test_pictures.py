@@ -6,6 +6,7 @@ from fixtures.obstacles import Obstacle
 from numpy.testing import assert_array_equal
 
 from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.marks import Mark
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.simulation.physics import Physics
@@ -48,6 +49,27 @@ def test_obstacles_are_seen_where_they_stand():
     physics = Physics.from_body(BODY, Obstacle())
     physics.data.mocap_pos[:] = (0.0, 2.0, 0.5)
     assert_array_equal(physics.render(60, 80), near)
+
+
+def test_marks_are_seen_and_have_no_depth():
+    qpos = compiled(BODY).qpos0
+    foot, way = np.array([0.0, 0.0, 1.2]), np.array([0.0, 0.8, 0.0])
+    views = {None: picture(BODY, FLAT, qpos, 60, 80, "tracking")}
+    for shape in ("arrow", "cylinder"):
+        marks = [Mark(shape, foot, foot + way, 0.1, (1.0, 0.0, 0.0, 1.0))]
+        views[shape] = picture(BODY, FLAT, qpos, 60, 80, "tracking", marks=marks)
+        red = (views[shape].astype(int) - views[None]).max(axis=(0, 1))
+        assert red[0] > 50 and (views[shape] != views[None]).any(axis=-1).mean() < 0.2
+        depths = [picture(BODY, FLAT, qpos, 60, 80, "tracking", depth=True, marks=shown) for shown in (marks, ())]
+        assert_array_equal(*depths)
+    assert not np.array_equal(views["arrow"], views["cylinder"])
+    assert_array_equal(picture(BODY, FLAT, qpos, 60, 80, "tracking"), views[None])
+
+
+def test_what_a_caller_adds_to_the_scene_is_drawn_too():
+    physics, called = Physics.from_body(BODY), []
+    physics.render(60, 80, scene_callback=lambda physics, scene: called.append(scene.ngeom))
+    assert called and called[0] > 0
 
 
 def test_cameras_are_checked_on_a_model():

@@ -238,7 +238,8 @@ def test_what_a_demonstrator_cannot_do_is_one_line():
     for arguments, message in (
         (
             {"robot": "queen", "froude": 0.2},
-            "froude: queen has presets alone: slow, medium, fast, tuned, refined, steered, surefooted, sighted",
+            "froude: queen has presets alone: slow, medium, fast, tuned, refined, steered, surefooted, sighted, "
+            "planned",
         ),
         ({"robot": BODY, "froude": 0.0}, "froude: expected 0.001 or more, forwards or backwards, got 0.0"),
         ({"robot": BODY, "froude": math.nan}, "froude: expected a number from -1 to 1, got nan"),

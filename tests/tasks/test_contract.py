@@ -13,7 +13,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks import TASKS
+from arc_suite.tasks import TASKS, ground
 from arc_suite.tasks.contract import Inputs
 from arc_suite.tasks.walk import Walk
 
@@ -26,7 +26,15 @@ PLACES = [
     for name, task in TASKS.items()
     for settings in ([{}] if task.own_arena else [{"arena": "flat"}, {"arena": "bumps"}, {"arena": "stairs"}])
 ]
-every_place = pytest.mark.parametrize(("task_name", "settings"), PLACES)
+# Bodies take turns from place to place in `make check`; `make test` takes all pairs.
+_PAIRS = [(name, settings, body) for name, settings in PLACES for body in BODIES]
+every_place_and_body = pytest.mark.parametrize(
+    ("task_name", "settings", "body"),
+    [
+        pytest.param(*pair, marks=() if index // len(BODIES) % len(BODIES) == index % len(BODIES) else pytest.mark.slow)
+        for index, pair in enumerate(_PAIRS)
+    ],
+)
 
 
 def frozen(memory):
@@ -58,8 +66,7 @@ def read_only(batch, task):
     return types.SimpleNamespace(**fields)
 
 
-@every_place
-@every_body
+@every_place_and_body
 def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings):
     task, _ = prepared(BODIES[body], task_name, settings)
     batch, memory = started(task)
@@ -122,8 +129,7 @@ class Counting(np.random.RandomState):
         return drawn
 
 
-@every_place
-@every_body
+@every_place_and_body
 @pytest.mark.parametrize("threads", [1, 3])
 def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
     """Over several episodes, among rows that fall or stand still at other times."""
@@ -156,7 +162,7 @@ SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take
 @every_task
 def test_settings_check_themselves(task_name):
     own = f"arena: task {task_name} has a ground of its own, expected none" if TASKS[task_name].own_arena else None
-    kind = task_name if own else "walk"
+    kind = task_name if issubclass(TASKS[task_name], ground.Lanes) else "walk"
     for settings, message in (
         ({"targt_velocity": 1.0}, f"unknown setting of {kind} 'targt_velocity'; did you mean 'target_velocity'?"),
         ({"weights": {"helthy": 1.0}}, "unknown weight 'helthy'; did you mean 'healthy'?"),

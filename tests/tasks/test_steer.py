@@ -242,3 +242,29 @@ def test_a_body_that_lies_on_its_torso_is_not_healthy():
     assert timestep.discount == 0.0
     assert timestep.observation["posture"][0] > steer.LOWEST * ROBOTS["tick"].torso.standing_height
     assert environment.task.progress["fell"] == 1.0
+
+
+def test_pictures_show_the_command_as_arrows():
+    environment = arc_suite.load("queen", "steer", {"random": 0})
+    environment.reset()
+    environment.command("command", (0.5, -0.25, 0.5))
+    task, memory = environment.task.definition, environment.task.memory
+    readings, heading = task.read(environment.physics.data.ptr), memory.place[2]
+    hub, going, turning = task.marks(memory, readings)
+    assert (hub.shape, going.shape, turning.shape) == ("cylinder", "arrow", "arrow")
+    assert_array_equal(hub.start, going.start)
+    assert_allclose(rotations.headed((going.end - going.start)[:2], heading), (0.5 * task.reach, -0.25 * task.reach))
+    assert_allclose(rotations.headed((turning.start - hub.start)[:2], heading), (task.reach, 0.0), atol=1e-12)
+    assert_allclose(rotations.headed((turning.end - turning.start)[:2], heading), (0.0, 0.5 * task.reach), atol=1e-12)
+    shown = environment.physics.render(60, 80)
+    environment.command("command", (0.0, 0.0, 0.0))
+    assert [mark.shape for mark in task.marks(environment.task.memory, readings)] == ["cylinder"]
+    stopped = environment.physics.render(60, 80)
+    assert not np.array_equal(shown, stopped)
+    rows = VectorEnv("queen", "steer", 2, render_mode="rgb_array", height=60, width=80)
+    single = arc_suite.load("queen", "steer")
+    rows.reset(seed=3), single.reset(seed=4)
+    for _ in range(3):
+        rows.step(np.zeros(rows.action_space.shape)), single.step(np.zeros(18))
+    assert_array_equal(rows.render([1])[0], single.physics.render(60, 80))
+    rows.close()

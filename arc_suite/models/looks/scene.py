@@ -12,6 +12,7 @@ _HORIZON = tuple((top + bottom) / 2.0 for top, bottom in zip(_SKY["rgb1"], _SKY[
 _GROUND = {"rgb1": (0.33, 0.37, 0.42), "rgb2": (0.29, 0.33, 0.375), "markrgb": (0.50, 0.56, 0.62)}
 
 
+_OBSTACLE = (0.62, 0.36, 0.22)  # stands out from ground and creatures
 _SHADE = 0.35  # by which ground is darker that is a height of the creature lower
 _EXTENT = 3.5  # of the scene, in heights of the creature, about what MuJoCo makes of one on a plane
 
@@ -52,8 +53,13 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
         if geom in tops:  # steps are told apart by their shade, the higher the brighter
             shade = 1.0 - _SHADE * (max(tops.values()) - tops[geom]) / height
             geom.rgba = (shade, shade, shade, 1.0)
-        if geom.type != "plane":  # ground of finite size would stretch the map of shadows over all of it
-            root.statistic.set_attributes(extent=_EXTENT * height, center=(0.0, 0.0, height))
+    obstacles = [geom for body in root.worldbody.body if body.mocap for geom in body.geom]
+    if obstacles:
+        root.asset.add("material", name="obstacle", rgba=(*_OBSTACLE, 1.0), specular=0.2, shininess=0.2)
+    for geom in obstacles:
+        geom.material = "obstacle"
+    if obstacles or any(geom.type != "plane" for geom in ground):  # would stretch the map of shadows over all of it
+        root.statistic.set_attributes(extent=_EXTENT * height, center=(0.0, 0.0, height))
 
     # Lights ride on the torso, so that shadows stay sharp however far the creature walks.
     torso = root.find("body", "torso")

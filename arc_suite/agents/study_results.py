@@ -1,0 +1,120 @@
+"""Results of studies: what the published tables of their runs say, and figures over them."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import evaluation
+from arc_suite.agents import run_folder
+from arc_suite.agents.studies import Row
+
+DEMONSTRATORS = "demonstrators.csv"
+
+
+class Result(NamedTuple):
+    """What a run has come to.
+
+    Attributes:
+        row: that made it.
+        steps: (evaluations,) environment steps.
+        returns: (evaluations, episodes)
+        progress: the task's figures in the latest evaluation by name, each (episodes,).
+        cpu: (evaluations,) s of the processor until then.
+        style: metrics of style of the latest policy by name, each (episodes,).
+    """
+
+    row: Row
+    steps: np.ndarray
+    returns: np.ndarray
+    progress: dict[str, np.ndarray]
+    cpu: np.ndarray
+    style: dict[str, np.ndarray]
+
+    @property
+    def final(self) -> float:
+        """Mean return of the latest evaluation."""
+        return float(self.returns[-1].mean())
+
+
+def results(rows: Sequence[Row], published: Path) -> list[Result]:
+    """Return the results of those runs of a study of which something is published.
+
+    Raises:
+        ValueError: a damaged table; one line.
+    """
+    return [_result(row, published / row.name) for row in rows if (published / row.name / "style.csv").exists()]
+
+
+def _result(row: Row, folder: Path) -> Result:
+    table, times, style = (run_folder.table(folder, name) for name in ("evaluations", "times", "style"))
+    marks, counts = np.unique(table["step"], return_counts=True)
+    whole = marks[counts == evaluation.EPISODES]
+    returns = np.array([table["return"][table["step"] == step] for step in whole])
+    last = table["step"] == whole[-1]
+    progress = {name: table[name][last] for name in table if name not in ("step", "seed", "return", "length")}
+    cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
+    metrics = {name: style[name] for name in style if name not in ("step", "seed")}
+    return Result(row, whole.astype(int), returns, progress, cpu, metrics)
+
+
+def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
+    """Return what demonstrators earn, by place (`Row.place`) and preset, each (episodes,)."""
+    found: dict[str, dict[str, list[float]]] = {}
+    if (published / DEMONSTRATORS).exists():
+        with (published / DEMONSTRATORS).open(newline="") as file:
+            for line in csv.DictReader(file):
+                found.setdefault(line["place"], {}).setdefault(line["preset"], []).append(float(line["return"]))
+    return {place: {name: np.array(values) for name, values in presets.items()} for place, presets in found.items()}
+
+
+def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
+    """Return results by place and kind, each with all its seeds."""
+    groups: dict[str, dict[str, list[Result]]] = {}
+    for each in found:
+        groups.setdefault(each.row.place, {}).setdefault(each.row.kind, []).append(each)
+    return groups
+
+
+def scores(seeds: Sequence[Result]) -> np.ndarray:
+    """Return what stands for a kind of run: the mean return of each seed, or of one seed each episode's."""
+    return seeds[0].returns[-1] if len(seeds) == 1 else np.array([each.final for each in seeds])
+
+
+def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
+    """Return environment steps and seconds of the processor up to the first evaluation whose mean return is enough.
+
+    Returns:
+        Means over the seeds; infinite where one of them has not earned as much.
+    """
+    found = []
+    for each in seeds:
+        enough = np.flatnonzero(each.returns.mean(axis=1) >= threshold)
+        found.append((each.steps[enough[0]], each.cpu[enough[0]]) if enough.size else (np.inf, np.inf))
+    steps, seconds = np.mean(found, axis=0)
+    return float(steps), float(seconds)
+
+
+def improvement(groups: dict[str, dict[str, list[Result]]], x: str, y: str) -> tuple[float, tuple[float, float]] | None:
+    """Return the probability that a run of kind x earns more than one of y, with its interval; None without pairs.
+
+    Places are strata. Both are compared at the latest step that all their runs have reached.
+    """
+    pairs = [(kinds[x], kinds[y]) for kinds in groups.values() if x in kinds and y in kinds]
+    cut = [[_until_step(side, both) for side in both] for both in pairs]
+    cut = [both for both in cut if all(side for side in both)]
+    if not cut:
+        return None
+    strata = [[scores(side) for side in both] for both in cut]
+    return evaluation.probability_of_improvement([each[0] for each in strata], [each[1] for each in strata])
+
+
+def _until_step(side: Sequence[Result], both: Sequence[Sequence[Result]]) -> list[Result]:
+    """Results cut back to the latest step at which all have been evaluated."""
+    common = set.intersection(*(set(each.steps.tolist()) for seeds in both for each in seeds))
+    if not common:
+        return []
+    ends = [int(np.flatnonzero(each.steps == max(common))[0]) + 1 for each in side]
+    return [each._replace(returns=each.returns[:end]) for each, end in zip(side, ends, strict=True)]

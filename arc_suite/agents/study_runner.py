@@ -1,0 +1,257 @@
+"""Runs studies: each run is a process of `arc-suite train`, which goes on with whatever its folder holds.
+
+The lock of a run is that of its log, which its process inherits: what a killed study has left behind goes on by
+itself, and no other study starts it a second time. Finished runs are published: their tables, a few kilobytes,
+and the style of their policies, go into a folder that is committed and that reports are made of.
+"""
+
+import contextlib
+import csv
+import fcntl
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import IO, NamedTuple
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from tqdm import tqdm
+
+from arc_suite import evaluation, files, policies, style
+from arc_suite.agents import run_folder, study_results
+from arc_suite.agents.studies import Row
+from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.data import collect
+from arc_suite.envs.dm import load
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import network
+
+PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
+
+# Metrics of `arc_suite.style` by which the final policies are compared.
+METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
+
+PRESETS = ("medium", "refined")  # of demonstrators whose returns are published beside those of runs
+
+_PAUSE = 0.2  # s between two looks at the processes
+
+
+class State(NamedTuple):
+    """How a run stands.
+
+    Attributes:
+        row: that makes it.
+        word: finished, running, elsewhere, failed or waiting.
+        step: environment steps of its latest line of times.
+        result: mean return of the latest evaluation; None before the first.
+        wall: s so far, of wall clock.
+        cpu: s so far, of the processor.
+    """
+
+    row: Row
+    word: str
+    step: int
+    result: float | None
+    wall: float
+    cpu: float
+
+
+def is_finished(row: Row, folder: Path) -> bool:
+    """Return whether the run in a folder is at its end.
+
+    Raises:
+        ValueError: it is another run than the row's, or damaged; one line.
+    """
+    if run_folder.progress_of(folder).get("evaluated", 0) < row.steps:
+        return False
+    run_folder.check(folder, json.loads(json.dumps(row.run().config())), left_out=("versions",))
+    return True
+
+
+def run(
+    rows: Sequence[Row],
+    folder: Path,
+    published: Path,
+    jobs: int,
+    shown: Callable[[list[State]], None],
+    progress: Callable = tqdm,
+) -> list[State]:
+    """Make the runs that are not finished, and publish them.
+
+    Args:
+        rows: of the study.
+        folder: of the study, in which each run has one of its own.
+        published: folder for what is to be committed.
+        jobs: runs at a time.
+        shown: called with the states of all runs, again and again.
+        progress: makes progress bars as `tqdm` does, of prior data that are collected first.
+
+    Returns:
+        The states of all runs at the end; a failed run has said why in its log, beside its folder.
+
+    Raises:
+        ValueError: a row that does not fit, or the folder of another run; one line.
+        OSError: something cannot be written; one line.
+    """
+    files.folder(folder)
+    words = ["finished" if is_finished(row, folder / row.name) else "waiting" for row in rows]
+    waiting = [row for row, word in zip(rows, words, strict=True) if word == "waiting"]
+    for row in {row.prior_id: row for row in waiting if row.prior is not None}.values():
+        collect(row.prior_id, row.prior_settings, row.prior.episodes, threads=jobs, progress=progress)
+    running: dict[int, tuple[subprocess.Popen, IO]] = {}
+
+    def states():
+        return [state(row, folder / row.name, word) for row, word in zip(rows, words, strict=True)]
+
+    try:
+        while not {"waiting", "elsewhere", "running"}.isdisjoint(words):
+            for place, row in enumerate(rows):
+                if words[place] in ("waiting", "elsewhere") and len(running) < jobs:
+                    log = _claimed(folder / f"{row.name}.log")
+                    words[place] = "running" if log else "elsewhere"
+                    if log:
+                        running[place] = _started(row, folder / row.name, log), log
+            for place, (process, log) in list(running.items()):
+                if process.poll() is not None:
+                    log.close()
+                    del running[place]
+                    words[place] = "failed" if process.returncode else "finished"
+                    publish(rows[place], folder, published)
+            shown(states())
+            time.sleep(_PAUSE)
+    finally:
+        for process, _ in running.values():
+            process.terminate()
+        for process, _ in running.values():
+            process.wait()
+    publish_all(rows, folder, published)  # those too that were finished before, or made elsewhere
+    return states()
+
+
+def state(row: Row, folder: Path, word: str) -> State:
+    """Return how a run stands, from its tables."""
+    times, evaluations = _table(folder, "times"), _table(folder, "evaluations")
+    step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
+    result = None
+    if evaluations:
+        result = float(evaluations["return"][evaluations["step"] == evaluations["step"][-1]].mean())
+    return State(row, word, int(step), result, float(wall), float(cpu))
+
+
+def remaining(states: Sequence[State], jobs: int) -> float | None:
+    """Return about how many seconds a study still takes; None where nothing tells yet.
+
+    A run goes on as fast as it has gone so far, or as the others of its kind, or as all others.
+    """
+    paces: dict[str, list[float]] = {}
+    for each in states:
+        if each.step:
+            for name in (each.row.kind, ""):
+                paces.setdefault(name, []).append(each.wall / each.step)
+    if not paces:
+        return None
+    total = 0.0
+    for each in states:
+        if each.word not in ("finished", "failed"):
+            pace = each.wall / each.step if each.step else np.mean(paces.get(each.row.kind, paces[""]))
+            total += pace * max(each.row.steps - each.step, 0)
+    return total / jobs
+
+
+def publish(row: Row, folder: Path, published: Path) -> None:
+    """Copy the tables of a run that has been evaluated, and measure the style of its latest policy.
+
+    Args:
+        row: of the run.
+        folder: of the study, in which the run has one.
+        published: folder in which the copies get one.
+
+    Raises:
+        OSError: something cannot be written; one line.
+    """
+    source, target = folder / row.name, published / row.name
+    evaluations = _table(source, "evaluations")
+    if not evaluations:
+        return
+    files.folder(target)
+    for name in PUBLISHED:
+        with files.writing(target / name) as temporary:
+            temporary.write_text((source / name).read_text())
+    step = int(evaluations["step"][-1])
+    measured = _table(target, "style")
+    if not measured or measured["step"][-1] != step:
+        with files.writing(target / "style.csv") as temporary:
+            temporary.write_text(_style(row, source, step))
+
+
+def publish_all(rows: Sequence[Row], folder: Path, published: Path) -> None:
+    """Publish all runs of a study that have been evaluated, and what demonstrators earn in their places.
+
+    Raises:
+        OSError: something cannot be written; one line.
+    """
+    for row in rows:
+        publish(row, folder, published)
+    known = study_results.demonstrators(published)
+    places = {row.place: row for row in rows}
+    if places.keys() <= known.keys() or not published.exists():
+        return
+    with files.writing(published / study_results.DEMONSTRATORS) as temporary, temporary.open("w", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(("place", "preset", "seed", "return"))
+        for place, presets in known.items():
+            for preset, totals in presets.items():
+                lines.writerows((place, preset, seed, repr(float(total))) for seed, total in enumerate(totals))
+        for place, row in places.items():
+            if place not in known:
+                for preset, episodes in _demonstrated(row).items():
+                    lines.writerows((place, preset, seed, repr(each.total)) for seed, each in enumerate(episodes))
+
+
+def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
+    """Return the episodes of the evaluation protocol by the demonstrators of a run's body, by preset."""
+    body, found = row.run().body, {}
+    rows = VectorEnv(body, row.task, evaluation.EPISODES, 1, AutoresetMode.DISABLED, task_kwargs=dict(row.task_kwargs))
+    with contextlib.closing(rows):
+        for preset in PRESETS:
+            if preset in presets_of(body):
+                policy = policies.policy("cpg", body, preset, evaluation.EPISODES, task=rows.task)
+                found[preset] = evaluation.episodes_in_rows(rows, policy)
+    return found
+
+
+def _style(row: Row, folder: Path, step: int) -> str:
+    """Return a table of the metrics of the episodes of the evaluation protocol."""
+    body = row.run().body
+    environment = load(body, row.task, row.task_kwargs)
+    with contextlib.closing(environment):
+        policy = policies.policy(folder / network.FILE, body, task=environment.task.definition)
+        lines = []
+        for seed in range(evaluation.EPISODES):
+            measured = style.measure(style.record(environment, policy, seed))
+            figures = {name: measured[name].value for name in METRICS if name in measured}
+            lines.append(",".join(map(repr, (step, seed, *figures.values()))))
+    return "\n".join([",".join(("step", "seed", *figures)), *lines]) + "\n"
+
+
+def _claimed(log: Path) -> IO | None:
+    """Return the open log of a run, locked; None where another process goes on with the run."""
+    file = log.open("ab")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        return None
+    return file
+
+
+def _started(row: Row, folder: Path, log: IO) -> subprocess.Popen:
+    command = [sys.executable, "-m", "arc_suite", *row.arguments(folder)]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
+
+
+def _table(folder: Path, name: str) -> dict[str, np.ndarray]:
+    return run_folder.table(folder, name) if (folder / f"{name}.csv").exists() else {}

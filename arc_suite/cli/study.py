@@ -1,0 +1,133 @@
+"""Make the runs of a study, or write its report.
+
+A study is a table of runs: robots, tasks, algorithms, seeds, steps. What is finished is skipped, what was broken
+off goes on; each run is a process of one thread. The tables of finished runs are copied into a folder that is small
+enough to be committed, and the report is made of that folder alone.
+
+  arc-suite study first-steps
+  arc-suite study first-steps --report
+  arc-suite study paper --jobs 8 --shard 3/16
+  arc-suite study paper --submit 16 --hours 24
+  arc-suite study my_studies:MINE
+"""
+
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from absl import flags
+
+from arc_suite.agents import studies, study_report, study_runner
+from arc_suite.agents.study_runner import State
+from arc_suite.cli.program import progress
+
+FLAGS = flags.FLAGS
+flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
+flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth, from the ith on, which counts from 0.")
+flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
+flags.DEFINE_float("hours", 24.0, "Of a job; it comes back until its share is done.", lower_bound=0.1)
+flags.DEFINE_string("partition", None, "Of the cluster. [default: the cluster's]")
+flags.DEFINE_bool("report", False, "Write the report in place of making runs.")
+flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
+flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
+
+_EVERY = 2.0  # s between two tables on a terminal
+
+
+def main(name: str | None = None) -> int:
+    """Make the runs, or write the report; the exit status tells whether all runs are finished."""
+    if name is None:
+        raise ValueError(f"expected a study: {', '.join(studies.STUDIES)}, or module:attribute; see --help")
+    study = studies.study(name)
+    part, parts = shard(FLAGS.shard)
+    rows = study.rows[part::parts]
+    folder = Path(FLAGS.runs or Path("runs", name.replace(":", ".")))
+    results = Path(FLAGS.results or Path("studies", name.replace(":", ".")))
+    if FLAGS.report:
+        study_runner.publish_all(rows, folder, results)
+        print(study_report.write(name, study, results))
+        return 0
+    if FLAGS.submit is not None:
+        return submit(name, folder, results)
+    jobs = FLAGS.jobs or os.cpu_count()
+    states = study_runner.run(rows, folder, results, jobs, shown(jobs), progress)
+    print(table(states, jobs))
+    failed = [each.row.name for each in states if each.word == "failed"]
+    for run in failed:
+        print(f"{folder / run}.log: {last_line(folder / f'{run}.log')}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+def submit(name: str, folder: Path, results: Path) -> int:
+    """Submit the study to a cluster, and print the jobs.
+
+    Raises:
+        ValueError: submitit is not installed; one line.
+    """
+    try:
+        from arc_suite.agents import cluster
+    except ImportError as error:
+        raise ValueError(f"--submit needs submitit: pip install 'arc_suite[cluster]' ({error})") from None
+    arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
+    parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
+    for job in cluster.submit(arguments, FLAGS.submit, FLAGS.hours, folder / "jobs", **parameters):
+        print(f"submitted {job.job_id}")
+    return 0
+
+
+def shard(text: str) -> tuple[int, int]:
+    """Return i and n of the text i/n.
+
+    Raises:
+        ValueError: it is no such text, or i is not below n; one line.
+    """
+    part, _, parts = text.partition("/")
+    if not (part.isdecimal() and parts.isdecimal() and int(part) < int(parts)):
+        raise ValueError(f"--shard={text}: expected i/n with i from 0 to n - 1, such as 0/4")
+    return int(part), int(parts)
+
+
+def table(states: list[State], jobs: int) -> str:
+    """Return as text how the runs stand, and how long they still take."""
+    width = max(len(each.row.name) for each in states)
+    lines = [f"{'run':<{width}}  {'state':<9} {'steps':>19} {'return':>8} {'CPU min':>8}"]
+    for each in states:
+        steps = f"{each.step:,} / {each.row.steps:,}"
+        result = "-" if each.result is None else f"{each.result:.1f}"
+        lines.append(f"{each.row.name:<{width}}  {each.word:<9} {steps:>19} {result:>8} {each.cpu / 60.0:>8.1f}")
+    finished = sum(each.word == "finished" for each in states)
+    seconds = study_runner.remaining(states, jobs)
+    left = "" if finished == len(states) else f", {'?' if seconds is None else duration(seconds)} to go"
+    return "\n".join([*lines, f"{finished} of {len(states)} finished{left}"])
+
+
+def duration(seconds: float) -> str:
+    """Return a duration as hours and minutes."""
+    hours, minutes = divmod(round(seconds / 60.0), 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min"
+
+
+def shown(jobs: int) -> Callable[[list[State]], None]:
+    """Return what shows states: on a terminal a table in its place, elsewhere a line for each change."""
+    words, latest = {}, [0.0]
+
+    def on_terminal(states):
+        if time.monotonic() - latest[0] >= _EVERY:
+            up = f"\x1b[{len(states) + 2}A" if latest[0] else ""
+            print(up + table(states, jobs).replace("\n", "\x1b[K\n") + "\x1b[K", flush=True)
+            latest[0] = time.monotonic()
+
+    def as_lines(states):
+        for each in states:
+            if words.get(each.row.name, "waiting") != each.word:
+                print(f"{each.row.name}: {each.word}", flush=True)
+            words[each.row.name] = each.word
+
+    return on_terminal if sys.stdout.isatty() else as_lines
+
+
+def last_line(log: Path) -> str:
+    """Return the last line of a log."""
+    return (log.read_text(errors="replace").splitlines() or ["says nothing"])[-1]

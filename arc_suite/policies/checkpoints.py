@@ -1,0 +1,90 @@
+"""Checkpoints of a run's policy: one folder for each evaluation, which any program takes as a policy.
+
+    RUN/checkpoints/<step>/policy.npz   the policy
+    RUN/checkpoints/<step>/agent.json   what it is: algorithm, environment steps, seed, mean return
+
+The folder `RUN/checkpoints` itself is a policy too: its checkpoints take turns from seed to seed.
+"""
+
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+from arc_suite import checks, files
+
+FOLDER, AGENT = "checkpoints", "agent.json"
+GRADES = ("random", "medium", "expert", "replay")
+MEDIUM = 1.0 / 3.0  # of the best return, as in D4RL (Fu et al., 2020)
+
+
+class Agent(NamedTuple):
+    """What a checkpoint is.
+
+    Attributes:
+        algorithm: that learned it.
+        steps: environment steps until then.
+        seed: of the run.
+        mean_return: of its evaluation.
+    """
+
+    algorithm: str
+    steps: int
+    seed: int
+    mean_return: float
+
+
+def save(folder: Path, agent: Agent) -> None:
+    """Write what a checkpoint is beside its policy.
+
+    Raises:
+        OSError: it cannot be written; one line.
+    """
+    with files.writing_json(folder / AGENT) as file:
+        file.update(agent._asdict())
+
+
+def agents(path: Path) -> list[Agent]:
+    """Return what a checkpoint is, or what those of a folder of checkpoints are by their steps; none for neither.
+
+    Raises:
+        ValueError: a damaged file; one line.
+    """
+    try:
+        found = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
+        return sorted((Agent(**json.loads(file.read_text())) for file in found), key=lambda agent: agent.steps)
+    except (OSError, TypeError, ValueError) as error:
+        raise ValueError(f"{path}: damaged: {' '.join(str(error).split())[:200]}") from None
+
+
+def at(run: Path, step: int) -> Path:
+    """Return the checkpoint of a run at a step.
+
+    Raises:
+        ValueError: there is none; one line.
+    """
+    there = [agent.steps for agent in agents(run / FOLDER)]
+    if step not in there:
+        raise ValueError(f"{run}: keeps no checkpoint at {step} (there are: {', '.join(map(str, there)) or 'none'})")
+    return run / FOLDER / str(step)
+
+
+def graded(run: Path, grade: str) -> str:
+    """Return the policy of a grade, as offline RL has them.
+
+    random is uniform; medium the first checkpoint that earns a third of what the best one does; expert the latest;
+    replay all of them in turn.
+
+    Raises:
+        ValueError: an unknown grade, or a run without checkpoints; one line.
+    """
+    checks.name(grade, GRADES, "grade")
+    if grade == "random":
+        return "random"
+    there = agents(run / FOLDER)
+    if not there:
+        raise ValueError(f"{run}: keeps no checkpoints")
+    if grade == "replay":
+        return str(run / FOLDER)
+    enough = MEDIUM * max(agent.mean_return for agent in there)
+    medium = next(agent for agent in there if agent.mean_return >= enough)
+    return str(at(run, (medium if grade == "medium" else there[-1]).steps))

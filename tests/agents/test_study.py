@@ -1,0 +1,215 @@
+"""Studies: eight tiny runs, killed twice, come out to the bit as an uninterrupted study does; times apart."""
+
+import importlib.util
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import programs
+import pytest
+import tiny_studies
+
+from arc_suite import policies, style
+from arc_suite.agents import run_folder, studies, study_runner
+from arc_suite.agents.study_runner import METRICS, State
+from arc_suite.envs.dm import load
+
+ROOT = pathlib.Path(__file__).parents[2]
+FIXTURES = ROOT / "tests" / "fixtures"
+
+
+@pytest.fixture
+def surroundings(tmp_path):
+    """Of programs: where datasets and compiled functions lie, and the tiny studies."""
+    return os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(ROOT), str(FIXTURES)]),
+        "MINARI_DATASETS_PATH": str(tmp_path / "datasets"),
+        "JAX_COMPILATION_CACHE_DIR": str(tmp_path / "cache"),
+        "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0",
+    }
+
+
+def begun(name, folder, jobs, surroundings):
+    """The process of a study, in a group of its own."""
+    command = [sys.executable, "-m", "arc_suite", "study", f"tiny_studies:{name}", f"--jobs={jobs}"]
+    command += [f"--runs={folder / 'runs'}", f"--results={folder / 'results'}"]
+    return subprocess.Popen(command, env=surroundings, start_new_session=True, cwd=folder.parent)
+
+
+def wait_for(count, pattern, folder, process):
+    """Wait until so many files are there."""
+    while process.poll() is None and len(list(folder.glob(pattern))) < count:
+        time.sleep(0.01)
+    assert process.poll() is None, "the study has ended before it could be killed"
+
+
+def contents(folder):
+    """Everything that must not depend on jobs and kills, by its path."""
+    found = {}
+    for path in sorted(folder.glob("results/*/*")):
+        if path.name != "times.csv":
+            found[str(path.relative_to(folder))] = path.read_bytes()
+    for path in sorted(folder.glob("runs/*/[cp]*.npz")):
+        with np.load(path) as stored:
+            for name in stored.files:
+                if name != "progress":
+                    found[f"{path.relative_to(folder)}/{name}"] = stored[name].tobytes()
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["WITH_NUMPY", "WITH_JAX"])
+def test_killed_twice(name, tmp_path, surroundings):
+    """First with all its processes, then alone, so that its runs go on; two jobs make what one makes."""
+    if name == "WITH_JAX":
+        pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+    assert begun(name, tmp_path / "whole", 1, surroundings).wait() == 0
+
+    process = begun(name, tmp_path / "killed", 2, surroundings)
+    wait_for(1, "runs/*/checkpoint.npz", tmp_path / "killed", process)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    process = begun(name, tmp_path / "killed", 2, surroundings)
+    wait_for(3, "results/*/style.csv", tmp_path / "killed", process)
+    process.kill()
+    process.wait()
+    assert begun(name, tmp_path / "killed", 2, surroundings).wait() == 0
+
+    whole, killed = contents(tmp_path / "whole"), contents(tmp_path / "killed")
+    assert len([path for path in whole if path.endswith("evaluations.csv")]) == 8
+    assert whole.keys() == killed.keys()
+    assert [path for path in whole if whole[path] != killed[path]] == []
+
+
+@pytest.mark.slow
+def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
+    (tmp_path / "study").mkdir()
+    command = ["-m", "arc_suite", "study", "tiny_studies:WITH_NUMPY", "--jobs=2"]
+    places = [f"--runs={tmp_path / 'runs'}", f"--results={tmp_path / 'results'}"]
+    rows = [row.name for row in tiny_studies.WITH_NUMPY.rows]
+    for shard in ("0/4", "1/4"):
+        done = subprocess.run(
+            [sys.executable, *command, *places, f"--shard={shard}"], env=surroundings, capture_output=True, text=True
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.endswith("2 of 2 finished\n")
+    made = sorted(path.name for path in (tmp_path / "runs").iterdir() if path.is_dir())
+    assert made == sorted(rows[0::4] + rows[1::4])
+
+    row, folder = tiny_studies.WITH_NUMPY.rows[0], tmp_path / "runs"
+    before = (folder / row.name / "checkpoint.npz").stat().st_mtime_ns
+    states = study_runner.run([row], folder, tmp_path / "results", 1, lambda states: None)
+    assert [each.word for each in states] == ["finished"]
+    assert (folder / row.name / "checkpoint.npz").stat().st_mtime_ns == before
+    assert states[0].step == row.steps
+
+    with pytest.raises(ValueError, match=r"of another run, whose row.spread is 0.02, and not 0.3; write to another"):
+        study_runner.is_finished(row._replace(numbers={"spread": 0.3}), folder / row.name)
+
+    # What is published of the policy's style is what the style room measures of it.
+    table = run_folder.table(tmp_path / "results" / row.name, "style")
+    environment = load("tick", "walk", row.task_kwargs)
+    policy = policies.policy(folder / row.name, "tick")
+    for seed in (0, 7):
+        measured = style.measure(style.record(environment, policy, seed))
+        for name in METRICS:
+            assert np.array_equal(table[name][seed], measured[name].value, equal_nan=True)
+
+
+@pytest.mark.slow
+def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
+    command = ["-m", "arc_suite", "study", "tiny_studies:BROKEN", "--jobs=1"]
+    done = subprocess.run([sys.executable, *command], env=surroundings, capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "1 of 2 finished" in done.stdout
+    (line,) = done.stderr.splitlines()
+    reason = (
+        "training needs JAX: "
+        if importlib.util.find_spec("jax") is None
+        else "prior: the algorithm takes no prior data, got "
+    )
+    assert line.startswith(f"runs/tiny_studies.BROKEN/tick-walk-sac-0.log: arc-suite train: {reason}")
+
+
+def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
+    """It is not started twice, whoever makes it."""
+    log = tmp_path / "a.log"
+    held = study_runner._claimed(log)
+    assert study_runner._claimed(log) is None
+    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, stdout=held)
+    held.close()
+    assert study_runner._claimed(log) is None, "the process of the run holds it too"
+    child.communicate(b"\n")
+    study_runner._claimed(log).close()
+
+
+def test_remaining_time():
+    """By a run's own pace, that of its kind, or that of all."""
+    sac, sope = (studies.Row("tick", name, 1000) for name in ("sac", "sope"))
+
+    def state(row, word, step, wall):
+        return State(row, word, step, None, wall, wall)
+
+    assert study_runner.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
+    begun = [state(sac, "finished", 1000, 100.0), state(sac, "running", 500, 100.0), state(sac, "waiting", 0, 0.0)]
+    assert study_runner.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
+    assert study_runner.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ([], "arc-suite study: expected a study: paper, exact-tick, short, "),
+        (["papr"], "arc-suite study: unknown study 'papr'; did you mean 'paper'? (there are: "),
+        (["paper", "--shard=4/4"], "arc-suite study: --shard=4/4: expected i/n with i from 0 to n - 1, such as 0/4"),
+        (["arc_suite:load"], "arc-suite study: study 'arc_suite:load': expected a Study, got function"),
+        (["tiny_studies:TWICE"], "arc-suite study: study 'tiny_studies:TWICE': 2 rows are named tick-walk-sac-0; a "),
+    ],
+)
+def test_errors_are_one_line(arguments, line, tmp_path):
+    done = programs.run("-m", "arc_suite", "study", *arguments, cwd=tmp_path, path=FIXTURES)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(line), done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", studies.STUDIES)
+def test_rows_of_the_table_are_runs(name):
+    study = studies.study(name)
+    assert study.title
+    for row in study.rows[:12]:
+        run = row.run()
+        assert (run.prior is None) == (getattr(run.definition.row, "prior", "none") == "none")
+        arguments = row.arguments("folder")
+        assert f"--seed={row.seed}" in arguments
+        assert [f"--row={key}={value}" in arguments for key, value in row.numbers.items()] == [True] * len(row.numbers)
+
+
+def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
+    """By submitit's executor that runs jobs here; a job that is broken off comes back as it was."""
+    pytest.importorskip("submitit", reason="of the extra cluster: make check-agents")
+    from arc_suite.agents import cluster
+
+    commands = []
+    monkeypatch.setattr(cluster.subprocess, "run", lambda command, check: commands.append(command))
+    jobs = cluster.submit(("study", "first-steps"), 3, 2.0, tmp_path / "jobs", cluster="debug")
+    for job in jobs:
+        job.result()
+    assert [command[1:] for command in commands] == [
+        ["-m", "arc_suite", "study", "first-steps", f"--shard={part}/3", "--jobs=1"] for part in range(3)
+    ]
+    share = cluster.Share(("study", "first-steps"))
+    assert share.checkpoint().function == share
+
+
+@pytest.mark.skipif(importlib.util.find_spec("submitit") is not None, reason="submitit is installed")
+def test_without_submitit_it_says_what_to_install(tmp_path):
+    done = programs.run("-m", "arc_suite", "study", "paper", "--submit=2", cwd=tmp_path)
+    line = "arc-suite study: --submit needs submitit: pip install 'arc_suite[cluster]' ("
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(line) and done.stderr.count("\n") == 1

@@ -1,0 +1,47 @@
+"""Draws a strip of all tasks, a view each, with robots in turn: docs/tasks.png.
+
+Example:
+  python tools/strip.py --output docs/tasks.png
+"""
+
+import imageio.v3 as imageio
+import numpy as np
+from absl import flags
+
+import arc_suite
+from arc_suite import evaluation, files, policies
+from arc_suite.cli import films, program
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
+
+FLAGS = flags.FLAGS
+flags.DEFINE_integer("steps", 110, "Control steps before the picture.", lower_bound=1)
+flags.DEFINE_integer("columns", 4, "Views side by side.", lower_bound=1)
+flags.DEFINE_string("output", "docs/tasks.png", "File to write.", short_name="o")
+
+WIDTH, HEIGHT = 360, 270  # pixels of a view
+PRESETS = {"walk": "tuned", "steer": "steered", "gaps": "sighted", "navigate": "planned"}  # else surefooted
+
+
+def view(task: str, robot: str) -> np.ndarray:
+    """Picture of a robot that does a task, (HEIGHT, WIDTH, 3), with both names."""
+    environment = arc_suite.load(robot, task)
+    policy = policies.policy("cpg", robot, PRESETS.get(task, "surefooted"), task=environment.task.definition)
+    for _ in evaluation.rollout(environment, policy, 0, FLAGS.steps):
+        pass
+    picture = environment.physics.render(HEIGHT, WIDTH, camera_id="portrait" if task == "walk" else "tracking")
+    return films.captioned(picture, f"{task}: {robot}")
+
+
+def main() -> None:
+    """Draw the views and write them."""
+    robots = list(ROBOTS)
+    pairs = [(task, robots[index % 3]) for index, task in enumerate(TASKS)]  # Leaper falls on ground
+    views = [view(*pair) for pair in program.progress(pairs, desc="tasks", leave=False)]
+    views += [np.full_like(views[0], 255)] * (-len(views) % FLAGS.columns)
+    with files.writing(FLAGS.output) as path:
+        imageio.imwrite(path, films.grid(views, FLAGS.columns))
+
+
+if __name__ == "__main__":
+    program.run(main)
