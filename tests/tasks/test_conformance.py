@@ -165,6 +165,8 @@ def test_bad_action_is_refused_and_changes_nothing(domain, task):
 @pytest.mark.slow
 @every_task
 def test_episode_is_1000_steps_of_50_ms(domain, task):
+    if "kicks" in TASKS[task].modifiers:
+        pytest.skip("who stands still may be kicked over")
     environment = load(domain, task, healthy_range=(-10.0, 10.0))
     timestep, length = environment.reset(), 0
     action = np.zeros(JOINTS[domain])
