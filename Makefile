@@ -57,7 +57,7 @@ check-lowest: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	tools/ensure_egl.sh $(VENV)/bin/python
 	$(VENV)/bin/python -m pip install -q -e '.[test]' 'gymnasium==1.2.0'
-	$(VENV)/bin/python -m pytest $(PARALLEL) tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "not slow" tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
 		tests/tasks/test_conformance.py tests/simulation/test_divergence.py tests/house/test_threads.py \
 		tests/house/test_errors.py
 
