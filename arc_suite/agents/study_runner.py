@@ -183,8 +183,9 @@ def publish(row: Row, folder: Path, published: Path) -> None:
     step = int(evaluations["step"][-1])
     measured = _table(target, "style")
     if not measured or measured["step"][-1] != step:
+        text = _style(row, source, step)  # long work, in which a kill is to leave no temporary file
         with files.writing(target / "style.csv") as temporary:
-            temporary.write_text(_style(row, source, step))
+            temporary.write_text(text)
 
 
 def publish_all(rows: Sequence[Row], folder: Path, published: Path) -> None:

@@ -50,7 +50,7 @@ def wait_for(count, pattern, folder, process):
 def contents(folder):
     """Everything that must not depend on jobs and kills, by its path."""
     found = {}
-    for path in sorted(folder.glob("results/*/*")):
+    for path in sorted(folder.glob("results/*/[!.]*")):  # a kill may leave a temporary file
         if path.name != "times.csv":
             found[str(path.relative_to(folder))] = path.read_bytes()
     for path in sorted(folder.glob("runs/*/[cp]*.npz")):
