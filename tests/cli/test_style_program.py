@@ -148,7 +148,9 @@ def test_other_tasks(tmp_path, task):
         assert list(report["robots"]["tick"].values()) == [recorded, recorded]
     else:  # nothing says which module registers the task
         assert (again.returncode, again.stdout) == (1, "")
-        assert again.stderr.startswith(f"style.py: unknown task 'stay' (there are: {', '.join(TASKS)})")
+        assert again.stderr.startswith(
+            f"style.py: unknown task 'stay'; did you mean 'stairs'? (there are: {', '.join(TASKS)})"
+        )
         again = programs.run(TOOL, f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path)
         assert again.returncode == 0, again.stderr
         assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]
