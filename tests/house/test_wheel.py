@@ -68,7 +68,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
-    package |= {"arc_suite/export/web/viewer.js"}
+    package |= {"arc_suite/export/page.html", "arc_suite/export/web/viewer.js"}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"
     assert {name for name in names if not name.startswith(prefix)} == package
     assert [name for name in names if name.endswith("/LICENSE")]
