@@ -4,12 +4,14 @@ import difflib
 import json
 import math
 import operator
+import pkgutil
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 _LARGEST_SEED = 2**32 - 1  # that a RandomState takes
+_LONGEST_QUOTE = 300  # characters
 
 
 def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> str:
@@ -155,3 +157,24 @@ def json_text(what: str, value: Any) -> str:
         return json.dumps(value, sort_keys=True)
     except TypeError as error:
         raise ValueError(f"{what}: expected values that JSON can hold: {error}") from None
+
+
+def quoted(value: Any) -> str:
+    """Return the beginning of a text that is not ours, of a file or another library's error, in one line."""
+    return " ".join(str(value).split())[:_LONGEST_QUOTE]
+
+
+def imported(path: str, kind: str) -> Any:
+    """Return what `module:name` stands for; its module is imported.
+
+    Args:
+        path: the module and the name in it.
+        kind: of what is wanted, with which an error begins.
+
+    Raises:
+        ValueError: there is none; one line.
+    """
+    try:
+        return pkgutil.resolve_name(path)
+    except (ImportError, ValueError, AttributeError) as error:
+        raise ValueError(f"{kind} {path!r}: {error}") from None

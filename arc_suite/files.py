@@ -1,12 +1,14 @@
-"""Files that are whole or not there, and folders made where need be."""
+"""Files that are whole or not there, folders made where need be, and locks."""
 
 import contextlib
 import errno
+import fcntl
 import json
 import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 
 def folder(path: str | os.PathLike) -> Path:
@@ -80,6 +82,37 @@ def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
         yield report
         if temporary:
             temporary.write_text(json.dumps(_plain(report), indent=2, allow_nan=False) + "\n")
+
+
+def lock(file: IO | int) -> bool:
+    """Lock an open file or folder until it is closed; return False where another process has locked it."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def locked(folder: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
+    """Keep a folder locked against other processes.
+
+    Args:
+        folder: that is there.
+        refusal: the error where another process has locked it; with None, wait until it lets go.
+
+    Raises:
+        ValueError: another process has locked it; the refusal.
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        if refusal is None:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        elif not lock(descriptor):
+            raise ValueError(refusal)
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def _plain(value):

@@ -3,7 +3,6 @@
 import dataclasses
 import importlib
 import json
-import pkgutil
 from collections.abc import Iterable
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -182,10 +181,7 @@ def algorithm(name: str) -> Algorithm:
         ValueError: there is none; one line.
     """
     if isinstance(name, str) and ":" in name:
-        try:
-            found = pkgutil.resolve_name(name)
-        except (ImportError, ValueError, AttributeError) as error:
-            raise ValueError(f"algorithm {name!r}: {error}") from None
+        found = checks.imported(name, "algorithm")
         if not isinstance(found, Algorithm):
             raise ValueError(f"algorithm {name!r}: expected an Algorithm, got {type(found).__name__}")
         return found

@@ -3,11 +3,8 @@
 The files lie beside the folder of the run, as runs with the same prior data share them.
 """
 
-import contextlib
-import fcntl
 import hashlib
 import json
-import os
 from pathlib import Path
 
 from arc_suite import files
@@ -43,7 +40,7 @@ def mapped(stage: Stage, task: Task) -> Replay:
         raise ValueError(f"prior {stage.prior!r}: holds no episode")
     digest = hashlib.sha256("".join(summary["sha256"] for summary in summaries).encode()).hexdigest()
     folder = files.folder(Path(stage.folder).parent / f"prior-{digest[:16]}")
-    with _alone(folder):
+    with files.locked(folder):
         if not (folder / _COUNT).exists():
             replay = Replay(folder, count, size, joints)
             for episode in dataset:
@@ -62,14 +59,3 @@ def mapped(stage: Stage, task: Task) -> Replay:
 
 def _tasks(stage: Stage, settings):
     return (stage.task.rpartition(":")[2], stage.task_kwargs), (settings.task.rpartition(":")[2], settings.task_kwargs)
-
-
-@contextlib.contextmanager
-def _alone(folder: Path):
-    """Keep other processes from writing the same files."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        os.close(descriptor)

@@ -11,7 +11,6 @@ Tables only grow; on going on they are cut back to where they were at the checkp
 """
 
 import contextlib
-import fcntl
 import json
 import os
 import zipfile
@@ -22,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import files
+from arc_suite import checks, files
 
 CONFIG, CHECKPOINT = "config.json", "checkpoint.npz"
 TABLES = ("evaluations", "training", "times")
@@ -107,12 +106,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
     """
     path = files.folder(path)
     with contextlib.ExitStack() as stack:
-        descriptor = os.open(path, os.O_RDONLY)
-        stack.callback(os.close, descriptor)
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ValueError(f"{path}: another process goes on with this run") from None
+        stack.enter_context(files.locked(path, f"{path}: another process goes on with this run"))
         _check(path, json.loads(json.dumps(config)))
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
@@ -128,7 +122,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
     try:
         config = json.loads((Path(path) / CONFIG).read_text())
     except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: no folder of a run: {' '.join(str(error).split())}") from None
+        raise ValueError(f"{path}: no folder of a run: {checks.quoted(error)}") from None
     if not isinstance(config, dict):
         raise ValueError(f"{path}: no folder of a run")
     return config
@@ -178,7 +172,7 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
         columns = np.array([line.split(",") for line in lines], float).T
         return dict(zip(header.split(","), columns, strict=True))
     except (OSError, ValueError) as error:
-        raise ValueError(f"{path}: no table of a run: {' '.join(str(error).split())}") from None
+        raise ValueError(f"{path}: no table of a run: {checks.quoted(error)}") from None
 
 
 def _check(path: Path, config: dict[str, Any]) -> None:
@@ -213,8 +207,7 @@ def _checkpoint(path: Path) -> tuple[dict[str, np.ndarray] | None, dict[str, Any
             raise ValueError("expected an object")
         return arrays, progress
     except _DAMAGES as error:
-        reason = " ".join(str(error).split())[:200]
-        raise ValueError(f"{path} is damaged: {reason}; delete it to start the run over") from None
+        raise ValueError(f"{path} is damaged: {checks.quoted(error)}; delete it to start the run over") from None
 
 
 def _cell(value) -> str:

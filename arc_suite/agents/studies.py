@@ -2,7 +2,6 @@
 
 import collections
 import itertools
-import pkgutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -206,10 +205,7 @@ def study(name: str) -> Study:
 def _named(name: str) -> Study:
     if ":" not in name:
         return STUDIES[checks.name(name, STUDIES, "study")]
-    try:
-        found = pkgutil.resolve_name(name)
-    except (ImportError, ValueError, AttributeError) as error:
-        raise ValueError(f"study {name!r}: {error}") from None
+    found = checks.imported(name, "study")
     if not isinstance(found, Study):
         raise ValueError(f"study {name!r}: expected a Study, got {type(found).__name__}")
     return found

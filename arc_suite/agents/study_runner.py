@@ -7,7 +7,6 @@ and the style of their policies, go into a folder that is committed and that rep
 
 import contextlib
 import csv
-import fcntl
 import json
 import subprocess
 import sys
@@ -241,12 +240,10 @@ def _style(row: Row, folder: Path, step: int) -> str:
 def _claimed(log: Path) -> IO | None:
     """Return the open log of a run, locked; None where another process goes on with the run."""
     file = log.open("ab")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        file.close()
-        return None
-    return file
+    if files.lock(file):
+        return file
+    file.close()
+    return None
 
 
 def _started(row: Row, folder: Path, log: IO) -> subprocess.Popen:

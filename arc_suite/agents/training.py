@@ -164,7 +164,7 @@ def _restore(learner: Learner, run_files: RunFolder) -> None:
         learner.restore(run_files.arrays)
     except (KeyError, ValueError) as error:
         where = f"{run_files.path / run_folder.CHECKPOINT} is damaged"
-        raise ValueError(f"{where}: {' '.join(str(error).split())}; delete it to start the run over") from None
+        raise ValueError(f"{where}: {checks.quoted(error)}; delete it to start the run over") from None
 
 
 def _record(run_files: RunFolder, learner: Learner, figures: Mapping[str, float]) -> None:

@@ -12,7 +12,6 @@ from tqdm import tqdm
 
 from arc_suite import checks, evaluation, policies
 from arc_suite.data import rollouts
-from arc_suite.data.dataset import quoted
 from arc_suite.data.settings import Settings
 from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
@@ -106,9 +105,9 @@ def _difference(metadata: dict, provenance: dict, specification: str) -> str | N
                 continue
             if name == "presets_sha256":
                 return f"its presets {' and '.join(provenance['settings']['presets'])} had other numbers"
-            return f"its {name} is {quoted(repr(was[group].get(name)))}, and not {value!r}"
+            return f"its {name} is {checks.quoted(repr(was[group].get(name)))}, and not {value!r}"
     if was["model_sha256"] != provenance["model_sha256"]:
-        digests = (quoted(digest)[:12] for digest in (was["model_sha256"], provenance["model_sha256"]))
+        digests = (checks.quoted(digest)[:12] for digest in (was["model_sha256"], provenance["model_sha256"]))
         return "the sha256 of its model is {}, and not {}".format(*digests)
     if metadata["env_spec"] != specification:
         return "its environment is specified otherwise"

@@ -30,7 +30,6 @@ _DAMAGES = (
     TypeError,
     ValueError,
 )
-_REASON = 300  # characters of a reason, which may quote a file
 MAIN = "main_data.hdf5"
 
 
@@ -139,12 +138,7 @@ def damages(dataset_id: str, file: Path):
     try:
         yield
     except _DAMAGES as error:
-        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {quoted(error)}") from None
-
-
-def quoted(value) -> str:
-    """Return what comes from a file as text that fits into a line."""
-    return " ".join(str(value).split())[:_REASON]
+        raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {checks.quoted(error)}") from None
 
 
 def plain(path: Path) -> Path:

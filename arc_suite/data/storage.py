@@ -13,7 +13,6 @@ one that replaces another changes places with it when it is complete.
 
 import contextlib
 import ctypes
-import fcntl
 import itertools
 import json
 import os
@@ -83,7 +82,7 @@ class Storage:
         folder = new if overwrite or not place.exists() else place
         _make_namespace(dataset_id)
         files.folder(folder / "data")
-        with _locked(folder, dataset_id):
+        with files.locked(folder, f"dataset {dataset_id!r} is being collected by another process"):
             try:
                 storage = cls(dataset_id, folder, place, early=not overwrite)
             except ValueError:
@@ -251,18 +250,6 @@ def _exchange(one: Path, other: Path) -> bool:
     """Let two folders change their names at once, so that neither is ever missing; False where that cannot be done."""
     renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)  # Linux alone has it, and not on every file system
     return renameat2 is not None and renameat2(_HERE, bytes(one), _HERE, bytes(other), _EXCHANGE) == 0
-
-
-@contextlib.contextmanager
-def _locked(folder: Path, dataset_id: str):
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    except BlockingIOError:
-        raise ValueError(f"dataset {dataset_id!r} is being collected by another process") from None
-    finally:
-        os.close(descriptor)
 
 
 def _image():

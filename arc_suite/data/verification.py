@@ -5,10 +5,10 @@ from collections.abc import Callable
 
 from tqdm import tqdm
 
-from arc_suite import registry, versions
+from arc_suite import checks, registry, versions
 from arc_suite.data import rollouts
 from arc_suite.data.collection import ROWS
-from arc_suite.data.dataset import open, quoted
+from arc_suite.data.dataset import open
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import model_sha256
 from arc_suite.policies import Script
@@ -48,11 +48,11 @@ def verify(
         raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {settings.task}, and not of {task}")
     for package, version in versions.recorded().items():
         if was["versions"].get(package) != version:
-            there = f"{package} {quoted(was['versions'].get(package))}"
+            there = f"{package} {checks.quoted(was['versions'].get(package))}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
     version, task = was["settings"].get("task_version"), registry.task_of(settings.task)
     if version != task.version:
-        there = f"version {quoted(version)} of {task.name}"
+        there = f"version {checks.quoted(version)} of {task.name}"
         raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {task.version} is installed")
     if was["model_sha256"] != model_sha256(settings.body, settings.task, settings.task_kwargs):
         raise ValueError(f"dataset {dataset_id!r} was collected with another model of {settings.body.name}")

@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from arc_suite import checks
+
 # Attributes of the environment that are arrays with a leading axis for the rows.
 _ARRAYS = ("_stream_seeds", "_streams_begin", "_steps", "_ended", "_resting", "_observation")
 
@@ -54,7 +56,7 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
             leaves = (arrays[f"carry/{row}/{place}"] for place, _ in enumerate(_leaves(environment.task.first())))
             environment._carries[row] = _rebuilt(environment.task.first(), leaves)
     except (KeyError, ValueError, TypeError, IndexError) as error:
-        raise ValueError(f"snapshot: of other rows or another task: {' '.join(str(error).split())}") from None
+        raise ValueError(f"snapshot: of other rows or another task: {checks.quoted(error)}") from None
 
 
 def _fitting(array: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ def agents(path: Path) -> list[Agent]:
         found = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
         return sorted((Agent(**json.loads(file.read_text())) for file in found), key=lambda agent: agent.steps)
     except (OSError, TypeError, ValueError) as error:
-        raise ValueError(f"{path}: damaged: {' '.join(str(error).split())[:200]}") from None
+        raise ValueError(f"{path}: damaged: {checks.quoted(error)}") from None
 
 
 def at(run: Path, step: int) -> Path:

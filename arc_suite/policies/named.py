@@ -2,7 +2,6 @@
 
 import itertools
 import os
-import pkgutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -155,10 +154,7 @@ def _from_zip(path: Path, body: Body) -> Policy:
 
 
 def _from_path(path: str, body: Body, rows: int) -> Policy:
-    try:
-        factory = pkgutil.resolve_name(path)
-    except (ImportError, ValueError, AttributeError) as error:
-        raise ValueError(f"policy {path!r}: {error}") from None
+    factory = checks.imported(path, "policy")
     if not callable(factory):
         raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
     make = _checked(path, factory, body.name if ROBOTS.get(body.name) == body else body)

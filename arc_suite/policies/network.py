@@ -169,7 +169,7 @@ def load(path: str | os.PathLike) -> Network:
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except _DAMAGES as error:
-        raise ValueError(f"{path}: no policy, or a damaged one: {' '.join(str(error).split())[:200]}") from None
+        raise ValueError(f"{path}: no policy, or a damaged one: {checks.quoted(error)}") from None
 
 
 def digest(path: str | os.PathLike) -> str:

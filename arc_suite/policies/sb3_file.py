@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.save_util import load_from_zip_file
 
+from arc_suite import checks
 from arc_suite.robots.spec import Body
 
 
@@ -34,8 +35,7 @@ class Saved:
             self._policy = data["policy_class"](*spaces, lambda _: 0.0, **data["policy_kwargs"])
             self._policy.load_state_dict(parameters["policy"])
         except (zipfile.BadZipFile, ValueError, KeyError, TypeError, RuntimeError, AssertionError) as error:
-            reason = " ".join(str(error).split())[:200]
-            raise ValueError(f"policy {path}: no policy of stable-baselines3: {reason}") from None
+            raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quoted(error)}") from None
         self._policy.set_training_mode(False)
         self._size = spaces[0].shape
         if spaces[1].shape != (len(body.joint_names),):

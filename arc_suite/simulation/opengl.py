@@ -17,6 +17,7 @@ import sys
 import threading
 import types
 
+from arc_suite import checks
 from arc_suite.simulation import forks
 
 _REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
@@ -297,7 +298,7 @@ def _explain(error: Exception) -> str:
     if isinstance(error, AttributeError):  # PyOpenGL's way to say that a library is not there
         reason = "the OpenGL library is missing"
     else:
-        reason = " ".join(str(error.__cause__ or error).split()).rstrip(".")
+        reason = checks.quoted(error.__cause__ or error).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
     return f"cannot render{backend}: {reason}; {_REMEDY}"
 

@@ -23,7 +23,6 @@ from arc_suite.tasks import terms
 FORMAT = "arc_suite tracks 2"  # another number for every change of what a file holds
 
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-_REASON = 300  # characters of a reason, which may quote a file
 
 # Types of single values, and shapes of arrays.
 _FIELDS = {
@@ -93,8 +92,7 @@ def load(path: str | os.PathLike) -> list[Track]:
                 count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
                 return [_track(body, arrays, index) for index in range(count)]
         except Exception as error:  # a damaged archive raises whatever its damage leads to
-            reason = " ".join(str(error).split())[:_REASON]
-            raise ValueError(f"{path}: not a file of tracks, or a damaged one: {reason}") from None
+            raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
 
 

@@ -1,12 +1,12 @@
 """Journals: what a search has found so far, in a file of JSON lines that survives being broken off."""
 
-import fcntl
 import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from arc_suite import files
 from arc_suite.tuning.search import Generation
 
 
@@ -32,11 +32,10 @@ class Journal:
         path, header = Path(path), _line(settings)
         try:
             self._file = path.open("a+b")
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise ValueError(f"{path}: another process goes on with this search") from None
         except OSError as error:
             raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+        if not files.lock(self._file):
+            raise ValueError(f"{path}: another process goes on with this search")
         text = path.read_bytes()
         # What has no end was being written when the search was broken off.
         if not header.startswith(text):
