@@ -2,13 +2,11 @@
 
 import dataclasses
 import importlib
-import json
-from collections.abc import Iterable
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from arc_suite import checks
-from arc_suite.agents.rows import Cloning, Imitation, ProximalPolicy
+from arc_suite.agents.rows import Cloning, Imitation, ProximalPolicy, SoftActorCritic
 
 
 class Algorithm(NamedTuple):
@@ -53,76 +51,6 @@ class Algorithm(NamedTuple):
             if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
                 raise ValueError(f"row {name}: expected {kind.__name__} like {fields[name]!r}, got {value!r}")
         return self._replace(row=dataclasses.replace(self.row, **changes))
-
-
-@dataclasses.dataclass(frozen=True)
-class SoftActorCritic:
-    """The numbers of a soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018).
-
-    Defaults are what the published code of the ARC-RL paper has for SAC.
-
-    Attributes:
-        hidden: units of each of the two hidden layers, of policy and critics.
-        learning_rate: of Adam, for policy, critics and temperature.
-        discount: of a control step.
-        averaging: share of a critic that its target takes over in each update.
-        batch: transitions of an update from each source of data.
-        capacity: latest online transitions that are kept.
-        dropout: share of units that the critics drop.
-        prior: what prior data are: "none"; "fenced", in one buffer with online data, never overwritten; or
-            "beside", a batch of their own in every update.
-        updates_per_step: of an environment step; all but the last are of the critics alone.
-        random_steps: the policy acts once the buffer has more transitions than this; before, actions are uniform.
-        phase_every: environment steps between stabilisation phases.
-        phase_updates: the most updates of critics alone in a phase; 0 for no phases.
-        early_stop: what ends a phase before: "none", "published" or "sign_safe"; see `stopping`.
-        held_out: share of the online transitions by which phases are judged.
-        scored_batches: the most batches from each source by which they are judged at a time.
-        check_every: updates between two looks at them.
-        patience: updates without improvement after which a phase ends.
-        improvement: relative improvement that counts.
-    """
-
-    hidden: int = 256
-    learning_rate: float = 3e-4
-    discount: float = 0.99
-    averaging: float = 0.005
-    batch: int = 256
-    capacity: int = 1_000_000
-    dropout: float = 0.0
-    prior: str = "none"
-    updates_per_step: int = 1
-    random_steps: int = 5000
-    phase_every: int = 10_000
-    phase_updates: int = 0
-    early_stop: str = "none"
-    held_out: float = 0.1
-    scored_batches: int = 16
-    check_every: int = 1000
-    patience: int = 10_000
-    improvement: float = 0.001
-
-    def __post_init__(self):
-        """Check the numbers.
-
-        Raises:
-            ValueError: one that does not fit; one line.
-        """
-        for name, low in (("hidden", 1), ("batch", 1), ("capacity", 1), ("random_steps", 0), ("phase_every", 1)):
-            checks.integer(name, getattr(self, name), low)
-        for name, low in (
-            ("updates_per_step", 1),
-            ("phase_updates", 0),
-            ("scored_batches", 1),
-            ("check_every", 1),
-            ("patience", 1),
-        ):
-            checks.integer(name, getattr(self, name), low)
-        for name in ("learning_rate", "discount", "averaging", "held_out", "improvement"):
-            checks.number(name, getattr(self, name), 0.0, 1.0)
-        checks.number("dropout", self.dropout, 0.0, 0.9)
-        checks.name(self.prior, ("none", "fenced", "beside"), "prior")
-        checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
 
 
 _SAC = SoftActorCritic()
@@ -186,21 +114,3 @@ def algorithm(name: str) -> Algorithm:
             raise ValueError(f"algorithm {name!r}: expected an Algorithm, got {type(found).__name__}")
         return found
     return ALGORITHMS[checks.name(name, ALGORITHMS, "algorithm")]
-
-
-def changes(texts: Iterable[str]) -> dict[str, Any]:
-    """Return the numbers that texts name=value change; values are JSON where they parse, else text.
-
-    Raises:
-        ValueError: a text without a value; one line.
-    """
-    found = {}
-    for text in texts:
-        name, equals, value = text.partition("=")
-        if not (name and equals):
-            raise ValueError(f"row {text}: expected name=value")
-        try:
-            found[name] = json.loads(value)
-        except ValueError:
-            found[name] = value
-    return found

@@ -1,8 +1,70 @@
-"""Rows of numbers of imitation, of behaviour cloning and of proximal policy optimisation. Nothing here needs JAX."""
+"""Rows of numbers of what learns. Nothing here needs JAX."""
 
 import dataclasses
+from collections.abc import Mapping
 
 from arc_suite import checks
+
+
+@dataclasses.dataclass(frozen=True)
+class SoftActorCritic:
+    """The numbers of a soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018).
+
+    Defaults are what the published code of the ARC-RL paper has for SAC.
+
+    Attributes:
+        hidden: units of each of the two hidden layers, of policy and critics.
+        learning_rate: of Adam, for policy, critics and temperature.
+        discount: of a control step.
+        averaging: share of a critic that its target takes over in each update.
+        batch: transitions of an update from each source of data.
+        capacity: latest online transitions that are kept.
+        dropout: share of units that the critics drop.
+        prior: what prior data are: "none"; "fenced", in one buffer with online data, never overwritten; or
+            "beside", a batch of their own in every update.
+        updates_per_step: of an environment step; all but the last are of the critics alone.
+        random_steps: the policy acts once the buffer has more transitions than this; before, actions are uniform.
+        phase_every: environment steps between stabilisation phases.
+        phase_updates: the most updates of critics alone in a phase; 0 for no phases.
+        early_stop: what ends a phase before: "none", "published" or "sign_safe"; see `stopping`.
+        held_out: share of the online transitions by which phases are judged.
+        scored_batches: the most batches from each source by which they are judged at a time.
+        check_every: updates between two looks at them.
+        patience: updates without improvement after which a phase ends.
+        improvement: relative improvement that counts.
+    """
+
+    hidden: int = 256
+    learning_rate: float = 3e-4
+    discount: float = 0.99
+    averaging: float = 0.005
+    batch: int = 256
+    capacity: int = 1_000_000
+    dropout: float = 0.0
+    prior: str = "none"
+    updates_per_step: int = 1
+    random_steps: int = 5000
+    phase_every: int = 10_000
+    phase_updates: int = 0
+    early_stop: str = "none"
+    held_out: float = 0.1
+    scored_batches: int = 16
+    check_every: int = 1000
+    patience: int = 10_000
+    improvement: float = 0.001
+
+    def __post_init__(self):
+        """Check the numbers.
+
+        Raises:
+            ValueError: one that does not fit; one line.
+        """
+        least = {"hidden": 1, "batch": 1, "capacity": 1, "updates_per_step": 1, "random_steps": 0, "phase_every": 1}
+        _check(self, least | {"phase_updates": 0, "scored_batches": 1, "check_every": 1, "patience": 1})
+        _check_shares(self, "learning_rate", "discount", "averaging", "held_out", "improvement")
+        checks.number("dropout", self.dropout, 0.0, 0.9)
+        checks.name(self.prior, ("none", "fenced", "beside"), "prior")
+        checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,12 +102,10 @@ class Imitation:
         Raises:
             ValueError: one that does not fit; one line.
         """
-        for name, low in (("rows", 2), ("left_out", 0), ("round", 1), ("updates", 1), ("last_updates", 1)):
-            checks.integer(name, getattr(self, name), low)
-        for name in ("batch", "hidden"):
-            checks.integer(name, getattr(self, name), 1)
+        least = {"rows": 2, "left_out": 0, "round": 1, "updates": 1, "last_updates": 1, "batch": 1, "hidden": 1}
+        _check(self, least)
         checks.number("noise", self.noise, 0.0, 10.0)
-        checks.number("learning_rate", self.learning_rate, 0.0, 1.0)
+        _check_shares(self, "learning_rate")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,9 +128,8 @@ class Cloning:
         Raises:
             ValueError: one that does not fit; one line.
         """
-        for name in ("batch", "hidden"):
-            checks.integer(name, getattr(self, name), 1)
-        checks.number("learning_rate", self.learning_rate, 0.0, 1.0)
+        _check(self, {"batch": 1, "hidden": 1})
+        _check_shares(self, "learning_rate")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,12 +185,19 @@ class ProximalPolicy:
         Raises:
             ValueError: one that does not fit; one line.
         """
-        for name in ("rows", "horizon", "epochs", "minibatch", "hidden"):
-            checks.integer(name, getattr(self, name), 1)
-        checks.integer("warm_up", self.warm_up, 0)
-        for name in ("discount", "trace", "clip", "normalising", "policy_rate", "value_rate"):
-            checks.number(name, getattr(self, name), 0.0, 1.0)
+        _check(self, {"rows": 1, "horizon": 1, "epochs": 1, "minibatch": 1, "hidden": 1, "warm_up": 0})
+        _check_shares(self, "discount", "trace", "clip", "normalising", "policy_rate", "value_rate")
         for name in ("first_std", "last_std", "first_divergence", "last_divergence", "gradient_norm"):
             checks.number(name, getattr(self, name), 1e-6, 1e3)
         if self.minibatch > self.rows * self.horizon * (2 if self.mirrored else 1):
             raise ValueError(f"minibatch: expected at most the steps between updates, got {self.minibatch}")
+
+
+def _check(row, least: Mapping[str, int]) -> None:
+    for name, low in least.items():
+        checks.integer(name, getattr(row, name), low)
+
+
+def _check_shares(row, *names: str) -> None:
+    for name in names:
+        checks.number(name, getattr(row, name), 0.0, 1.0)

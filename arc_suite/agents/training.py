@@ -24,7 +24,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
 from arc_suite.policies.network import Network
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 
@@ -57,7 +57,7 @@ class Run(NamedTuple):
     @property
     def robot(self) -> str:
         """Name of the robot, or the JSON text of a body that is none."""
-        return self.body.name if ROBOTS.get(self.body.name) == self.body else body_to_json(self.body)
+        return self.body.name if is_robot(self.body) else body_to_json(self.body)
 
     @property
     def interval(self) -> int:

@@ -16,7 +16,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, export, files, policies
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
 from arc_suite.cli.program import VERSION, progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
@@ -42,9 +42,7 @@ def main() -> None:
     """Record, write both files and print a row for each clip."""
     checks.name(FLAGS.rig, export.RIGS, "rig")
     checks.name(FLAGS.root_motion, export.ROOT_MOTIONS, "root_motion")
-    body, *others = bodies(_ROBOT).values()
-    if others:
-        raise ValueError(f"--robot={_ROBOT.value}: expected one robot, as a file holds one")
+    body = only_body(_ROBOT)
     task_name, task_kwargs = task()
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")

@@ -1,6 +1,7 @@
 """Flags that several programs have: of which body, and in which task."""
 
 import json
+from collections.abc import Iterable
 from typing import Any
 
 from absl import flags
@@ -72,6 +73,19 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     return {body.name: body}
 
 
+def only_body(robot: flags.FlagHolder) -> Body:
+    """Return the body of a program that takes one alone; see `bodies`.
+
+    Raises:
+        ValueError: as `bodies`, or "all"; one line.
+        OSError: as `bodies`.
+    """
+    body, *others = bodies(robot).values()
+    if others:
+        raise ValueError(f"--robot={robot.value}: expected one robot")
+    return body
+
+
 def task() -> tuple[str, dict[str, Any]]:
     """Return the name of the task that --task asks for and its settings, `task_kwargs` of `arc_suite.load`.
 
@@ -81,19 +95,29 @@ def task() -> tuple[str, dict[str, Any]]:
         ValueError: an unknown task, a setting without a value, or `random`; one line.
     """
     registry.task_of(FLAGS.task)
-    settings = dict(_setting(text) for text in FLAGS["set"].value)
+    settings = named_values("set", FLAGS["set"].value)
+    if "random" in settings:
+        raise ValueError(
+            f"--set random={settings['random']}: programs seed every episode; see --help for the flag of the first seed"
+        )
     if "arena" in settings:
         registry.arena_maker(settings["arena"])
     return FLAGS.task, settings
 
 
-def _setting(text: str) -> tuple[str, Any]:
-    name, equals, value = text.partition("=")
-    if not (name and equals):
-        raise ValueError(f"--set {text}: expected name=value")
-    if name == "random":
-        raise ValueError(f"--set {text}: programs seed every episode; see --help for the flag of the first seed")
-    try:
-        return name, json.loads(value)
-    except ValueError:
-        return name, value
+def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
+    """Return what texts name=value of a flag say; values are JSON where they parse, else text.
+
+    Raises:
+        ValueError: a text without a name or a value; one line.
+    """
+    found = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name and equals):
+            raise ValueError(f"--{flag} {text}: expected name=value")
+        try:
+            found[name] = json.loads(value)
+        except ValueError:
+            found[name] = value
+    return found

@@ -24,7 +24,7 @@ from absl import flags
 from arc_suite import evaluation, files
 from arc_suite.agents import algorithms, run_folder
 from arc_suite.agents.training import Run, train
-from arc_suite.cli.flags import bodies, define_body, define_task, task
+from arc_suite.cli.flags import define_body, define_task, named_values, only_body, task
 from arc_suite.cli.program import progress
 from arc_suite.policies import network, onnx_file
 from arc_suite.robots import ROBOTS
@@ -56,11 +56,8 @@ def main() -> None:
     """Train, and print what the policy earns."""
     for name, value in _ONE_THREAD.items():
         os.environ.setdefault(name, value)  # read when JAX is imported
-    definition = algorithms.algorithm(FLAGS.algorithm).with_row(algorithms.changes(FLAGS.row))
-    walkers = bodies(_ROBOT)
-    if len(walkers) > 1:
-        raise ValueError("--robot=all: a run has one robot")
-    (body,) = walkers.values()
+    definition = algorithms.algorithm(FLAGS.algorithm).with_row(named_values("row", FLAGS.row))
+    body = only_body(_ROBOT)
     steps = FLAGS.steps or definition.steps
     run = Run(body, FLAGS.algorithm, definition, *task(), FLAGS.seed, steps, FLAGS.prior, FLAGS.evaluate_every)
     folder = Path(FLAGS.output or run.folder())

@@ -18,7 +18,7 @@ from absl import flags
 
 import arc_suite
 from arc_suite import policies
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
 from arc_suite.cli.live import Live, play
 from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.models.outline import outline
@@ -40,9 +40,7 @@ flags.DEFINE_integer("seed", 0, "Seed of the start of the first episode and of t
 
 def main() -> None:
     """Open the window and play until it is closed."""
-    body, *others = bodies(_ROBOT).values()
-    if others:
-        raise ValueError(f"--robot={_ROBOT.value}: expected one robot")
+    body = only_body(_ROBOT)
     name, settings = task()
     environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings | {"random": FLAGS.seed})
     steered = "command" in environment.task.definition.commands

@@ -19,7 +19,7 @@ from arc_suite.envs.scene import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
 from arc_suite.registration import importable
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks.contract import STEPS
@@ -78,7 +78,7 @@ class Settings(NamedTuple):
         task = registry.task_of(self.task)
         env_id = registry.env_id(self.body.name, task)
         settings = {"task_kwargs": json.loads(self._settings_text())} if self.task_kwargs else {}
-        if ROBOTS.get(self.body.name) == self.body:
+        if is_robot(self.body):
             spec = copy.deepcopy(gymnasium.spec(env_id))
             spec.max_episode_steps = self.steps
             spec.kwargs |= settings

@@ -12,7 +12,7 @@ from arc_suite.cpg import PRESETS, Demonstrator
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks import TASKS, Task
@@ -157,7 +157,7 @@ def _from_path(path: str, body: Body, rows: int) -> Policy:
     factory = checks.imported(path, "policy")
     if not callable(factory):
         raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
-    make = _checked(path, factory, body.name if ROBOTS.get(body.name) == body else body)
+    make = _checked(path, factory, body.name if is_robot(body) else body)
     make()  # finds out at once whether it makes one
     return Individuals(make, rows, len(body.joint_names), f"policy {path!r}")
 

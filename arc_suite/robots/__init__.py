@@ -9,6 +9,11 @@ from arc_suite.robots.spec import Body
 ROBOTS = {module.BODY.name: module.BODY for module in (queen, bastion, tick, leaper)}
 
 
+def is_robot(body: Body) -> bool:
+    """Return whether a body is one of the robots, registered ones included, and no variation of one."""
+    return ROBOTS.get(body.name) == body
+
+
 def row(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
     """Return a robot's row of a table of numbers, by the body's name; None where there is none.
 

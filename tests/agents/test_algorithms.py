@@ -7,7 +7,8 @@ import sys
 import pytest
 
 from arc_suite.agents import algorithms
-from arc_suite.agents.algorithms import ALGORITHMS, Algorithm, SoftActorCritic, algorithm, changes
+from arc_suite.agents.algorithms import ALGORITHMS, Algorithm, algorithm
+from arc_suite.agents.rows import SoftActorCritic
 
 PAPER = {
     # prior data, transitions of an update, the most updates of a phase, early stop, dropout
@@ -37,28 +38,27 @@ def test_rows_are_frozen():
 
 
 def test_numbers_of_a_row_can_be_changed():
-    changed = algorithm("sope").with_row(changes(["phase_updates=7500", "early_stop=sign_safe", "dropout=0"]))
+    changed = algorithm("sope").with_row({"phase_updates": 7500, "early_stop": "sign_safe", "dropout": 0})
     row = ALGORITHMS["sope"].row
     assert changed.row == dataclasses.replace(row, phase_updates=7500, early_stop="sign_safe", dropout=0)
     assert ALGORITHMS["sope"].row is row
 
 
 @pytest.mark.parametrize(
-    ("texts", "line"),
+    ("changes", "line"),
     [
-        (["phase_update=3"], r"^unknown number of the row 'phase_update'; did you mean 'phase_updates'\? "),
-        (["phase_updates=many"], r"^row phase_updates: expected int like 75000, got 'many'$"),
-        (["phase_updates=1.5"], r"^row phase_updates: expected int like 75000, got 1\.5$"),
-        (["dropout=true"], r"^row dropout: expected float like 0\.01, got True$"),
-        (["dropout=2"], r"^dropout: expected a number from 0 to 0\.9, got 2$"),
-        (["batch=0"], r"^batch: expected an integer from 1, got 0$"),
-        (["early_stop=safe"], r"^unknown early_stop 'safe'"),
-        (["batch"], r"^row batch: expected name=value$"),
+        ({"phase_update": 3}, r"^unknown number of the row 'phase_update'; did you mean 'phase_updates'\? "),
+        ({"phase_updates": "many"}, r"^row phase_updates: expected int like 75000, got 'many'$"),
+        ({"phase_updates": 1.5}, r"^row phase_updates: expected int like 75000, got 1\.5$"),
+        ({"dropout": True}, r"^row dropout: expected float like 0\.01, got True$"),
+        ({"dropout": 2}, r"^dropout: expected a number from 0 to 0\.9, got 2$"),
+        ({"batch": 0}, r"^batch: expected an integer from 1, got 0$"),
+        ({"early_stop": "safe"}, r"^unknown early_stop 'safe'"),
     ],
 )
-def test_changes_that_do_not_fit(texts, line):
+def test_changes_that_do_not_fit(changes, line):
     with pytest.raises(ValueError, match=line):
-        algorithm("sope").with_row(changes(texts))
+        algorithm("sope").with_row(changes)
 
 
 @pytest.mark.parametrize(

@@ -33,8 +33,9 @@ def one_line(done, line):
     ("flags", "line"),
     [
         (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
-        (["--robot=all"], "arc-suite train: --robot=all: a run has one robot"),
+        (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
         (["--row=batsch=3"], "arc-suite train: unknown number of the row 'batsch'; did you mean 'batch'? "),
+        (["--row=batch"], "arc-suite train: --row batch: expected name=value"),
         (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
         (["--task=wlak"], "arc-suite train: unknown task 'wlak'; did you mean 'walk'?"),
     ],
