@@ -17,7 +17,7 @@ import numpy as np
 import optax
 
 from arc_suite import policies
-from arc_suite.agents import networks
+from arc_suite.agents import networks, normaliser
 from arc_suite.agents.learner import Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
 from arc_suite.agents.rows import Imitation
@@ -142,7 +142,7 @@ class Imitator:
             **networks.named("state", self._state),
             **{name: array[: self._length] for name, array in zip(names, seen, strict=True)},
             "age": self._age,
-            **{f"normaliser/{place}": array for place, array in enumerate(self._normaliser.arrays)},
+            **normaliser.stored(self._normaliser),
             **environment_arrays(self._environment),
         }
 
@@ -152,8 +152,7 @@ class Imitator:
         self._length, self._age = len(arrays["labels"]), arrays["age"]
         for ours, name in ((self._observations, "observations"), (self._labels, "labels"), (self._ages, "ages")):
             ours[: self._length] = arrays[name]
-        layer = tuple(arrays[f"normaliser/{place}"] for place, _ in enumerate(self._normaliser.arrays))
-        self._normaliser = self._normaliser._replace(arrays=layer)
+        self._normaliser = normaliser.restored(arrays)
         self._observation = restore_environment(self._environment, arrays)
         for observation, age in zip(self._observations[: self._length], self._ages, strict=False):
             self._taught(observation, age)

@@ -1,5 +1,6 @@
 """Running moments of observations, by which networks see numbers of like size."""
 
+from collections.abc import Mapping
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from arc_suite.policies.network import Layer
 
 LIMIT = 5.0  # of a normalised number
+_NAME = "normaliser"
 _LEAST = 1e-3  # standard deviation, so that what hardly ever moves does not shout when it does
 
 
@@ -46,3 +48,17 @@ class Moments(NamedTuple):
         deviation = np.sqrt(self.squares / max(self.count, 1.0))
         factor = 1.0 / np.maximum(deviation, _LEAST) if self.count else np.ones_like(deviation)
         return Layer("normalise", tuple(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))
+
+
+def stored(layer: Layer) -> dict[str, np.ndarray]:
+    """Return the arrays of a layer that normalises, by name, as a learner stores them."""
+    return {f"{_NAME}/{place}": array for place, array in enumerate(layer.arrays)}
+
+
+def restored(arrays: Mapping[str, np.ndarray]) -> Layer:
+    """Return the layer that was `stored`.
+
+    Raises:
+        KeyError: arrays of it are missing.
+    """
+    return Layer("normalise", tuple(arrays[f"{_NAME}/{place}"] for place in range(3)))

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.agents import networks
+from arc_suite.agents import networks, normaliser
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
@@ -98,7 +98,7 @@ class OnPolicy:
         return {
             **networks.named("state", self._state),
             **networks.named("moments", self._moments),
-            **networks.named("normaliser", self._normaliser.arrays),
+            **normaliser.stored(self._normaliser),
             "iterations": np.array(self._iterations),
             **environment_arrays(self._environment),
         }
@@ -107,8 +107,7 @@ class OnPolicy:
         """Go on from what `arrays` returned."""
         self._state = networks.restored("state", self._state, arrays)
         self._moments = Moments(*(arrays[f"moments/{name}"] for name in Moments._fields))
-        layer = tuple(arrays[f"normaliser/{place}"] for place, _ in enumerate(self._normaliser.arrays))
-        self._normaliser = self._normaliser._replace(arrays=layer)
+        self._normaliser = normaliser.restored(arrays)
         self._iterations = int(arrays["iterations"])
         self._observation = restore_environment(self._environment, arrays)
 

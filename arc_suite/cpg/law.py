@@ -107,3 +107,20 @@ def felt(
     if parts is not None and forces and forces[-1] != 6 * parts:
         raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces[-1] / 6:g}")
     return quaternion, angles, speeds
+
+
+def blocks(observation: Mapping[str, np.ndarray], task: str, *names: str) -> tuple[np.ndarray, ...]:
+    """Return named blocks of an observation, float64.
+
+    Args:
+        observation: blocks by name.
+        task: one that has them, which an error names.
+        names: of the blocks.
+
+    Raises:
+        ValueError: one of them is missing; one line.
+    """
+    for name in names:
+        if name not in observation:
+            raise ValueError(f"observation: expected a block {name}, as the task {task} has")
+    return tuple(np.asarray(observation[name], dtype=float) for name in names)

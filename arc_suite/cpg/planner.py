@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.arenas.pillars import RADIUS
+from arc_suite.cpg.law import blocks
 from arc_suite.cpg.steering import STEERING, Manner, Steered
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import reach
@@ -66,12 +67,11 @@ class Planned:
 
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
-        if missing := {"command", "goal", "ranges"} - observation.keys():
-            raise ValueError(f"observation: expected a block {min(missing)}, as the task navigate has")
-        command = np.array(observation["command"], dtype=float)
-        for row, (goal, ranges) in enumerate(zip(observation["goal"], observation["ranges"], strict=True)):
-            circles = seen(np.asarray(ranges, dtype=float))
-            goal = FAR * float(goal[2]) * np.asarray(goal[:2], dtype=float)
+        commanded, goals, ranges = blocks(observation, "navigate", "command", "goal", "ranges")
+        command = commanded.copy()
+        for row, goal in enumerate(goals):
+            circles = seen(ranges[row])
+            goal = FAR * float(goal[2]) * goal[:2]
             x, y = along(way(goal, circles, self._extent, self._plan) or [goal], self._plan.aim)
             command[row, :3] = toward(math.atan2(y, x), self._plan)
         return self._steered.act({**observation, "command": command})

@@ -14,12 +14,12 @@ from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.following import Following, phase
 from arc_suite.cpg.kinematics import Legs
-from arc_suite.cpg.law import felt, torques
+from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import walk
-from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.fitting import reach, velocity_units
 from arc_suite.tasks.ground import SCAN
 
 
@@ -98,6 +98,7 @@ class Sighted:
         self._duty = parameters.duty_factor - tread.longer
         self._offsets = np.array(parameters.phase_offsets) / (2.0 * np.pi) + tread.lead
         self._units = velocity_units(body, parameters.target_velocity)
+        self._reach = reach(body)
         self._stiffness, self._damping = position_gains(body, pose.inertias)
         self._following = Following(tread.gain, tread.integral, self._cycles)
         angles = _at_ease(self._legs, pose.soles, tread.ride * pose.height)
@@ -116,12 +117,8 @@ class Sighted:
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
         quaternion, angles, velocities = felt(observation, len(self._stiffness), self._parts)
-        for block, task in (("command", "steer"), ("gait_clock", "steer"), ("scan", "rough")):
-            if block not in observation:
-                raise ValueError(f"observation: expected a block {block}, as the task {task} has")
-        clock, commanded, scan, motion = (
-            np.asarray(observation[name], dtype=float) for name in ("gait_clock", "command", "scan", "velocities")
-        )
+        commanded, clock, motion = blocks(observation, "steer", "command", "gait_clock", "velocities")
+        (scan,) = blocks(observation, "rough", "scan")
         rows = len(angles)
         if self._state is None or len(self._state.feet) != rows:
             self._state = _State(*(np.tile(first, (rows, *[1] * first.ndim)) for first in self._first))
@@ -183,7 +180,7 @@ class Sighted:
         half = 0.5 * self._stance * _flows(asked, self._places)
         along = half / np.maximum(np.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
         landing, shifts = self._places[:, :2] + half, self._state.shifts
-        view = footholds.View(self._state.heights, self._state.moved, self._units[0] / self._units[2])
+        view = footholds.View(self._state.heights, self._state.moved, self._reach)
         found = footholds.shifts(view, landing + moved, along, self._places[:, :2], self._height)
         shifts[:] = np.where(held, shifts, found)
         return landing + shifts[..., None] * along

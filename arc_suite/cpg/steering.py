@@ -14,7 +14,7 @@ import numpy as np
 
 from arc_suite import robots, rotations
 from arc_suite.cpg.following import Following, phase
-from arc_suite.cpg.law import felt, torques
+from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.cpg.stride import lifted
 from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import Standing, standing
@@ -136,9 +136,7 @@ class Steered:
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
         """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
         quaternion, angles, velocities = felt(observation, len(self._neutral), self._parts)
-        if missing := {"gait_clock", "command"} - observation.keys():
-            raise ValueError(f"observation: expected a block {min(missing)}, as the task steer has")
-        clock, commanded = (np.asarray(observation[name], dtype=float) for name in ("gait_clock", "command"))
+        commanded, clock = blocks(observation, "steer", "command", "gait_clock")
         asked, size = self._following.asked(clock, commanded)
         sweeps, raised, lifts = self._directions(asked * self._units, quaternion)
         now = phase(clock)
