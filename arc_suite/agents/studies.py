@@ -156,25 +156,28 @@ def six(
     )
 
 
+# A tenth of the published phases, of how often they are judged, and of the patience with them.
+_SHORT = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
+
 # The paper's own study is `paper`: 3,000 hours of a core. The others are what fits fewer.
 STUDIES = {
     "paper": Study("the paper's six algorithms as published", six(ROBOTS, 1_000_000, 5, Prior())),
     "exact-tick": Study("phases as published, 100,000 steps", six(("tick",), 100_000, 1, Prior())),
     "short": Study(
         "short phases: 7,500 updates in place of 75,000",
-        six(("tick", "leaper"), 100_000, 1, Prior(), {"phase_updates": 7500}),
+        six(("tick", "leaper"), 100_000, 1, Prior(), _SHORT),
     ),
-    # Minutes of a core a run: the first 20,000 steps, a quarter of them at random where there are no prior data.
+    # A quarter to half an hour of a core a run.
     "first-steps": Study(
-        "the first 20,000 steps, short phases: 7,500 updates in place of 75,000, prior data of 100 episodes",
-        six(("tick",), 20_000, 1, Prior(episodes=100), {"phase_updates": 7500}, evaluate_every=2500),
+        "the first 50,000 steps, short phases: 7,500 updates in place of 75,000, prior data of 100 episodes",
+        six(("tick",), 50_000, 1, Prior(episodes=100), _SHORT, evaluate_every=5000),
     ),
     # What demonstrators are good for that the paper did not have.
     "refined-prior": Study(
         "prior data of the demonstrators with refined numbers in place of medium, short phases: 7,500 updates",
         tuple(
             row._replace(label=f"{row.algorithm}-refined")
-            for row in six(("tick",), 100_000, 1, Prior("refined"), {"phase_updates": 7500})
+            for row in six(("tick",), 100_000, 1, Prior("refined"), _SHORT)
             if row.prior is not None
         ),
     ),
