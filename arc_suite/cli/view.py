@@ -9,8 +9,11 @@ backspace restarts. In a task that takes a command, such as steer, the arrow key
 turning left and right; until the first of them the task's own schedule holds. A fall begins the next episode.
 """
 
+import contextlib
 import math
 import queue
+import threading
+from collections.abc import Callable, Iterator
 
 import glfw
 import mujoco
@@ -25,6 +28,7 @@ from arc_suite.models.outline import outline
 from arc_suite.simulation import opengl
 
 _RATE = 60.0  # pictures a second, where the display does not tell its own
+_PATIENCE = 10.0  # s, for the window to close
 _DISTANCE = 2.8  # of the camera, of the farthest that the body reaches
 
 FLAGS = flags.FLAGS
@@ -49,15 +53,32 @@ def main() -> None:
     policy = policies.policy(FLAGS.policy, body, preset, task=environment.task.definition)
     live = Live(environment, policies.alone(policy, FLAGS.seed))
     opengl.require_window("`arc-suite render -o walk.html` writes a page that plays in any browser")
-    from mujoco import viewer  # which initializes GLFW where there is a display, and complains where not
-
     keys = queue.SimpleQueue()
-    model, data = live.shown.model.ptr, live.shown.data.ptr
-    with viewer.launch_passive(model, data, key_callback=keys.put, show_left_ui=False, show_right_ui=False) as window:
-        window.cam.type, window.cam.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, model.body("torso").id
+    with opened(live, keys.put) as window:
+        window.cam.type = mujoco.mjtCamera.mjCAMERA_TRACKING
+        window.cam.trackbodyid = live.shown.model.ptr.body("torso").id
         window.cam.distance = _DISTANCE * abs(outline(body)).max()
         window.cam.azimuth, window.cam.elevation = 140.0, -15.0
         play(window, live, keys, rate())
+
+
+@contextlib.contextmanager
+def opened(live: Live, pressed: Callable[[int], None]) -> Iterator:
+    """Open a window that shows what is live; yield it.
+
+    Args:
+        live: what is shown.
+        pressed: called with each key.
+    """
+    from mujoco import viewer  # which initializes GLFW where there is a display, and complains where not
+
+    model, data = live.shown.model.ptr, live.shown.data.ptr
+    others = set(threading.enumerate())
+    with viewer.launch_passive(model, data, key_callback=pressed, show_left_ui=False, show_right_ui=False) as window:
+        yield window
+    # Were the process to end while the window's thread still draws, it would crash.
+    for thread in set(threading.enumerate()) - others:
+        thread.join(_PATIENCE)
 
 
 def rate() -> float:
