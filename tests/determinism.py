@@ -1,11 +1,11 @@
 """The same bits everywhere: `python tests/determinism.py` prints digests of 500 steps of every robot and task.
 
 One of the observations and one of the rewards, of a single environment and of a row among others,
-on each number of threads given (1, 2 and 8 by default).
+on each number of threads given (1, 2 and 8 by default); `--steps 100` is quicker, with digests of its own.
 """
 
+import argparse
 import hashlib
-import sys
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -15,7 +15,6 @@ import numpy as np
 import arc_suite
 from arc_suite import registry
 
-STEPS = 500
 ROW, SEED = 1, 40  # the row that is looked at, and its seed
 
 Step = tuple[np.ndarray, float | None]  # observation and reward; a reset of the environment has none
@@ -28,10 +27,10 @@ class Digests(NamedTuple):
     rewards: str
 
 
-def actions(robot: str) -> np.ndarray:
+def actions(robot: str, steps: int) -> np.ndarray:
     """Return actions (steps, motors) float32, strong enough to fall now and then."""
     motors = len(registry.body_of(robot).joint_names)
-    return np.random.RandomState(1).uniform(-1.0, 1.0, (STEPS, motors)).astype(np.float32)
+    return np.random.RandomState(1).uniform(-1.0, 1.0, (steps, motors)).astype(np.float32)
 
 
 def digests(steps: Iterable[Step]) -> Digests:
@@ -49,12 +48,12 @@ def env_id(robot: str, task: str) -> str:
     return registry.env_id(robot, registry.task_of(task))
 
 
-def single(robot: str, task: str) -> Iterator[Step]:
+def single(robot: str, task: str, steps: int) -> Iterator[Step]:
     """Step a single environment that is reset when an episode ends."""
     env = gymnasium.make(env_id(robot, task))
     yield env.reset(seed=SEED)[0], None
     ended = False
-    for action in actions(robot):
+    for action in actions(robot, steps):
         if ended:  # as rows of a vector environment do
             observation, reward, ended = env.reset()[0], 0.0, False
         else:
@@ -64,11 +63,11 @@ def single(robot: str, task: str) -> Iterator[Step]:
     env.close()
 
 
-def row(robot: str, task: str, threads: int) -> Iterator[Step]:
+def row(robot: str, task: str, threads: int, steps: int) -> Iterator[Step]:
     """Step three rows, and show one of them."""
     envs = gymnasium.make_vec(env_id(robot, task), num_envs=3, num_threads=threads)
     yield envs.reset(seed=SEED - ROW)[0][ROW], None
-    for action in actions(robot):
+    for action in actions(robot, steps):
         observations, rewards, *_ = envs.step(np.stack([action] * 3))
         yield observations[ROW], rewards[ROW]
     envs.close()
@@ -76,13 +75,16 @@ def row(robot: str, task: str, threads: int) -> Iterator[Step]:
 
 def main() -> None:
     """Prints a line for each robot, task and way."""
-    threads = [int(argument) for argument in sys.argv[1:]] or [1, 2, 8]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("threads", type=int, nargs="*", default=[1, 2, 8])
+    parser.add_argument("--steps", type=int, default=500)
+    given = parser.parse_args()
     print(f"{'robot':<10}{'task':<10}{'way':<16}{'observations':<18}rewards")
     for robot, task in arc_suite.ALL_TASKS:
-        ways = {"single": single(robot, task)}
-        ways |= {f"row, threads={count}": row(robot, task, count) for count in threads}
-        for way, steps in ways.items():
-            found = digests(steps)
+        ways = {"single": single(robot, task, given.steps)}
+        ways |= {f"row, threads={count}": row(robot, task, count, given.steps) for count in given.threads}
+        for way, episode in ways.items():
+            found = digests(episode)
             print(f"{robot:<10}{task:<10}{way:<16}{found.observations:<18}{found.rewards}", flush=True)
 
 
