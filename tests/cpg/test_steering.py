@@ -64,25 +64,15 @@ def test_an_open_loop_does_not():
     assert abs(motion - COMMANDS).mean() > 0.2
 
 
-def test_rows_are_single_demonstrators():
-    rows, policy = VectorEnv("tick", "steer", 3), Demonstrator("tick", "steered")
-    single = arc_suite.load("tick", "steer")
-    alone = Demonstrator("tick", "steered")
+@pytest.mark.parametrize(
+    ("robot", "task", "preset", "steps"),
+    [("tick", "steer", "steered", 30), ("queen", "gaps", "surefooted", 60), ("queen", "gaps", "sighted", 60)],
+)
+def test_rows_are_single_demonstrators(robot, task, preset, steps):
+    rows, policy = VectorEnv(robot, task, 3), Demonstrator(robot, preset)
+    single, alone = arc_suite.load(robot, task), Demonstrator(robot, preset)
     observations, timestep = rows.reset(seed=4)[0], single.reset(5)
-    for step in range(30):
-        actions = policy.act({name: block.astype(float) for name, block in rows.task.split(observations).items()})
-        blocks = {name: block.astype(np.float32) for name, block in timestep.observation.items()}
-        assert_array_equal(actions[1], alone(timestep._replace(observation=blocks)), err_msg=f"step {step}")
-        observations, *_ = rows.step(actions)
-        timestep = single.step(actions[1])
-
-
-@pytest.mark.parametrize("preset", ["surefooted", "sighted"])
-def test_rows_over_trenches_are_single_demonstrators(preset):
-    rows, policy = VectorEnv("queen", "gaps", 3), Demonstrator("queen", preset)
-    single, alone = arc_suite.load("queen", "gaps"), Demonstrator("queen", preset)
-    observations, timestep = rows.reset(seed=4)[0], single.reset(5)
-    for step in range(60):
+    for step in range(steps):
         actions = policy.act({name: block.astype(float) for name, block in rows.task.split(observations).items()})
         blocks = {name: block.astype(np.float32) for name, block in timestep.observation.items()}
         assert_array_equal(actions[1], alone(timestep._replace(observation=blocks)), err_msg=f"step {step}")
