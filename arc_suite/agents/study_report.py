@@ -164,7 +164,7 @@ _IMPROVEMENT = (
     "at the latest step that both have reached. With one seed, episodes stand for runs: the interval then tells "
     "nothing of other seeds."
 )
-_STYLE = "Mean size over ten episodes of the latest policy of each seed: docs/style.md says what is measured."
+_STYLE = "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each."
 _CLAIMS = (
     "How far each sentence is from being false, in its own unit: above zero it holds. The paper's figure is from its "
     "final returns after 1,000,000 steps, where those tell. Ours are of finished runs alone, at the steps they have."
