@@ -20,6 +20,7 @@ flags.DEFINE_integer("columns", 4, "Views side by side.", lower_bound=1)
 flags.DEFINE_string("output", "docs/tasks.png", "File to write.", short_name="o")
 
 WIDTH, HEIGHT = 360, 270  # pixels of a view
+NEAR = ("walk", "steer", "shoved", "limp", "roam")  # seen from before, where arrows of the command show their length
 PRESETS = {"walk": "tuned", "steer": "steered", "gaps": "sighted", "navigate": "planned"}  # else surefooted
 
 
@@ -29,7 +30,7 @@ def view(task: str, robot: str) -> np.ndarray:
     policy = policies.policy("cpg", robot, PRESETS.get(task, "surefooted"), task=environment.task.definition)
     for _ in evaluation.rollout(environment, policy, 0, FLAGS.steps):
         pass
-    picture = environment.physics.render(HEIGHT, WIDTH, camera_id="portrait" if task == "walk" else "tracking")
+    picture = environment.physics.render(HEIGHT, WIDTH, camera_id="portrait" if task in NEAR else "tracking")
     return films.captioned(picture, f"{task}: {robot}")
 
 

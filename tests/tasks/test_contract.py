@@ -131,7 +131,7 @@ class Counting(np.random.RandomState):
 
 
 @every_place_and_body
-@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("threads", [pytest.param(1, marks=pytest.mark.slow), 3])
 def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
     """Over several episodes, among rows that fall or stand still at other times."""
     settings = settings | {"time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}
