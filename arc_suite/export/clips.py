@@ -1,6 +1,7 @@
 """Animation clips: named motions of one body, which loop and stay in step with one another."""
 
 import collections
+import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from arc_suite.envs.dm import load
 from arc_suite.export import motions
 from arc_suite.export.footfalls import TOUCH_DOWN, Footfall, footfalls, sole_heights
 from arc_suite.export.idle import idle
-from arc_suite.export.motions import Motion
+from arc_suite.export.motions import Motion, Stretch
 from arc_suite.export.recordings import Recording, record
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import policy as named_policy
@@ -24,7 +25,8 @@ from arc_suite.simulation.model import compiled
 FPS = 60
 
 _SETTLE = 200  # control steps, after which starts and changes of command are forgotten
-_RECORDED = 300  # control steps: longer than the longest loop of any body, by some cycles to choose from
+_WALKED = 700  # control steps: most of an episode, as the speed of feet that slip takes that long to be known
+_STEERED = 300  # control steps: longer than the longest loop of any body, by some cycles to choose from
 _BEFORE_STOP, _AFTER_STOP = 3, 5  # gait cycles of a recorded stop, before and after the command
 _STOPPING = 3  # gait cycles of the clip
 
@@ -99,10 +101,11 @@ def clips(
 ) -> list[Clip]:
     """Make clips of a body.
 
-    All loops hold the same number of gait cycles, the least with which every pose returns within half a degree, or
-    the one that comes nearest to it; they begin as the first leg that steps in all of them touches down. A clip has
-    the whole number of frames that comes nearest to the rate, evenly over its duration. Soles in stance lie at 0
-    in the median.
+    All loops hold the same number of gait cycles: the least with which every pose returns within half a degree and
+    every root goes as fast as its walk does on the mean, to 1 %; where there is none, the least with which poses
+    return, or the one that comes nearest to it. Loops begin as the first leg that steps in all of them touches down.
+    A clip has the whole number of frames that comes nearest to the rate, evenly over its duration. Soles in stance
+    lie at 0 in the median.
 
     Args:
         body: any body.
@@ -174,7 +177,7 @@ def _taken(body: Body, shot: Shot, policy, preset, task, task_kwargs) -> _Take:
         environment = load(body, task, {"random": 0, **(task_kwargs or {})})
         name, chosen = "cpg" if shot.preset else policy, shot.preset or preset
         actor = named_policy(name, body, chosen, task=environment.task.definition)
-        recording = record(environment, actor, _SETTLE, _RECORDED)
+        recording = record(environment, actor, _SETTLE, _WALKED)
         cycle = motions.period(recording)
         if cycle is None:
             seconds = len(recording.qpos) * recording.step / 2.0
@@ -184,7 +187,7 @@ def _taken(body: Body, shot: Shot, policy, preset, task, task_kwargs) -> _Take:
     # It walks by the task's clock; some bodies take every other stride differently.
     cycle = 1.0 / environment.task.definition.parameters.gait_frequency
     if not shot.stops:
-        return _Take(record(environment, actor, _SETTLE, _RECORDED, [(0, shot.command)]), cycle)
+        return _Take(record(environment, actor, _SETTLE, _STEERED, [(0, shot.command)]), cycle)
     before, after = (round(cycles * cycle / environment.control_timestep()) for cycles in (_BEFORE_STOP, _AFTER_STOP))
     commands = [(0, shot.command), (_SETTLE + before, (0.0, 0.0, 0.0))]
     return _Take(record(environment, actor, _SETTLE, before + after, commands), cycle, before * SUBSTEPS)
@@ -193,21 +196,27 @@ def _taken(body: Body, shot: Shot, policy, preset, task, task_kwargs) -> _Take:
 def _loops(body: Body, takes: Mapping[str, _Take]) -> dict[str, _Draft]:
     """Return the loops among recordings, with the same number of cycles in all of them."""
     takes = {name: take for name, take in takes.items() if take.stop is None}
+    if not takes:
+        return {}
     closings = {name: motions.closings(take.recording, take.cycle) for name, take in takes.items()}
-    common = set.intersection(*map(set, closings.values())) if closings else set()
-    worst = {cycles: max(closing[cycles].seam for closing in closings.values()) for cycles in sorted(common)}
-    cycles = next((cycles for cycles, seam in worst.items() if seam <= motions.CLOSED), None)
-    if cycles is None and worst:
-        cycles = min(worst, key=worst.get)
+    common = sorted(set.intersection(*map(set, closings.values())))
+    worst = {cycles: max(closing[cycles].seam for closing in closings.values()) for cycles in common}
+    closed = [cycles for cycles in common if worst[cycles] <= motions.CLOSED] or [min(common, key=worst.get)]
     for name, closing in closings.items():
-        seam = closing[cycles].seam if cycles else np.inf
+        cycles, seam = closed[0], closing[closed[0]].seam
         if seam > motions.OPEN:
             raise ValueError(
                 f"{body.name}, clip {name}: the pose does not return within {np.degrees(motions.OPEN):.0f} degrees: "
                 f"{np.degrees(seam):.1f} after {cycles} cycles"
             )
+
+    @functools.cache
+    def chosen(cycles: int) -> dict[str, Stretch]:
+        return {name: motions.usual(take.recording, closings[name][cycles].samples) for name, take in takes.items()}
+
+    cycles = next((some for some in closed if all(each.usual for each in chosen(some).values())), closed[0])
     return {
-        name: _Draft(motions.loop(take.recording, closings[name][cycles]), True, cycles, take.cycle)
+        name: _Draft(motions.loop(take.recording, chosen(cycles)[name]), True, cycles, take.cycle)
         for name, take in takes.items()
     }
 

@@ -19,7 +19,9 @@ OPEN = np.radians(2.0)  # a seam that is none
 MOST_CYCLES = 12  # of a loop
 
 _RETURNED = 0.3  # of the largest distance between two poses: a cycle later the distance is less
+_USUAL = 0.01  # by which share a loop's speed may differ from the walk's
 _SPEED = 100.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
+_TRIED = 200  # loops that are chosen among, at most about
 _STRIDE = 5  # substeps: every so many poses are compared in the search for the cycle
 
 
@@ -117,21 +119,19 @@ def period(recording: Recording) -> float | None:
 
 
 class Closing(NamedTuple):
-    """A part of a recording that can be a loop.
+    """How well a recording closes to loops of one length.
 
     Attributes:
-        seam: rad, by which the pose has not returned.
-        first: sample with which it begins.
-        samples: of it; the sample after the last is the first one again.
+        seam: rad, by which the pose has not returned in the best of them.
+        samples: of a loop; the sample after the last is the first one again.
     """
 
     seam: float
-    first: int
     samples: int
 
 
 def closings(recording: Recording, cycle: float) -> Mapping[int, Closing]:
-    """Return the loops of a recording by their number of cycles.
+    """Return how a recording closes, by the number of cycles.
 
     Args:
         recording: with some cycles more than the longest loop.
@@ -140,46 +140,79 @@ def closings(recording: Recording, cycle: float) -> Mapping[int, Closing]:
     found = {}
     for cycles in range(1, MOST_CYCLES + 1):
         length = cycles * cycle / recording.step / SUBSTEPS
-        candidates = {SUBSTEPS * int(np.floor(length)), SUBSTEPS * int(np.ceil(length))}
-        loops = [closing(recording, samples) for samples in candidates if 0 < samples < len(recording.qpos)]
+        lengths = {SUBSTEPS * int(np.floor(length)), SUBSTEPS * int(np.ceil(length))}
+        loops = [
+            Closing(float(_seams(recording.qpos[:-samples], recording.qpos[samples:]).min()), samples)
+            for samples in lengths
+            if 0 < samples < len(recording.qpos)
+        ]
         if loops:
             found[cycles] = min(loops)
     return found
 
 
-def closing(recording: Recording, samples: int) -> Closing:
-    """Return the loop of a number of samples that closes, and of those the one that goes most as all do on the mean.
+class Stretch(NamedTuple):
+    """A part of a recording that can be a loop.
 
-    Where none closes it is the one that comes nearest to it.
+    Attributes:
+        first: sample with which it begins.
+        samples: of it; the sample after the last is the first one again.
+        usual: whether its root goes as fast as that of the whole recording does on the mean, to 1 %.
     """
-    qpos = recording.qpos
-    apart = abs(qpos[samples:, 7:] - qpos[:-samples, 7:]).max(axis=-1)
-    vertical = rotations.matrix(qpos[:, 3:7])[:, 2]  # as the torso sees it
-    tilt = np.linalg.norm(vertical[samples:] - vertical[:-samples], axis=-1)  # of two unit vectors: nearly the angle
-    seams = np.maximum(apart, tilt)
-    place = _places(qpos)
-    ways = logarithm(relative(place[:-samples], place[samples:]))
-    speed, astray = np.hypot(ways[:, 0], ways[:, 1]), abs(ways - ways.mean(axis=0))
-    miss = _SPEED * abs(speed - speed.mean()) + astray[:, 1] + qpos[:, 2].mean() * astray[:, 2]
-    first = int(np.where(seams <= CLOSED, miss, np.inf).argmin() if seams.min() <= CLOSED else seams.argmin())
-    return Closing(float(seams[first]), first, samples)
+
+    first: int
+    samples: int
+    usual: bool
 
 
-def loop(recording: Recording, closing: Closing) -> Motion:
+def usual(recording: Recording, samples: int) -> Stretch:
+    """Return the loop of a number of samples that goes most as all do on the mean, of those that close.
+
+    It is judged by the way of its root: the torso's own depends on where in its sway the loop begins. Where none closes
+    it is the loop that comes nearest to it.
+    """
+    place = _places(recording.qpos)
+    mean = logarithm(relative(place[:-samples], place[samples:]))
+    speed, (_, left, turning) = np.hypot(mean[:, 0], mean[:, 1]).mean(), mean.mean(axis=0)
+    seams = _seams(recording.qpos[:-samples], recording.qpos[samples:])
+    firsts = np.flatnonzero(seams <= max(CLOSED, seams.min()))
+    firsts = firsts[:: -(-len(firsts) // _TRIED)]
+    ways = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
+    wrong = abs(np.hypot(ways[:, 0], ways[:, 1]) - speed)
+    astray = abs(ways[:, 1] - left) + recording.qpos[:, 2].mean() * abs(ways[:, 2] - turning)
+    best = (_SPEED * wrong + astray).argmin()
+    return Stretch(int(firsts[best]), samples, bool(wrong[best] <= _USUAL * speed))
+
+
+def loop(recording: Recording, stretch: Stretch) -> Motion:
     """Return a part of a recording as a loop: a root of constant velocity, and a pose that returns exactly."""
-    samples = closing.samples
-    qpos = recording.qpos[closing.first : closing.first + samples + 1]
-    seconds, times = samples * recording.step, recording.step * np.arange(samples + 1)
-    place = _places(qpos)
+    qpos = recording.qpos[stretch.first : stretch.first + stretch.samples + 1]
+    way, local = _rooted(_places(qpos))
+    root = along(way, np.linspace(0.0, 1.0, len(qpos)))
+    motion = _mended(_on_root(recording, qpos, root, local))
+    return motion._replace(twist=way / motion.seconds, seam=float(_seams(qpos[:1], qpos[-1:])[0]))
+
+
+def _seams(before, later) -> np.ndarray:
+    """Return by how much poses (n, nq) differ: the largest angle (n,) of a joint's or the torso's tilt, rad."""
+    apart = abs(later[:, 7:] - before[:, 7:]).max(axis=-1)
+    # Of two unit vectors, the vertical as the torso sees it: nearly the angle between them.
+    tilt = rotations.matrix(later[:, 3:7])[:, 2] - rotations.matrix(before[:, 3:7])[:, 2]
+    return np.maximum(apart, np.linalg.norm(tilt, axis=-1))
+
+
+def _rooted(place) -> tuple[np.ndarray, np.ndarray]:
+    """Return the way (3,) of a loop's root, and where the torso is (samples, 3) in its frame, seen from above.
+
+    The root runs below the middle of the torso's way, and heads as the torso does on the mean.
+
+    Args:
+        place: (samples, 3) of the torso in the world, both ends included.
+    """
     place = relative(place[0], place)
-    twist = logarithm(place[-1]) / seconds
-    local = relative(along(twist, times), place)
-    # The root runs below the middle of the torso's way, and heads as the torso does on the mean.
+    local = relative(along(logarithm(place[-1]), np.linspace(0.0, 1.0, len(place))), place)
     centre = local[:-1].mean(axis=0)
-    local = relative(centre, local)
-    twist = logarithm(relative(centre, after(place[-1], centre))) / seconds
-    motion = _on_root(recording, qpos, along(twist, times), local)
-    return _mended(motion)._replace(twist=twist, seam=closing.seam)
+    return logarithm(relative(centre, after(place[-1], centre))), relative(centre, local)
 
 
 def passage(recording: Recording, first: int, samples: int, window: int) -> Motion:

@@ -1,5 +1,7 @@
 """Motions: places on the ground, loops of synthetic walks whose truth is known."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ STEP, CYCLE = 0.002, 0.55  # s; a cycle is 11 control steps
 TWISTS = [(0.5, 0.0, 0.0), (0.4, -0.1, 0.8), (0.0, 0.2, -0.5), (-0.3, 0.0, 1e-12)]
 
 
+@functools.cache
 def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
     """Two joints and a torso that sway once a cycle on a path of constant twist."""
     times = STEP * np.arange(round(seconds / STEP) + 1)
@@ -61,7 +64,7 @@ def test_a_loop(twist):
     recording = walk(twist)
     closing = motions.closings(recording, CYCLE)[1]
     assert closing.samples == 275 and closing.seam < 1e-9
-    loop = motions.loop(recording, closing._replace(first=137))
+    loop = motions.loop(recording, motions.Stretch(137, closing.samples, True))
     assert loop.seconds == pytest.approx(CYCLE)
     np.testing.assert_allclose(loop.twist[2], twist[2], atol=1e-9)
     assert np.hypot(*loop.twist[:2]) == pytest.approx(np.hypot(*twist[:2]), rel=0.02)
@@ -82,8 +85,9 @@ def test_a_loop(twist):
 
 def test_a_seam_is_spread():
     recording = walk(TWISTS[1], drift=0.02)
-    assert motions.closing(recording, 275).seam == pytest.approx(0.02 * CYCLE, rel=0.01)
-    loop = motions.loop(recording, motions.Closing(0.0, 10, 275))
+    loop = motions.loop(recording, motions.Stretch(10, 275, True))
+    assert loop.seam == pytest.approx(0.02 * CYCLE, rel=0.01)
+    assert motions.closings(recording, CYCLE)[1] == pytest.approx((loop.seam, 275))
     assert (loop.joints[0] == loop.joints[-1]).all() and (loop.quaternions[0] == loop.quaternions[-1]).all()
     correction = loop.joints[:, 1] - recording.qpos[10:286, 8]
     np.testing.assert_allclose(np.diff(correction)[:-1], -0.02 * STEP, atol=1e-12)
@@ -91,23 +95,41 @@ def test_a_seam_is_spread():
     assert jumps[[0, -1]].max() < 1.2 * np.median(jumps) + 1e-3
 
 
-def test_of_the_loops_that_close_the_usual_one_is_taken():
-    recording = walk(TWISTS[0], seconds=4 * CYCLE)
+@pytest.mark.parametrize("twist", TWISTS[:3])
+def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
+    """Of four cycles the last leads further: a loop of the first three goes as fast as the walk does on the mean."""
+    recording = walk(twist, seconds=4 * CYCLE)
     qpos = recording.qpos.copy()
-    qpos[825:, 0] += 0.02 * np.cos(2.5) * np.arange(276) / 275.0  # the last cycle leads further
-    qpos[825:, 1] += 0.02 * np.sin(2.5) * np.arange(276) / 275.0
-    assert motions.closing(Recording(STEP, qpos), 275).first < 600
+    qpos[825:, :2] += np.outer(np.arange(276) / 275.0, 0.3 * (qpos[-1, :2] - qpos[825, :2]))
+    stretch = motions.usual(Recording(STEP, qpos), 275)
+    assert stretch.first < 600 and stretch.samples == 275
+    speed = np.hypot(*motions.loop(Recording(STEP, qpos), stretch).twist[:2])
+    mean = np.hypot(*twist[:2])
+    assert mean < speed < 1.3 * mean
+    assert motions.usual(recording, 275).usual
+
+
+def test_a_loop_that_is_the_only_one_to_close_need_not_be_usual():
+    """Two cycles, of which the first is slower and the second one's pose returns."""
+    recording = walk(TWISTS[0], seconds=2 * CYCLE)
+    qpos = recording.qpos.copy()
+    qpos[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)
+    qpos[275:, 0] += 0.05 * np.cos(2.5) * np.arange(276) / 275.0
+    qpos[275:, 1] += 0.05 * np.sin(2.5) * np.arange(276) / 275.0
+    stretch = motions.usual(Recording(STEP, qpos), 275)
+    assert not stretch.usual
+    assert motions.loop(Recording(STEP, qpos), stretch).seam <= motions.CLOSED
 
 
 def test_beginning_elsewhere_is_the_same_loop():
-    loop = motions.loop(walk(TWISTS[1]), motions.Closing(0.0, 10, 275))
+    loop = motions.loop(walk(TWISTS[1]), motions.Stretch(10, 275, True))
     begun = loop.begun(100)
     assert (begun.joints[0] == loop.joints[100]).all() and (begun.joints[-1] == begun.joints[0]).all()
     np.testing.assert_array_equal(np.sort(begun.joints[:-1], axis=0), np.sort(loop.joints[:-1], axis=0))
 
 
 def test_frames_lie_between_samples():
-    loop = motions.loop(walk(TWISTS[1]), motions.Closing(0.0, 10, 275))
+    loop = motions.loop(walk(TWISTS[1]), motions.Stretch(10, 275, True))
     frames = loop.at(np.linspace(0.0, loop.seconds, 34))
     assert (frames.joints[0] == loop.joints[0]).all() and (frames.joints[-1] == loop.joints[-1]).all()
     place = loop.seconds / 33.0 / STEP
