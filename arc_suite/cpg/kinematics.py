@@ -39,8 +39,13 @@ class Legs(NamedTuple):
     high: np.ndarray
 
     @classmethod
-    def of(cls, body: Body) -> Self:
-        """Return the legs of a body."""
+    def of(cls, body: Body, used: float = _USED) -> Self:
+        """Return the legs of a body.
+
+        Args:
+            body: any body.
+            used: share of a joint's range, about its middle, that targets may use.
+        """
         shape = (len(body.legs), max(len(leg.links) for leg in body.legs))
         axes, ends, joints = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape, int)
         moves, low, high, count = np.zeros(shape, bool), np.zeros(shape), np.zeros(shape), 0
@@ -51,7 +56,7 @@ class Legs(NamedTuple):
                     axes[i, j] = np.array(link.joint.axis) / np.linalg.norm(link.joint.axis)
                     joints[i, j], moves[i, j] = count, True
                     first, last = np.radians(link.joint.range_deg)
-                    spare = 0.5 * (1.0 - _USED) * (last - first)
+                    spare = 0.5 * (1.0 - used) * (last - first)
                     low[i, j], high[i, j] = first + spare, last - spare
                     count += 1
         mounts, radii = np.array([leg.mount for leg in body.legs]), np.array([leg.foot.radius for leg in body.legs])

@@ -139,7 +139,7 @@ def clips(
                 raise ValueError(f"{body.name}, clip {name}: {error}") from None
     drafts = _loops(body, takes) | {name: _stop(take) for name, take in takes.items() if take.stop is not None}
     if "idle" in names:
-        drafts["idle"] = _Draft(idle(model, body), True, 0)
+        drafts["idle"] = _Draft(idle(body), True, 0)
     drafts = _in_step(model, body, drafts)
     return [_framed(name, model, body, drafts[name], fps) for name in names]
 

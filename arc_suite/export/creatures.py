@@ -204,11 +204,10 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
         path = motion.root if moves else np.zeros((2, 3))
         own = times if moves else document.accessor(_float32(clip.times[[0, -1]]), bounds=True)
         ground = np.concatenate([path[:, :2], np.zeros((len(path), 1))], axis=-1)
-        upright = np.zeros((len(path), 4))
-        upright[:, 0], upright[:, 3] = np.cos(0.5 * path[:, 2]), np.sin(0.5 * path[:, 2])
+        heading = rotations.turned(np.array((1.0, 0.0, 0.0, 0.0)), path[:, 2])
         channels = [
             (root, "translation", own, document.accessor(_float32(ground[:, _AXES]))),
-            (root, "rotation", own, document.accessor(_turn(upright))),
+            (root, "rotation", own, document.accessor(_turn(heading))),
             *shared,
         ]
         document.add(

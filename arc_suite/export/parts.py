@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 
 from arc_suite import models
-from arc_suite.export.shapes import KINDS
+from arc_suite.models.standing import GEOMS
 from arc_suite.robots.spec import Body
 
-_KINDS = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name.upper()}")): name for name in KINDS}
+_KINDS = {int(geom): name for name, geom in GEOMS.items()}
 
 
 class Shape(NamedTuple):

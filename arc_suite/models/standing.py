@@ -9,7 +9,7 @@ import numpy as np
 
 from arc_suite.robots.spec import Ballast, Body
 
-_GEOMS = {
+GEOMS = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
     "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -97,7 +97,7 @@ def _model(body: Body) -> mujoco.MjModel:
     for solid in (*body.torso.solids, *body.ballast):
         weight = {"mass": solid.mass} if isinstance(solid, Ballast) else {"density": body.density}
         turn = [math.radians(angle) for angle in solid.euler_deg]
-        torso.add_geom(type=_GEOMS[solid.shape], size=solid.size, pos=solid.position, euler=turn, **weight)
+        torso.add_geom(type=GEOMS[solid.shape], size=solid.size, pos=solid.position, euler=turn, **weight)
     for leg in body.legs:
         parent, pos, yaw = torso, leg.mount, math.radians(leg.yaw_deg)
         for link in leg.links:
@@ -105,10 +105,10 @@ def _model(body: Body) -> mujoco.MjModel:
             if link.joint:
                 parent.add_joint(name=leg.full_name(link.joint), axis=link.joint.axis)
             ends = (0.0, 0.0, 0.0, *link.end)
-            parent.add_geom(type=_GEOMS["capsule"], fromto=ends, size=(link.radius,), density=body.density)
+            parent.add_geom(type=GEOMS["capsule"], fromto=ends, size=(link.radius,), density=body.density)
             pos, yaw = link.end, 0.0
         foot = parent.add_body(name=leg.full_name(leg.foot), pos=pos)
-        foot.add_geom(type=_GEOMS["sphere"], size=(leg.foot.radius,), density=body.density)
+        foot.add_geom(type=GEOMS["sphere"], size=(leg.foot.radius,), density=body.density)
     return spec.compile()
 
 
