@@ -20,7 +20,8 @@ MOST_CYCLES = 12  # of a loop
 
 _RETURNED = 0.3  # of the largest distance between two poses: a cycle later the distance is less
 _USUAL = 0.01  # by which share a loop's speed may differ from the walk's
-_SPEED = 100.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
+_SPEED = 10.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
+_NEAREST = 1.2  # times the least seam: where none closes, loops that are chosen among
 _TRIED = 200  # loops that are chosen among, at most about
 _STRIDE = 5  # substeps: every so many poses are compared in the search for the cycle
 
@@ -169,13 +170,13 @@ def usual(recording: Recording, samples: int) -> Stretch:
     """Return the loop of a number of samples that goes most as all do on the mean, of those that close.
 
     It is judged by the way of its root: the torso's own depends on where in its sway the loop begins. Where none closes
-    it is the loop that comes nearest to it.
+    it is one of those that come nearest to it.
     """
     place = _places(recording.qpos)
     mean = logarithm(relative(place[:-samples], place[samples:]))
     speed, (_, left, turning) = np.hypot(mean[:, 0], mean[:, 1]).mean(), mean.mean(axis=0)
     seams = _seams(recording.qpos[:-samples], recording.qpos[samples:])
-    firsts = np.flatnonzero(seams <= max(CLOSED, seams.min()))
+    firsts = np.flatnonzero(seams <= max(CLOSED, _NEAREST * seams.min()))
     firsts = firsts[:: -(-len(firsts) // _TRIED)]
     ways = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
     wrong = abs(np.hypot(ways[:, 0], ways[:, 1]) - speed)
