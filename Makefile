@@ -90,14 +90,13 @@ $(VIEWER): $(wildcard web/*)
 check-web: VENV := .venv-web
 check-web: setup.cfg $(VIEWER)
 	tools/ensure_venv.sh $(VENV)
-	tools/ensure_packages.sh chromium
+	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
 	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
 	$(VENV)/bin/python -m pytest tests/export/test_pages.py
 	$(VENV)/bin/python tests/engines/make_files.py $(ENGINES) few
 	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
 		--outfile=$(ENGINES)/loader.js --log-level=warning
 	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
-
 
 check-glb: $(INSTALLED)
 	mkdir -p .node-glb
@@ -114,6 +113,7 @@ check-blender: $(INSTALLED)
 	.venv-blender/bin/python tests/engines/blender.py $(ENGINES)
 
 check-godot: $(INSTALLED)
+	command -v godot3-server >/dev/null || tools/ensure_packages.sh godot3-server
 	$(PYTHON) tests/engines/make_files.py $(ENGINES) few
 	$(PYTHON) tests/engines/godot.py $(ENGINES)
 

@@ -18,9 +18,11 @@ FEW = ("walk", "turn_left", "idle")
 
 
 def main(folder: str, few: str = "") -> None:
-    """Write FOLDER/<body>-<rig>.glb, and beside it the places of all bones on every frame as .npz."""
+    """Write FOLDER/<body>-<rig>.glb, and beside it the places of all bones on every frame as .npz; old ones go."""
     out = pathlib.Path(folder)
     out.mkdir(parents=True, exist_ok=True)
+    for old in [*out.glob("*.glb"), *out.glob("*.npz")]:
+        old.unlink()
     bodies = dict(ROBOTS)
     if not few:
         examples = sorted(pathlib.Path("examples").glob("*.json"))
