@@ -4,6 +4,7 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 const WINDOW = 4; // s of footfalls
+const VIEW = (35 / 180) * Math.PI; // angle of the camera
 const INK = "#d7dde5", FAINT = "#8791a0", PALE = "#39424f", BLUE = "#3b9be0", VERMILION = "#f0713a";
 
 const byId = (id) => document.getElementById(id);
@@ -103,8 +104,11 @@ class Stage {
     const height = walk.height;
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color("#a3adb8");
-    this.scene.fog = new THREE.Fog("#a3adb8", 12 * height, 40 * height);
-    this.scene.add(this.creature.torso, new THREE.HemisphereLight("#dfe8f2", "#56606c", 1.6));
+    this.away = new THREE.Vector3(1.9, -2.6, 1.1).multiplyScalar(1.5 * walk.reach); // of the camera
+    const away = this.away.length(); // the ground is there for 12 heights about the way, a plane for more
+    this.scene.fog = new THREE.Fog("#a3adb8", away + 3 * height, away + (walk.scenery.level ? 34 : 11) * height);
+    this.marks = new Marks(walk.scenery);
+    this.scene.add(this.creature.torso, this.marks.group, new THREE.HemisphereLight("#dfe8f2", "#56606c", 1.6));
     this.sun = new THREE.DirectionalLight("#fff4e6", 2.4);
     this.sun.castShadow = true;
     this.sun.shadow.mapSize.set(1024, 1024);
@@ -112,7 +116,7 @@ class Stage {
     Object.assign(this.sun.shadow.camera, { left: -reach, right: reach, top: reach, bottom: -reach, far: 20 * reach });
     this.sun.shadow.normalBias = 0.01 * height;
     this.offset = new THREE.Vector3(-0.3, 0.5, 1.2).setLength(6 * reach);
-    this.scene.add(this.sun, this.sun.target, ...grounds(walk));
+    this.scene.add(this.sun, this.sun.target, ...surroundings(walk));
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
     this.renderer.shadowMap.enabled = true;
     this.renderer.setPixelRatio(window.devicePixelRatio);
@@ -123,19 +127,20 @@ class Stage {
     this.creature.seek(0);
     this.target = new THREE.Vector3();
     this.aim(this.target);
-    this.camera.position.copy(this.target).add(new THREE.Vector3(1.9, -2.6, 1.1).multiplyScalar(1.5 * walk.reach));
+    this.camera.position.copy(this.target).add(this.away);
     this.controls.target.copy(this.target);
     this.controls.update();
   }
 
   aim(target) {
     const { x, y, z } = this.creature.torso.position;
-    const height = this.creature.walk.terrain ? z - 0.5 * this.creature.walk.height : 0.45 * this.creature.walk.height;
-    return target.set(x, y, height);
+    const { height, scenery } = this.creature.walk;
+    return target.set(x, y, scenery.level ? 0.45 * height : z - 0.5 * height);
   }
 
   draw(time) {
     this.creature.seek(time);
+    this.marks.seek(this.creature.row(time));
     const before = this.target.clone();
     const way = this.aim(this.target).clone().sub(before);
     this.camera.position.add(way);
@@ -148,41 +153,108 @@ class Stage {
     if (size.x !== width || size.y !== height) {
       this.renderer.setSize(width, height, false);
       this.camera.aspect = width / height;
+      // In a narrow view the creature is as far from the sides as it is from top and bottom in a wide one.
+      this.camera.fov = 2 * Math.atan(Math.tan(VIEW / 2) * Math.max(1, height / width)) * (180 / Math.PI);
       this.camera.updateProjectionMatrix();
     }
     this.renderer.render(this.scene, this.camera);
   }
 }
 
-function grounds(walk) {
-  const surface = new THREE.MeshStandardMaterial({ color: "#5d6875", roughness: 0.95 });
-  if (walk.terrain) {
-    const { low, cell, heights } = walk.terrain;
-    const shape = new THREE.PlaneGeometry(1, 1, heights[0].length - 1, heights.length - 1);
-    const points = shape.attributes.position;
-    heights.forEach((row, j) =>
-      row.forEach((z, i) => points.setXYZ(j * row.length + i, low[0] + i * cell, low[1] + j * cell, z)),
-    );
-    shape.setIndex([...shape.index.array].reverse()); // rows run the other way than three.js has them
-    shape.computeVertexNormals();
-    const field = new THREE.Mesh(shape, surface);
-    const lines = new THREE.Mesh(shape, new THREE.MeshBasicMaterial({ color: "#3c4651", wireframe: true }));
-    field.receiveShadow = true;
-    return [field, lines];
-  }
-  const path = new THREE.Box2().setFromPoints(walk.positions.map(([x, y]) => new THREE.Vector2(x, y)));
-  const middle = path.getCenter(new THREE.Vector2()).divideScalar(walk.height).round().multiplyScalar(walk.height);
-  const cells = 2 * Math.ceil(Math.max(...path.getSize(new THREE.Vector2()).toArray()) / walk.height + 40);
-  surface.map = tiles(cells);
-  surface.color.set("#ffffff");
-  const floor = new THREE.Mesh(new THREE.PlaneGeometry(cells * walk.height, cells * walk.height), surface);
-  floor.position.set(middle.x, middle.y, 0);
-  floor.receiveShadow = true;
-  return [floor];
+// What is around the creature: floors and steps with tiles on them, fields, obstacles.
+function surroundings({ scenery, height, positions }) {
+  const floor = tiles();
+  const material = (shade) =>
+    new THREE.MeshStandardMaterial({ map: floor, color: new THREE.Color().setScalar(shade), roughness: 0.95 });
+  const ground = (shape, shade, [x, y, z] = [0, 0, 0]) => {
+    const places = shape.attributes.position;
+    const tile = Array.from({ length: places.count }, (_, index) => [places.getX(index) + x, places.getY(index) + y]);
+    shape.setAttribute("uv", new THREE.Float32BufferAttribute(tile.flat().map((way) => way / height), 2));
+    const mesh = new THREE.Mesh(shape, material(shade));
+    mesh.position.set(x, y, z);
+    mesh.receiveShadow = true;
+    return mesh;
+  };
+  const path = new THREE.Box2().setFromPoints(positions.map(([x, y]) => new THREE.Vector2(x, y)));
+  const middle = path.getCenter(new THREE.Vector2()).divideScalar(height).round().multiplyScalar(height);
+  const width = (Math.max(...path.getSize(new THREE.Vector2()).toArray()) / height + 80) * height;
+  const solid = ({ kind, size, place, colour, shade }) => {
+    if (!colour) return ground(geometry({ kind, size }), shade, place);
+    const look = new THREE.Color().setRGB(...colour, THREE.SRGBColorSpace);
+    const mesh = new THREE.Mesh(geometry({ kind, size }), new THREE.MeshStandardMaterial({ color: look }));
+    mesh.position.set(...place);
+    mesh.castShadow = mesh.receiveShadow = true;
+    return mesh;
+  };
+  return [
+    ...scenery.planes.map((z) => ground(new THREE.PlaneGeometry(width, width), 1, [middle.x, middle.y, z])),
+    ...scenery.fields.map((field) => ground(triangles(field), 1)),
+    ...scenery.solids.map(solid),
+  ];
 }
 
-// A floor of square tiles, which makes motion over it visible.
-function tiles(count) {
+// A height field, in whose cells MuJoCo's triangles meet from the corner of lowest to that of highest x and y.
+function triangles({ low, cell, heights }) {
+  const columns = heights[0].length;
+  const points = heights.flatMap((row, j) => row.flatMap((z, i) => [low[0] + i * cell[0], low[1] + j * cell[1], z]));
+  const corners = heights.slice(1).flatMap((_, j) =>
+    heights[0].slice(1).flatMap((_, i) => {
+      const first = j * columns + i;
+      const last = first + columns + 1;
+      return [first, first + 1, last, first, last, last - 1];
+    }),
+  );
+  const shape = new THREE.BufferGeometry().setIndex(corners);
+  shape.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
+  shape.computeVertexNormals();
+  return shape;
+}
+
+// What the task asks for: arrows and discs, one mesh for each style.
+class Marks {
+  constructor({ styles, marks }) {
+    this.rows = marks;
+    this.group = new THREE.Group();
+    this.shown = styles.map(({ shape, radius, colour: [red, green, blue, alpha] }) => {
+      const look = new THREE.MeshStandardMaterial({ transparent: alpha < 1, opacity: alpha });
+      look.color.setRGB(red, green, blue, THREE.SRGBColorSpace);
+      const shaft = new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, 1, 32).translate(0, 0.5, 0), look);
+      const mark = new THREE.Group().add(shaft);
+      if (shape === "arrow") mark.add(new THREE.Mesh(new THREE.ConeGeometry(2 * radius, 1, 24).translate(0, 0.5, 0), look));
+      mark.userData.head = 4 * radius;
+      this.group.add(mark);
+      return mark;
+    });
+  }
+
+  seek({ before, after, share }) {
+    for (const mark of this.shown) mark.visible = false;
+    const next = this.rows[after] ?? [];
+    for (const [style, ...ends] of this.rows[before] ?? []) {
+      const same = next.find(([other]) => other === style);
+      // A goal that is reached gives way to the next at once; what goes along with the body does so between rows.
+      const moves = same && ends.every((value, index) => Math.abs(same[index + 1] - value) < this.shown[style].userData.head);
+      const [x, y, z, ...tip] = moves ? ends.map((value, index) => (1 - share) * value + share * same[index + 1]) : ends;
+      this.place(this.shown[style], new THREE.Vector3(x, y, z), new THREE.Vector3(...tip));
+    }
+  }
+
+  place(mark, start, end) {
+    const way = end.clone().sub(start), length = way.length();
+    mark.visible = length > 0;
+    mark.position.copy(start);
+    mark.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), way.normalize());
+    const [shaft, cone] = mark.children;
+    const head = cone ? Math.min(mark.userData.head, length) : 0;
+    shaft.scale.y = Math.max(length - head, 1e-6);
+    if (!cone) return;
+    cone.position.y = length - head;
+    cone.scale.y = Math.max(head, 1e-6);
+  }
+}
+
+// A square tile, which makes motion over the ground visible.
+function tiles() {
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = 128;
   const pen = canvas.getContext("2d");
@@ -193,7 +265,6 @@ function tiles(count) {
   const texture = new THREE.CanvasTexture(canvas);
   texture.colorSpace = THREE.SRGBColorSpace;
   texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
-  texture.repeat.set(count, count);
   texture.anisotropy = 8;
   return texture;
 }
@@ -213,7 +284,7 @@ function sized(canvas) {
   return { pen, width, height };
 }
 
-const LEFT = 58; // px, for names of legs
+const LEFT = 58, RIGHT = 150; // px, for names of legs and for terms
 
 // Bars of stance by leg on the prescribed schedule, some seconds about the cursor.
 function drawGait(canvas, walk, time) {
@@ -241,13 +312,10 @@ function drawGait(canvas, walk, time) {
 }
 
 // Weighted terms of the reward, gains stacked upwards and costs downwards, with their values at the cursor.
-function drawReward(canvas, walk, time, row) {
+function drawReward(canvas, walk, time, row, [bottom, top]) {
   const { pen, width, height } = sized(canvas);
   const names = Object.keys(walk.terms), count = walk.positions.length;
-  const right = 150, scale = (width - LEFT - right) / count;
-  const ups = walk.totals.map((_, k) => names.reduce((sum, name) => sum + Math.max(0, walk.terms[name][k]), 0));
-  const downs = walk.totals.map((_, k) => names.reduce((sum, name) => sum + Math.min(0, walk.terms[name][k]), 0));
-  const top = Math.max(...ups, 1e-9), bottom = Math.min(...downs, 0);
+  const scale = (width - LEFT - RIGHT) / count;
   const y = (value) => 6 + ((top - value) / (top - bottom)) * (height - 12);
   for (let k = 0; k < count; k += 1) {
     let up = 0, down = 0;
@@ -260,20 +328,28 @@ function drawReward(canvas, walk, time, row) {
     }
   }
   pen.fillStyle = INK;
-  for (const value of [0, Math.floor(top)]) pen.fillText(value.toFixed(0), LEFT - 18, y(value));
-  pen.fillText("reward", 4, 10);
+  pen.textAlign = "right";
+  for (const value of [0, Math.floor(top)]) pen.fillText(value.toFixed(0), LEFT - 6, y(value));
+  pen.textAlign = "left";
+  pen.fillText("reward", 4, height / 2);
   pen.fillStyle = "#ffffff";
   pen.fillRect(LEFT + Math.min(time / walk.step, count) * scale - 0.5, 0, 1, height);
   names.forEach((name, index) => {
     const line = 8 + (index * (height - 16)) / Math.max(names.length - 1, 1);
     pen.fillStyle = walk.colours[name];
-    pen.fillRect(width - right + 8, line - 4, 8, 8);
+    pen.fillRect(width - RIGHT + 8, line - 4, 8, 8);
     pen.fillStyle = INK;
-    pen.fillText(name.replaceAll("_", " "), width - right + 20, line);
+    pen.fillText(name.replaceAll("_", " "), width - RIGHT + 20, line);
     pen.textAlign = "right";
-    pen.fillText(walk.terms[name][row].toFixed(2), width - 4, line);
+    pen.fillText(walk.terms[name][row].toFixed(2).replace(/^-(?=0.00$)/, ""), width - 4, line);
     pen.textAlign = "left";
   });
+}
+
+// The least and the greatest of what costs and gains add up to in any step.
+function extent(walk) {
+  const sums = (part) => walk.totals.map((_, k) => Object.values(walk.terms).reduce((sum, term) => sum + part(0, term[k]), 0));
+  return [Math.min(...sums(Math.min), 0), Math.max(...sums(Math.max), 1e-9)];
 }
 
 function column(walk) {
@@ -292,6 +368,8 @@ async function main() {
   const columns = walks.map(column);
   for (const each of columns) each.stage = new Stage(each.walk, each.view);
   const seconds = Math.max(...walks.map((walk) => walk.step * walk.positions.length));
+  const extents = walks.map(extent); // one scale, so that walks can be compared
+  const scale = [Math.min(...extents.map(([low]) => low)), Math.max(...extents.map(([, high]) => high))];
   const finest = Math.min(...walks.map((walk) => walk.step));
   const state = { time: 0, speed: 1, playing: true };
   const slider = byId("time"), speeds = byId("speed"), button = byId("play");
@@ -305,7 +383,7 @@ async function main() {
       stage.draw(time);
       const row = Math.round(stage.creature.row(time).before + stage.creature.row(time).share);
       if (gait) drawGait(gait, walk, time);
-      drawReward(reward, walk, time, row);
+      drawReward(reward, walk, time, row, scale);
       const earned = walk.totals[row];
       title.textContent = `${walk.label}: return ${earned.toFixed(1)} in ${row + 1} steps`;
     }
@@ -353,7 +431,7 @@ async function main() {
     const clicked = (canvas, toTime) =>
       canvas?.addEventListener("click", (event) => seek(toTime(event.offsetX, canvas.clientWidth)));
     clicked(gait, (x, width) => state.time + ((x - LEFT) / (width - LEFT - 8) - 0.5) * WINDOW);
-    clicked(reward, (x, width) => ((x - LEFT) / (width - LEFT - 150)) * walk.step * walk.positions.length);
+    clicked(reward, (x, width) => ((x - LEFT) / (width - LEFT - RIGHT)) * walk.step * walk.positions.length);
   }
 
   let last = null, stale = true; // a page at rest draws only what changes

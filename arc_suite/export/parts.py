@@ -9,7 +9,8 @@ from arc_suite import models
 from arc_suite.models.standing import GEOMS
 from arc_suite.robots.spec import Body
 
-_KINDS = {int(geom): name for name, geom in GEOMS.items()}
+# Kinds of shapes by MuJoCo's number.
+KINDS = {int(geom): name for name, geom in GEOMS.items()}
 
 
 class Shape(NamedTuple):
@@ -93,7 +94,7 @@ def _part(model: mujoco.MjModel, index: int, ids: list[int]) -> Part:
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
     return Shape(
-        kind=_KINDS[int(model.geom_type[geom])],
+        kind=KINDS[int(model.geom_type[geom])],
         size=model.geom_size[geom],
         place=model.geom_pos[geom],
         quaternion=model.geom_quat[geom],

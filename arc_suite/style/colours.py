@@ -1,5 +1,8 @@
 """Colours of pictures, Okabe and Ito's and Tol's, told apart by colour-blind eyes too."""
 
+import itertools
+from collections.abc import Iterable
+
 BLUE, VERMILION = "#0072B2", "#D55E00"
 INK, FAINT, PALE = "#333333", "#8C8C8C", "#E3E3E3"
 TERM_COLOURS = {
@@ -14,3 +17,11 @@ TERM_COLOURS = {
     "vertical_velocity": "#332288",
     "posture": "#999933",
 }
+_SPARE = ("#44AA99", "#AA4499", "#DDCC77", "#6699CC")
+
+
+def of_terms(names: Iterable[str]) -> dict[str, str]:
+    """Return colours of a reward's terms by name; those that have none of their own get what others have not."""
+    names = list(names)
+    free = itertools.cycle([*(colour for name, colour in TERM_COLOURS.items() if name not in names), *_SPARE])
+    return {name: TERM_COLOURS.get(name) or next(free) for name in names}

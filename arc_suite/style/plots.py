@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from arc_suite.style import metrics
-from arc_suite.style.colours import BLUE, FAINT, INK, PALE, TERM_COLOURS, VERMILION
+from arc_suite.style.colours import BLUE, FAINT, INK, PALE, VERMILION, of_terms
 from arc_suite.style.tracks import Track
 
 _LOOK = {
@@ -118,7 +118,7 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
                     track.times,
                     floor,
                     ceiling,
-                    facecolor=TERM_COLOURS.get(name, FAINT),
+                    facecolor=of_terms(weighted)[name],
                     linewidth=0,
                     label=f"{weighted[name].mean():+.3f}  {name.replace('_', ' ')}",
                 )

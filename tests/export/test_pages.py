@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import arc_suite
-from arc_suite.export import pages
+from arc_suite.export import pages, scenery
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
@@ -59,19 +59,62 @@ def test_a_page_holds_the_tracks(bundle, tracks):
     np.testing.assert_allclose(np.sum(list(first["terms"].values()), axis=0), track.rewards, atol=1e-5)
     assert first["totals"][-1] == pytest.approx(track.rewards.sum(), abs=1e-5)
     assert first["terms"].keys() == first["colours"].keys() and len(set(first["colours"].values())) == 10
-    assert first["terrain"] is None
+    assert first["scenery"] == {"level": True, "planes": [0.0], "fields": [], "solids": [], "styles": [], "marks": []}
     assert pages.page(tracks) == page
 
 
-def test_the_ground_of_an_uneven_arena_comes_along(bundle):
-    environment = arc_suite.load("tick", "steer", {"random": 0, "arena": "bumps"})
-    (walk,) = walks_of(pages.page({"tick": record(environment, policy("cpg", "tick", "steered"), 0, 5)}))
-    terrain, arena = walk["terrain"], environment.task.definition.scene.arena
-    rows, columns = np.shape(terrain["heights"])
-    x, y = terrain["low"][0] + terrain["cell"] * (columns // 2), terrain["low"][1] + terrain["cell"] * (rows // 3)
-    assert terrain["heights"][rows // 3][columns // 2] == pytest.approx(
-        arena.height(np.array(x), np.array(y)), abs=1e-4
+def scenery_of(task, settings, steps):
+    """The scenery of an episode, and the environment where it ended."""
+    environment = arc_suite.load("tick", task, {"random": 0, **settings})
+    track = record(environment, policy("cpg", "tick", "steered"), 3, steps)
+    return scenery.scenery(track), environment
+
+
+def test_the_ground_of_an_uneven_arena_comes_along():
+    found, environment = scenery_of("steer", {"arena": "bumps"}, 2)
+    (field,), arena = found["fields"], environment.task.definition.scene.arena
+    rows, columns = field["heights"].shape
+    x, y = (
+        low + cell * np.arange(count)
+        for low, cell, count in zip(field["low"], field["cell"], (columns, rows), strict=True)
     )
+    np.testing.assert_allclose(field["heights"], arena.height(*np.meshgrid(x, y)), atol=1e-6)
+    assert not found["level"] and not found["planes"] and not found["solids"]
+    assert x[0] < -2.0 < 2.0 < x[-1] and np.ptp(field["heights"]) > 0.01
+
+
+def test_steps_come_along():
+    found, environment = scenery_of("stairs", {}, 2)
+    place, arena = environment.physics.data.qpos[:2], environment.task.definition.scene.arena
+    unit = ROBOTS["tick"].torso.standing_height
+    x, y = (place + np.random.default_rng(0).uniform((-3.0, -5.0), (10.0, 5.0), (500, 2)) * unit).T
+    heights = np.full(500, -np.inf)
+    for solid in found["solids"]:
+        (half_x, half_y, half_z), (at_x, at_y, at_z) = solid["size"], solid["place"]
+        over = (abs(x - at_x) <= half_x) & (abs(y - at_y) <= half_y)
+        heights = np.where(over, np.maximum(heights, at_z + half_z), heights)
+    np.testing.assert_allclose(heights, arena.height(x, y), atol=1e-9)
+    assert np.ptp(heights) > 0.1 * unit
+
+
+def test_obstacles_and_goals_come_along():
+    found, environment = scenery_of("navigate", {}, 12)
+    data, run = environment.physics.data, environment.task
+    places, near = {tuple(solid["place"]) for solid in found["solids"]}, 11.0 * ROBOTS["tick"].torso.standing_height
+    assert places <= {tuple(place) for place in data.mocap_pos}
+    assert places >= {tuple(place) for place in data.mocap_pos if abs(place - data.qpos[:3]).max() < near}
+    assert {solid["kind"] for solid in found["solids"]} == {"capsule"} and found["planes"] == [0.0]
+    assert len(found["marks"]) == 12
+    wanted = run.marks(environment.physics)
+    for (style, *ends), mark in zip(found["marks"][-1], wanted, strict=True):
+        assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "colour": tuple(mark.colour)}
+        np.testing.assert_allclose(ends, [*mark.start, *mark.end])
+
+
+def test_marks_end_where_actions_do_not_repeat_the_episode():
+    """Actions are recorded as motors of a third of their strength apply them: repeated, they are a ninth."""
+    found, _ = scenery_of("steer", {"motor_strength": 1.0 / 3.0}, 12)
+    assert len(found["marks"]) < 6
 
 
 def test_a_clone_without_the_viewer_is_told(tmp_path, monkeypatch):
@@ -202,6 +245,24 @@ def test_keys_and_controls(shown, tracks):
     assert time() == pytest.approx(1.5, abs=0.01)
     assert shown.locator("section").count() == 2
     assert shown.locator("h2").first.text_content().startswith("tick, tuned: return")
+
+
+@pytest.mark.slow
+@needs_viewer
+def test_goals_are_drawn(browser, tmp_path):
+    environment = arc_suite.load("tick", "navigate", {"random": 0})
+    track = record(environment, policy("cpg", "tick", "steered"), 0, 3)
+    (tmp_path / "goal.html").write_text(pages.page({"tick": track}), encoding="utf-8")
+    tab, said = browser.new_page(viewport={"width": 800, "height": 600}), []
+    tab.on("console", lambda message: said.append(message.text))
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.goto((tmp_path / "goal.html").as_uri())
+    tab.wait_for_function("window.viewer", timeout=60_000)
+    tab.evaluate("viewer.pause(false), viewer.seek(0.1)")
+    picture = Image.open(io.BytesIO(tab.locator("canvas.view").screenshot())).convert("RGB")
+    red, green, blue = np.asarray(picture, dtype=float).transpose(2, 0, 1)
+    assert (green > 1.5 * np.maximum(red, blue)).sum() > 300  # pixels of the disc
+    assert said == []
 
 
 @pytest.mark.slow

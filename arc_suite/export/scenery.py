@@ -1,0 +1,105 @@
+"""What is around a body in a recorded episode, as plain data: the ground, obstacles, and marks of what is asked."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from arc_suite import models
+from arc_suite.envs.dm import load
+from arc_suite.export.parts import KINDS
+from arc_suite.marks import Mark
+from arc_suite.style.tracks import Track
+
+_MARGIN = 12.0  # standing heights of ground about the way
+_SAME = 1e-3  # of the standing height, by which an episode that is repeated may differ from the recorded one
+
+
+def scenery(track: Track) -> dict[str, Any]:
+    """Return the scenery of an episode; lengths are in m and the world's axes.
+
+    The episode is begun anew by its seed, which tells where obstacles stand, and repeated by its actions where its
+    task marks what it asks for. Marks end where the repetition is not what was recorded, as where motors are weak:
+    actions are recorded as they are applied.
+
+    Returns:
+        A dictionary:
+            `level`: whether the ground is the plane z = 0;
+            `planes`: heights of planes;
+            `fields`: height fields, each `low` (2,), `cell` (2,) and `heights` (rows, columns);
+            `solids`: shapes, each `kind`, `size`, `place` and `colour`, None for that of the ground times `shade`;
+            `styles`: of marks, `shape`, `radius` and `colour`;
+            `marks`: for every row of the track, of each mark the index of its style, start and end.
+    """
+    settings = {name: value for name, value in track.task_kwargs.items() if name not in ("random", "on_divergence")}
+    environment = load(track.body, track.task, settings)
+    environment.reset(track.seed)
+    arena = environment.task.definition.scene.arena
+    model = mujoco.MjModel.from_xml_string(models.assemble(track.body, arena, decorated=True).to_xml_string())
+    data = mujoco.MjData(model)
+    data.mocap_pos[:] = environment.physics.data.mocap_pos
+    mujoco.mj_kinematics(model, data)
+    margin = _MARGIN * track.body.torso.standing_height
+    low, high = track.positions[:, :2].min(axis=0) - margin, track.positions[:, :2].max(axis=0) + margin
+    found: dict[str, Any] = {"level": arena.is_level, "planes": [], "fields": [], "solids": []}
+    for geom in range(model.ngeom):
+        if not model.geom(geom).name.startswith("floor"):
+            continue
+        kind, place, size = int(model.geom_type[geom]), data.geom_xpos[geom], model.geom_size[geom]
+        if kind == mujoco.mjtGeom.mjGEOM_PLANE:
+            found["planes"].append(float(place[2]))
+        elif kind == mujoco.mjtGeom.mjGEOM_HFIELD:
+            found["fields"].append(_field(model, model.geom_dataid[geom], place, low, high))
+        elif (place[:2] + size[:2].max() > low).all() and (place[:2] - size[:2].max() < high).all():
+            found["solids"].append(_solid(model, geom, KINDS[kind], place))
+    styles, marks = _marks(environment, track)
+    environment.close()
+    return found | {"styles": styles, "marks": marks}
+
+
+def _field(model: mujoco.MjModel, index: int, place, low, high) -> dict[str, Any]:
+    """The part of a height field that lies between two corners (2,)."""
+    shape = np.array((model.hfield_nrow[index], model.hfield_ncol[index]))
+    start = model.hfield_adr[index]
+    heights = model.hfield_data[start : start + shape.prod()].reshape(shape)
+    halves, (columns, rows) = model.hfield_size[index], shape[::-1]
+    cell = 2.0 * halves[:2] / (shape[::-1] - 1)
+    corner = place[:2] - halves[:2]
+    first = np.floor((low - corner) / cell).astype(int).clip(0, (columns - 2, rows - 2))
+    last = np.ceil((high - corner) / cell).astype(int).clip(first + 1, (columns - 1, rows - 1))
+    part = heights[first[1] : last[1] + 1, first[0] : last[0] + 1]
+    return {"low": corner + first * cell, "cell": cell, "heights": place[2] + halves[2] * part.astype(float)}
+
+
+def _solid(model: mujoco.MjModel, geom: int, kind: str, place) -> dict[str, Any]:
+    """A shape of the ground, whose axes are the world's, or an obstacle."""
+    ground = model.body_mocapid[model.geom_bodyid[geom]] < 0
+    colour = None if ground else model.mat_rgba[model.geom_matid[geom], :3]
+    shade = float(model.geom_rgba[geom, 0])
+    return {"kind": kind, "size": model.geom_size[geom], "place": place.copy(), "colour": colour, "shade": shade}
+
+
+def _marks(environment, track: Track) -> tuple[list, list]:
+    """The styles of marks, and the marks of every row, of an environment that stands at the start of a track."""
+    physics, styles, rows = environment.physics, {}, []
+    if not environment.task.marks(physics):
+        return [], []
+    near = _SAME * track.body.torso.standing_height
+    for action, position in zip(track.actions, track.positions, strict=True):
+        environment.step(action)
+        if abs(physics.data.qpos[:3] - position).max() > near:
+            break
+        rows.append(_styled(environment.task.marks(physics), styles))
+    return [dict(zip(("shape", "radius", "colour"), style[:3], strict=True)) for style in styles], rows
+
+
+def _styled(marks: Sequence[Mark], styles: dict[tuple, int]) -> list[list]:
+    """Marks as indices of styles, start and end; styles that are new are added. None has two marks at once."""
+    row, counts = [], {}
+    for mark in marks:
+        style = (mark.shape, float(mark.radius), tuple(map(float, mark.colour)))
+        counts[style] = counts.get(style, 0) + 1
+        index = styles.setdefault((*style, counts[style]), len(styles))
+        row.append([index, *np.concatenate([mark.start, mark.end]).tolist()])
+    return row
