@@ -8,7 +8,8 @@ import glfw
 import mujoco
 import numpy as np
 
-from arc_suite.simulation.pictures import Decorated
+from arc_suite.marks import Mark
+from arc_suite.simulation.pictures import Decorated, geom_of
 
 _PRESS = 0.25  # of the body's own speed, by which an arrow changes the command
 _ARROWS = {
@@ -17,6 +18,7 @@ _ARROWS = {
     glfw.KEY_LEFT: (0.0, 0.0, _PRESS),
     glfw.KEY_RIGHT: (0.0, 0.0, -_PRESS),
 }
+_ENDS = ("start", "end")  # of a mark
 _LONGEST = 0.5  # s that a picture may stand for: a machine that is slower shows slow motion
 
 
@@ -48,7 +50,7 @@ class Live:
         """Start the next episode; what arrows have set still holds."""
         self._timestep, self._earned, self._steps = self._environment.reset(), 0.0, 0
         self._command()
-        self._before = self._qpos()
+        self._before, self._marks = self._qpos(), 2 * (self._asked(),)
 
     def press(self, key: int) -> None:
         """Do what a key, of GLFW's numbers, asks for."""
@@ -75,6 +77,7 @@ class Live:
         self._timestep = self._environment.step(self._act(self._timestep))
         self._earned += self._timestep.reward
         self._steps += 1
+        self._marks = self._marks[1], self._asked()
 
     def pose(self, share: float) -> None:
         """Let the picture show what is a share of the latest control step after its start, 0 to 1."""
@@ -86,6 +89,16 @@ class Live:
         data.mocap_pos[:] = self._environment.physics.data.mocap_pos
         mujoco.mj_forward(model, data)
 
+    def marks(self, share: float) -> list[Mark]:
+        """Return what the task asks for, a share of the latest control step after its start, 0 to 1."""
+        before, now = self._marks
+        if [mark._replace(start=0, end=0) for mark in before] != [mark._replace(start=0, end=0) for mark in now]:
+            return now
+        return [
+            mark._replace(**{end: (1.0 - share) * getattr(old, end) + share * getattr(mark, end) for end in _ENDS})
+            for old, mark in zip(before, now, strict=True)
+        ]
+
     def text(self) -> str:
         """Return a line about the episode."""
         told = [f"return {self._earned:.0f} in {self._steps * self.control_timestep:.1f} s"]
@@ -96,6 +109,9 @@ class Live:
     def _command(self) -> None:
         if self.wanted is not None:
             self._environment.command("command", self.wanted)
+
+    def _asked(self) -> list[Mark]:
+        return self._environment.task.marks(self._environment.physics)
 
     def _qpos(self) -> np.ndarray:
         return self._environment.physics.data.qpos.copy()
@@ -130,6 +146,10 @@ def play(
                 live.step(pulls(live.shown, window.perturb))
                 ahead -= live.control_timestep
             live.pose(ahead / live.control_timestep)
+            marks = live.marks(ahead / live.control_timestep)
+            window.user_scn.ngeom = len(marks)
+            for mark, geom in zip(marks, window.user_scn.geoms, strict=False):
+                geom_of(mark, geom)
         window.set_texts((None, mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, live.text(), None))
         window.sync()
         sleep(max(0.0, pause - (clock() - now)))

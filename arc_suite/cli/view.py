@@ -29,7 +29,7 @@ from arc_suite.simulation import opengl
 
 _RATE = 60.0  # pictures a second, where the display does not tell its own
 _PATIENCE = 10.0  # s, for the window to close
-_DISTANCE = 2.8  # of the camera, of the farthest that the body reaches
+_DISTANCE = 4.0  # of the camera, of the farthest that the body reaches
 
 FLAGS = flags.FLAGS
 define_body()
@@ -37,7 +37,7 @@ define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string(
-    "preset", None, f"{policies.PRESET_HELP} [default: steered where the task takes a command, else tuned or medium]"
+    "preset", None, f"{policies.PRESET_HELP} [default: steered where the task tells a command, else tuned or medium]"
 )
 flags.DEFINE_integer("seed", 0, "Seed of the start of the first episode and of the random policy.", 0, 2**32 - 1)
 
@@ -47,7 +47,7 @@ def main() -> None:
     body = only_body(_ROBOT)
     name, settings = task()
     environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings | {"random": FLAGS.seed})
-    steered = "command" in environment.task.definition.commands
+    steered = "command" in environment.task.definition.blocks
     usual = ("steered",) if steered else ("tuned", "medium")
     preset = FLAGS.preset or next(preset for preset in usual if preset in presets_of(body))
     policy = policies.policy(FLAGS.policy, body, preset, task=environment.task.definition)

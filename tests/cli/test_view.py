@@ -29,6 +29,7 @@ class Window:
     def __init__(self, pictures, seconds=1.0 / 60.0, at=None):
         self.left, self.seconds, self.at = pictures, seconds, at or {}
         self.time, self.texts, self.perturb = 0.0, [], mujoco.MjvPerturb()
+        self.user_scn = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 10)
         self.shown = 0
 
     def is_running(self):
@@ -108,6 +109,19 @@ def test_arrows_command():
     for _ in range(2):
         shown.press(glfw.KEY_RIGHT)
     np.testing.assert_array_equal(wanted(), (-1.0, 0.0, -0.25))
+
+
+def test_what_is_asked_is_shown():
+    environment, shown = playing()
+    shown.press(glfw.KEY_UP)
+    window = Window(40)
+    play(shown, window)
+    marks = environment.task.marks(environment.physics)
+    assert window.user_scn.ngeom == len(marks) == 2  # no arrow turns
+    before, middle, after = (shown.marks(share)[1].end for share in (0.0, 0.5, 1.0))
+    np.testing.assert_allclose(middle, 0.5 * (before + after))
+    np.testing.assert_allclose(after, marks[1].end)
+    assert (before != after).any()
 
 
 def test_arrows_do_nothing_where_the_task_takes_no_command():
