@@ -239,6 +239,11 @@ class Marks {
     }
   }
 
+  // Where those that are visible begin.
+  places() {
+    return this.shown.filter((mark) => mark.visible).map((mark) => mark.position.toArray());
+  }
+
   place(mark, start, end) {
     const way = end.clone().sub(start), length = way.length();
     mark.visible = length > 0;
@@ -454,7 +459,8 @@ async function main() {
   };
   requestAnimationFrame(frame);
   // For tests, and for whoever steers the page from outside.
-  window.viewer = { state, seek, pause, places: () => columns.map(({ stage }) => stage.creature.places()) };
+  const told = (what) => () => columns.map(({ stage }) => stage[what].places());
+  window.viewer = { state, seek, pause, places: told("creature"), marks: told("marks") };
 }
 
 main();
