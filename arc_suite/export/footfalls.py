@@ -12,7 +12,7 @@ TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 
 # Of a foot's way up and down in the motion: a swing rises above the upper share, and lasts while the foot is
 # above the lower one.
-_RISES, _LASTS = 0.5, 0.15
+_RISES, _LASTS = 0.5, 0.2
 _BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
 _LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
 
