@@ -150,10 +150,10 @@ class OnPolicy:
         if self._symmetry is not None:
             mirror, mirror_action = self._symmetry
             image = self._normalised(mirror(seen["observations"]).reshape(-1, size))
-            image_means = np.asarray(ppo.mean_action(self._state.policy, image))
             observations = np.concatenate([observations, image])
-            actions = np.concatenate([actions, mirror_action(actions)])
-            means = np.concatenate([means, image_means])
+            # The image of an action is as probable as the action was. By the policy's own mean for the image, where
+            # it is not symmetric, the action would be all but impossible, and what is learned of it huge.
+            actions, means = (np.concatenate([each, mirror_action(each)]) for each in (actions, means))
             advantages, returns = np.tile(advantages, 2), np.tile(returns, 2)
         arrays = (observations, actions, means, advantages, returns)
         return ppo.Batch(*(jnp.asarray(array, jnp.float32) for array in arrays))

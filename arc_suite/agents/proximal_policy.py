@@ -141,7 +141,8 @@ def update(row: ProximalPolicy, state: State, batch: Batch, orders, numbers, wit
         return State(policy, values, (of_policy, of_values), state.rate), loss
 
     state, losses = jax.lax.scan(once, state, orders)
-    apart = divergence(state.policy, jax.tree.map(lambda array: array[orders[0]], batch))
+    # Images come last: what the policy would do in the mirror is told by nothing that acted.
+    apart = divergence(state.policy, jax.tree.map(lambda array: array[: row.rows * row.horizon], batch))
     if with_policy:
         factor = jnp.where(apart > 2.0 * wanted, 1.0 / _STEP, jnp.where(apart < 0.5 * wanted, _STEP, 1.0))
         state = state._replace(rate=(state.rate * factor).clip(_LEAST_RATE, _MOST_RATE))

@@ -20,7 +20,7 @@ class Track(NamedTuple):
         body: what moved.
         task: name of the task.
         task_kwargs: its settings, as in `arc_suite.load`.
-        seed: of the episode, with which the actions repeat it.
+        seed: of the episode; the actions repeat it, unless motors were weak or actions late.
         time_step: s between rows.
         positions: (steps, 3) of the torso.
         quaternions: (steps, 4) of the torso, w first.
