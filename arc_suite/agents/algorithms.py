@@ -87,7 +87,14 @@ ALGORITHMS = {
     # Small steps about a policy that is good already: the noise of learning from nothing would undo it.
     "finetune": Algorithm(
         "arc_suite.agents.on_policy",
-        ProximalPolicy(first_std=0.1, last_std=0.04, first_divergence=0.008, policy_rate=1e-5, warm_up=320),
+        ProximalPolicy(
+            first_std=0.1,
+            last_std=0.04,
+            first_divergence=0.008,
+            last_divergence=0.004,
+            policy_rate=1e-5,
+            warm_up=320,
+        ),
         "proximal policy optimisation from the policy of another run, --row start=FOLDER",
         evaluate_every=100_000,
         steps=500_000,

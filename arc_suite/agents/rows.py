@@ -170,8 +170,8 @@ class ProximalPolicy:
     clip: float = 0.2
     first_std: float = 0.37
     last_std: float = 0.07
-    first_divergence: float = 0.012
-    last_divergence: float = 0.004
+    first_divergence: float = 0.03
+    last_divergence: float = 0.01
     policy_rate: float = 3e-4
     value_rate: float = 5e-4
     gradient_norm: float = 1.0
