@@ -185,7 +185,7 @@ STUDIES = {
         "beyond the paper: imitation of the demonstrators, and PPO from nothing",
         (
             *(Row(robot, "imitation", 25_600) for robot in ROBOTS),
-            Row("tick", "ppo", 832_000, evaluate_every=208_000),
+            *(Row(robot, "ppo", 832_000 if robot == "tick" else 1_200_000) for robot in ROBOTS),
             Row("queen", "imitation", 38_400, task="steer", evaluate_every=38_400),
         ),
     ),
