@@ -202,7 +202,7 @@ class Steer(walk.Walk):
         }
 
     def ended(self, memory: Memory, readings: Readings) -> tuple:
-        """Return as terminated who fell; nobody is truncated."""
+        """Return as terminated who fell; none is truncated."""
         return memory.fell, False
 
     def marks(self, memory: Memory, readings: Readings) -> list[Mark]:
