@@ -42,7 +42,7 @@ def register(
             numbers fitted to the body.
         tuning: presets of a demonstrator of the robot by name, slow, medium and fast among them; None
             to have them fitted likewise.
-        look: what the robot wears; None for what every body wears.
+        look: decorations and colours; None for those that suit any body.
         tasks: classes by the contract of `tasks.contract`, each with its name.
         arenas: functions by name, from a body to the `Arena` that suits it.
 

@@ -88,9 +88,9 @@ MUTANTS = (
         "return simulations.warning[..., 1].any(axis=-1)",
         "return simulations.warning[..., 1].any(axis=-1) & False",
     ),
-    Mutant("fork unnoticed", "    count += 1\n", "    count += 0\n"),
+    Mutant("fork unnoticed", "    global count\n    count += 1\n", "    global count\n    count += 0\n"),
     Mutant("batch destroyed in a forked child", "        forks.keep(self._simulations)\n", ""),
-    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos)\n", ""),
+    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos, marks)\n", ""),
     Mutant("user's choice of OpenGL overwritten", '"MUJOCO_GL" not in os.environ and ', ""),
     # Tasks.
     Mutant(

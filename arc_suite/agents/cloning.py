@@ -24,7 +24,11 @@ _ROWS = 4096  # observations that are normalised at a time
 
 
 def begin(row: Cloning, stage: Stage) -> "Cloner":
-    """Return the learner; see `arc_suite.agents`."""
+    """Return the learner; see `arc_suite.agents`.
+
+    Raises:
+        ValueError: no dataset, or one that does not fit; one line.
+    """
     if stage.prior is None:
         raise ValueError("prior: the algorithm takes prior data, the id of a dataset, got None")
     return Cloner(row, stage)

@@ -49,7 +49,7 @@ def mlp(
     gain: float = 1.0,
     last_gain: float = 1.0,
 ) -> tuple[dict[str, np.ndarray], ...]:
-    """Draw a multilayer perceptron.
+    """Draw a multilayer perceptron: for each layer its weight (inputs, outputs), bias (outputs,) and norm, if any.
 
     Args:
         random: to draw from.

@@ -41,7 +41,11 @@ class Phase(NamedTuple):
 
 
 def begin(row: SoftActorCritic, stage: Stage) -> "OffPolicy":
-    """Return the learner; see `arc_suite.agents`."""
+    """Return the learner; see `arc_suite.agents`.
+
+    Raises:
+        ValueError: prior data are missing, not taken by the algorithm, or do not fit; one line.
+    """
     if (stage.prior is None) != (row.prior == "none"):
         wanted = "no prior data" if row.prior == "none" else "prior data, the id of a dataset"
         raise ValueError(f"prior: the algorithm takes {wanted}, got {stage.prior!r}")

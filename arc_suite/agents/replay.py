@@ -88,7 +88,14 @@ class Replay:
         self.total += 1
 
     def at(self, indices: np.ndarray) -> Transitions:
-        """Return copies of transitions by index, from the oldest that can be sampled on: 0 to `len` - 1."""
+        """Return copies of transitions by index, from the oldest that can be sampled on.
+
+        Args:
+            indices: (batch,) from 0 to `len` - 1.
+
+        Returns:
+            Arrays (batch, ...).
+        """
         slots = (self.total - len(self) + indices) % self._slots
         nexts, ends = self._observations[(slots + 1) % self._slots], self._end[slots]
         last = ends >= 0
@@ -135,7 +142,14 @@ class Fenced:
         return len(self._first) + len(self._second)
 
     def at(self, indices: np.ndarray) -> Transitions:
-        """Return copies of transitions by index, those of the first source before those of the second."""
+        """Return copies of transitions by index, those of the first source before those of the second.
+
+        Args:
+            indices: (batch,) from 0 to `len` - 1.
+
+        Returns:
+            Arrays (batch, ...), in the order of the indices.
+        """
         count = len(self._first)
         of_first = indices < count
         parts = self._first.at(indices[of_first]), self._second.at(indices[~of_first] - count)

@@ -79,7 +79,7 @@ def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
 
 
 def scores(seeds: Sequence[Result]) -> np.ndarray:
-    """Return what stands for a kind of run: the mean return of each seed, or of one seed each episode's."""
+    """Return what stands for a kind of run: the mean return of each seed, (seeds,), or those of one seed's episodes."""
     return seeds[0].returns[-1] if len(seeds) == 1 else np.array([each.final for each in seeds])
 
 

@@ -24,15 +24,14 @@ from absl import flags
 from arc_suite import evaluation, files
 from arc_suite.agents import algorithms, run_folder
 from arc_suite.agents.training import Run, train
-from arc_suite.cli.flags import define_body, define_task, named_values, only_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, named_values, only_body, task
 from arc_suite.cli.program import progress
 from arc_suite.policies import network, onnx_file
-from arc_suite.robots import ROBOTS
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"One of {', '.join(ROBOTS)}.")
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
 flags.DEFINE_string(
     "algorithm",
     "sac",

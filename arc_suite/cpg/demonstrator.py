@@ -145,7 +145,7 @@ class OnClock:
             self._clock[rows] = 0
 
     def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the actions; see `Demonstrator.act`."""
+        """Return the actions (rows, joints), or (joints,) alone; see `Demonstrator.act`."""
         quaternion, angles, velocities = felt(observation, *self._size)
         if self._clock.shape != angles.shape[:-1]:
             self._clock = np.broadcast_to(self._clock, angles.shape[:-1]).copy()

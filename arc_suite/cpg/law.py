@@ -110,10 +110,10 @@ def felt(
 
 
 def blocks(observation: Mapping[str, np.ndarray], task: str, *names: str) -> tuple[np.ndarray, ...]:
-    """Return named blocks of an observation, float64.
+    """Return named blocks of an observation, (..., size) float64 each.
 
     Args:
-        observation: blocks by name.
+        observation: blocks by name, each (..., size).
         task: one that has them, which an error names.
         names: of the blocks.
 

@@ -34,7 +34,7 @@ class Preset(NamedTuple):
             0 if it is not there.
         bends: of the other joints, by name.
         crouch: angles held while settling, as `centre`; None for the centre. Legs drawn up catch a
-            robot whom a reset with its feet in the ground has thrown.
+            robot that a reset with its feet in the ground has thrown.
         torques: actions that are added whatever the error is, by joint and for each rank: amplitudes of
             the cosines of the leg's phase and its multiples, then of their sines; a hip's positive
             forwards. None for none.

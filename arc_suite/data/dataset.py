@@ -134,7 +134,11 @@ class Dataset:
 
 @contextlib.contextmanager
 def damages(dataset_id: str, file: Path):
-    """Turn what h5py raises at a damaged file into a ValueError of one line that names dataset and file."""
+    """Turn what h5py raises at a damaged file into one line that names dataset and file.
+
+    Raises:
+        ValueError: the file is damaged; one line.
+    """
     try:
         yield
     except _DAMAGES as error:

@@ -187,7 +187,11 @@ class TaskRun(control.Task):
         return self.definition.progress(self.memory)
 
     def set_command(self, name: str, value) -> None:
-        """Set a live command; see `Environment.command`."""
+        """Set a live command; see `Environment.command`.
+
+        Raises:
+            ValueError: no such command, a value that does not fit, or no episode has begun; one line.
+        """
         value = checked_command(self.definition, name, value)
         if self.memory is None:
             raise ValueError(f"command {name!r}: no episode has begun; reset first")

@@ -116,7 +116,7 @@ class Network(NamedTuple):
         """Start episodes: nothing to do, as the policy remembers nothing."""
 
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
-        """Return the actions of a control step.
+        """Return the actions (rows, joints) of a control step; see `Policy.act`.
 
         Raises:
             ValueError: blocks that are not those it was made for; one line.

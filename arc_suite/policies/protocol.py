@@ -48,7 +48,7 @@ class Script:
             self._scripts[row] = iter(self._script(seed))
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the next actions."""
+        """Return the next actions (rows, joints)."""
         return np.stack([next(script, self._zero) for script in self._scripts])
 
 
@@ -65,7 +65,7 @@ class Sum:
             policy.begin(rows, seeds)
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the sum of the actions."""
+        """Return the sum of the actions (rows, joints)."""
         return sum(policy.act(observation, rewards) for policy in self._policies)
 
 
@@ -84,7 +84,7 @@ class Positioned:
         self._policy.begin(rows, seeds)
 
     def act(self, observation, rewards=None) -> np.ndarray:
-        """Return the positions.
+        """Return the positions (rows, joints), as actions in [-1, 1].
 
         Raises:
             ValueError: an observation without the blocks that tell how the joints are; one line.
@@ -109,7 +109,7 @@ class Mixture:
             policy.begin(rows, seeds)
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the actions."""
+        """Return the actions (rows, joints)."""
         actions = np.stack([policy.act(observation, rewards) for policy in self._policies])
         return actions[self._chosen, np.arange(len(self._chosen))]
 
@@ -139,7 +139,7 @@ class Individuals:
             self._functions[row], self._seeds[row], self._clock[row] = self._make(), seed, 0
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the actions.
+        """Return the actions (rows, joints).
 
         Raises:
             ValueError: one of another shape, not of numbers, or with NaN; one line that tells the

@@ -67,7 +67,7 @@ class Batch:
 
         Args:
             nstep: number of substeps, at least 2.
-            rows: mask (rows,) of whom to advance.
+            rows: mask (rows,) of those to advance.
 
         Returns:
             Mask (rows,) of those that diverged.
@@ -98,7 +98,7 @@ class Batch:
         """Restart some rows, as dm_control's `reset_context` does.
 
         Args:
-            rows: mask (rows,) of whom to restart.
+            rows: mask (rows,) of those to restart.
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
             mocap_pos: (restarted, nmocap, 3) positions of the arena's movable bodies; None for the model's.
@@ -122,7 +122,7 @@ class Batch:
         """Move some rows to other positions, and bring derived quantities up to date.
 
         Args:
-            rows: mask (rows,) of whom to move.
+            rows: mask (rows,) of those to move.
             qpos: (moved, nq) where to.
 
         Raises:

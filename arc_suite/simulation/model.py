@@ -50,7 +50,7 @@ def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: muj
 
     Args:
         model: to write to.
-        fields: values by name.
+        fields: values by name, of the shapes that the model's fields have.
         scratch: data of such a model, which nobody needs.
     """
     for name, values in fields.items():

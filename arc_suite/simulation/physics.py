@@ -64,7 +64,7 @@ class Physics(dm_mujoco.Physics):
         super().reset(keyframe_id)
 
     def change_model(self, fields: Mapping[str, np.ndarray]) -> None:
-        """Give fields of the model, by name, other values until the next reset."""
+        """Give fields of the model, by name, other values of the same shapes until the next reset."""
         model = self.model.ptr
         self._unchanged = {name: getattr(model, name).copy() for name in fields} | self._unchanged
         self._change(fields)

@@ -167,7 +167,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
 
 
 def mirrors(body: Body) -> np.ndarray:
-    """Return for each leg the index of the leg that stands across the x-z plane, -1 if there is none."""
+    """Return (legs,) for each leg the index of the leg that stands across the x-z plane, -1 if there is none."""
     stands = np.array([leg.foot_position for leg in body.legs])
     distances = np.linalg.norm(stands[:, None] - stands * (1, -1, 1), axis=-1)
     nearest = distances.argmin(axis=1)

@@ -163,7 +163,7 @@ class Modified(Task):
 
     @functools.cached_property
     def gains(self) -> tuple[np.ndarray, np.ndarray]:
-        """The stiffness, action per rad, and damping, action per rad/s, of the joints as positions hold them."""
+        """The stiffness (joints,), action per rad, and damping, action per rad/s, with which positions are held."""
         body = sized(self.scene.body)
         return position_gains(body, standing(body).inertias)
 
@@ -174,7 +174,7 @@ class Modified(Task):
 
     @functools.cached_property
     def noises(self) -> dict[str, tuple[slice, np.ndarray]]:
-        """Where the noise of a block lies among that of all blocks, and its half-widths, by name."""
+        """Where the noise of a block lies among that of all blocks, and its half-widths (size,), by name."""
         levels, first, noises = self.changes.observation_noise, 0, {}
         for name, widths in noise.half_widths(self.scene.body, self.task.blocks).items():
             last = first + len(widths)
@@ -223,7 +223,7 @@ class Modified(Task):
         return self.task.read(data)
 
     def lift(self, memory, readings: Readings) -> np.ndarray | None:
-        """Return the other task's positions at the start."""
+        """Return the other task's qpos (..., nq) of the start, or None."""
         return self.task.lift(memory, readings)
 
     def begin(self, memory, readings: Readings) -> Any:

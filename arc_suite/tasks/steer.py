@@ -129,7 +129,7 @@ class Steer(walk.Walk):
         return reading.read(data, layout, self.scene.arena, forces)
 
     def lift(self, memory: Memory, readings: Readings) -> np.ndarray:
-        """Return the positions that bring every foot clear of the ground, level ground too: none is thrown up."""
+        """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too: none is thrown up."""
         return self.lifted(readings)
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
@@ -202,7 +202,7 @@ class Steer(walk.Walk):
         }
 
     def ended(self, memory: Memory, readings: Readings) -> tuple:
-        """Return as terminated who fell; nobody is truncated."""
+        """Return as terminated who fell; none is truncated."""
         return memory.fell, False
 
     def marks(self, memory: Memory, readings: Readings) -> list[Mark]:

@@ -354,7 +354,7 @@ class Walk(Task):
         }
 
     def ended(self, memory: Memory, readings: Readings) -> tuple:
-        """Return as terminated whose torso has left its healthy range; nobody is truncated."""
+        """Return as terminated whose torso has left its healthy range; none is truncated."""
         return ~terms.healthy(readings.torso_height, self.parameters), False
 
     def progress(self, memory: Memory) -> dict:

@@ -82,7 +82,7 @@ class Space(NamedTuple):
         return [*_SHARED.values(), *(number for number in by_rank for _ in range(self.ranks))]
 
     def origins(self) -> list[np.ndarray]:
-        """Return the vectors of which the best is where a search sets out: the preset with leads over its clock."""
+        """Return vectors (size,), the best of which a search starts from: the preset with leads over its clock."""
         return [self.vector(lead / LEADS) for lead in range(LEADS)]
 
     def rounded(self, vector: np.ndarray) -> np.ndarray:
@@ -149,7 +149,7 @@ class Torques(NamedTuple):
         return [*[_AMPLITUDE] * math.prod(self._shape), _STEERING]
 
     def origins(self) -> list[np.ndarray]:
-        """Return the vector at which a search sets out: no torques but for steering."""
+        """Return the vector (size,) at which a search starts: no torques but for steering."""
         return [np.array([*[0.0] * math.prod(self._shape), _STEERED])]
 
     def rounded(self, vector: np.ndarray) -> np.ndarray:

@@ -8,7 +8,6 @@ from numpy.testing import assert_array_equal
 
 pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
-from arc_suite import policies
 from arc_suite.agents import imitation, run_folder
 from arc_suite.agents.algorithms import ALGORITHMS
 from arc_suite.agents.learner import Stage
@@ -85,17 +84,6 @@ def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path)
     demonstrator = Demonstrator("leaper", "refined")
     for observation, label in zip(learner.arrays()["observations"], labels, strict=True):
         said = demonstrator.act(environment.task.split(observation))
-        assert_array_equal(said.astype(np.float32), label)
-
-
-def test_where_motors_hold_positions_it_learns_positions(tmp_path):
-    learner = imitation.begin(SMALL, stage(tmp_path, actions="position"))
-    learner.advance(80)
-    policy = policies.policy("cpg", "leaper", "refined", SMALL.rows, task=learner._environment.task)
-    policy.begin(range(8), [0] * 8)
-    arrays = learner.arrays()
-    for observation, label in zip(arrays["observations"], arrays["labels"], strict=True):
-        said = policy.act(learner._environment.task.split(observation), np.zeros(8))
         assert_array_equal(said.astype(np.float32), label)
 
 

@@ -119,10 +119,14 @@ class TestRun:
         process = subprocess.Popen(
             command, cwd=tmp_path, text=True, stderr=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)}
         )
-        while not (tmp_path / "run" / "checkpoint.npz").exists():
-            assert process.poll() is None
-            time.sleep(0.05)
-        process.send_signal(signal.SIGINT)
-        _, errors = process.communicate()
+        try:
+            while not (tmp_path / "run" / "checkpoint.npz").exists():
+                assert process.poll() is None
+                time.sleep(0.05)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=120)
+        finally:
+            process.kill()
+            process.wait()
         assert process.returncode == 130
         assert errors.splitlines()[-1] == "arc-suite train: interrupted; the same command goes on with run"

@@ -305,12 +305,14 @@ def test_a_full_disk_keeps_every_episode_that_fits(root, monkeypatch):
     monkeypatch.setattr(collection, "SHARE", -1.0)  # all that is finished waits for one write
     process = os.fork()
     if not process:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (size // 3, size // 3))
+        status = 1
         try:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (size // 3, size // 3))
             collect(ID, settings, 6)
         except OSError as error:
-            os._exit(0 if "file too large; 6 of 6 episodes" in str(error) else 2)
-        os._exit(3)
+            status = 0 if "file too large; 6 of 6 episodes" in str(error) else 2
+        finally:  # whatever happens, the child does not go on with other tests
+            os._exit(status)
     assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 0
     assert digests() == whole
 

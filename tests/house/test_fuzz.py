@@ -36,7 +36,7 @@ def raises(error):
     ],
 )
 def test_what_comes_of_reading_is_told(read, expected):
-    assert fuzz.outcome(read, limit=2.0 if expected is not fuzz.TOO_LONG else 0.1) == expected
+    assert fuzz.outcome(read, limit=0.1 if expected is fuzz.TOO_LONG else fuzz.LIMIT) == expected
 
 
 def test_files_are_damaged_again_in_the_same_way():

@@ -4,11 +4,13 @@ import pathlib
 import re
 
 import programs
+import pytest
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "disturbances.py"
 SHORT = ("--robots=tick", "--presets=steered", "--episodes=2")
 
 
+@pytest.mark.slow
 def test_a_table_of_every_modifier():
     done = programs.run(TOOL, *SHORT, "--steps=42")
     assert done.returncode == 0, done.stderr

@@ -11,7 +11,7 @@ from arc_suite.models.looks.look import Look
 from arc_suite.models.looks.scene import add_scene
 from arc_suite.robots.spec import Body, Leg, Link
 
-# A creature without a row wears `generic`.
+# A creature without a row has the look `generic`.
 LOOKS = {"queen": queen.LOOK, "bastion": bastion.LOOK, "tick": tick.LOOK, "leaper": leaper.LOOK}
 
 GROUP = 2  # of decorations; what weighs or touches is in group 0

@@ -38,7 +38,7 @@ class Look(NamedTuple):
     """The looks of one creature.
 
     Attributes:
-        colours: of the materials; "shell", "trim", "frame", "limb" and "glow" are what every body wears.
+        colours: of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.
         solids: materials of the torso's solids and ballast by name, where not "shell".
         ornaments: on the torso.
         glowing: names of the joints that glow; None for all of them.
