@@ -162,7 +162,7 @@ def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread | Pla
     Raises:
         ValueError: a body of a robot's name that has other joints; one line.
     """
-    tread = robots.row(TREADS, body, "treads") or Tread()
+    tread = robots.row(TREADS, body, "presets") or Tread()
     return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **STEERING, "sighted": tread, **PLANS}
 
 

@@ -51,7 +51,7 @@ class Tread(NamedTuple):
 
 
 # Of bodies that do not walk as all others; found by trying.
-TREADS = {"bastion": Tread(lift=0.35, lead=0.06, longer=0.0), "tick": Tread(trust=0.5)}
+TREADS = {"queen": Tread(ride=0.93), "bastion": Tread(lift=0.35, lead=0.06, longer=0.0), "tick": Tread(trust=0.5)}
 
 
 _SCANS = 6  # that are remembered

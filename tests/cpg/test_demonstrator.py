@@ -13,7 +13,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of
 from arc_suite.cpg.planner import PLANS
 from arc_suite.cpg.presets import TUNINGS, Bend, Preset
-from arc_suite.cpg.sighted import Tread
+from arc_suite.cpg.sighted import TREADS
 from arc_suite.cpg.steering import STEERING
 from arc_suite.models.sizing import control_timestep
 from arc_suite.policies import alone
@@ -190,7 +190,7 @@ def test_a_registered_robot_moves_at_the_frequency_that_its_preset_asks_for(heig
 def test_a_robots_numbers_go_by_its_name():
     queen = ROBOTS["queen"]
     heavier = queen.replace(density=10.001)
-    assert presets_of(heavier) == TUNINGS["queen"] | STEERING | {"sighted": Tread()} | PLANS
+    assert presets_of(heavier) == TUNINGS["queen"] | STEERING | {"sighted": TREADS["queen"]} | PLANS
     blocks = {name: block[None] for name, block in arc_suite.load("queen", "steer").reset(0).observation.items()}
     for preset in TUNINGS["queen"]:
         ours, theirs = (Demonstrator(body, preset) for body in (queen, heavier))
