@@ -176,6 +176,9 @@ def publish(row: Row, folder: Path, published: Path) -> None:
     if not evaluations:
         return
     files.folder(target)
+    config = target / run_folder.CONFIG
+    if config.exists() and config.read_text() != (source / run_folder.CONFIG).read_text():
+        (target / "style.csv").unlink(missing_ok=True)  # it was measured of another run
     for name in PUBLISHED:
         with files.writing(target / name) as temporary:
             temporary.write_text((source / name).read_text())

@@ -122,6 +122,14 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     with pytest.raises(ValueError, match=r"of another run, whose row.spread is 0.02, and not 0.3; write to another"):
         study_runner.is_finished(row._replace(numbers={"spread": 0.3}), folder / row.name)
 
+    # Of another run nothing that was measured stays.
+    published = tmp_path / "results" / row.name
+    measured = (published / "style.csv").read_text()
+    (published / "config.json").write_text("{}")
+    (published / "style.csv").write_text(measured.replace(",0.", ",1."))
+    study_runner.publish(row, folder, tmp_path / "results")
+    assert (published / "style.csv").read_text() == measured
+
     # What is published of the policy's style is what the style room measures of it.
     table = run_folder.table(tmp_path / "results" / row.name, "style")
     environment = load("tick", "walk", row.task_kwargs)
