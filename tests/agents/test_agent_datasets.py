@@ -62,8 +62,8 @@ def test_checkpoints_take_turns(run):
 
 
 @pytest.mark.parametrize(("flag", "label", "steps"), [
-    ("--checkpoint=200", "200", [200]),
-    ("--grade=expert", "expert", [300]),
+    pytest.param("--checkpoint=200", "200", [200], marks=pytest.mark.slow),
+    pytest.param("--grade=expert", "expert", [300], marks=pytest.mark.slow),
     ("--grade=replay", "replay", [100, 200, 300]),
 ])  # fmt: skip
 def test_a_dataset_of_an_agent(flag, label, steps, run, collected):

@@ -57,6 +57,7 @@ def cells(page, *starts):
     raise AssertionError(starts)
 
 
+@pytest.mark.slow
 def test_report(made):
     study, folder = made
     page = study_report.write("mine", study, folder).read_text()
@@ -94,6 +95,7 @@ def test_claims(made):
     assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
 
 
+@pytest.mark.slow
 def test_claims_need_what_they_compare(made):
     """Short phases are told by the study's title; other tasks and missing algorithms are not compared."""
     study, folder = made

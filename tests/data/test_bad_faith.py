@@ -224,7 +224,10 @@ ALTERED = {
 }
 
 
-@pytest.mark.parametrize("name", ALTERED)
+FAST = ("group", "complex", "other joints", "seed")  # in `make check`
+
+
+@pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in ALTERED])
 def test_episodes_that_are_stored_otherwise_are_one_line(root, name):
     change, reason = ALTERED[name]
     collect(ID, SETTINGS, 2)

@@ -31,6 +31,7 @@ WEIGHTS = BONUSES | COSTS
 ROOT = pathlib.Path(__file__).parents[2]
 IDS = [f"arc_suite/{robot}-walk-v0" for robot in ("queen", "bastion", "tick", "leaper")]
 SIZES = {"queen": (199, 18), "bastion": (151, 12), "tick": (199, 18), "leaper": (163, 12)}
+PICTURES = ("rgb_array", "depth_array")
 EVERY_ID = pytest.mark.parametrize("env_id", IDS)
 
 
@@ -69,7 +70,7 @@ def test_import_registers_lazily_and_in_silence_however_often():
 
 
 @EVERY_ID
-@pytest.mark.parametrize("render_mode", [None, "rgb_array", "depth_array"])
+@pytest.mark.parametrize("render_mode", [None, *(pytest.param(m, marks=pytest.mark.slow) for m in PICTURES)])
 def test_check_env_warns_of_infinite_bounds_alone(env_id, render_mode):
     env = gymnasium.make(env_id, render_mode=render_mode, width=64, height=48)
     with warnings.catch_warnings(record=True) as caught:

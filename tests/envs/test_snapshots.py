@@ -30,8 +30,10 @@ def assert_equal_steps(one, other, actions):
             np.testing.assert_array_equal(mine, theirs)
 
 
-@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("mode", ["SameStep", pytest.param("NextStep", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "task", [t if t in ("walk", "gaps") else pytest.param(t, marks=pytest.mark.slow) for t in TASKS]
+)
 def test_another_environment_goes_on_to_the_bit(task, mode):
     actions = np.random.default_rng(0).uniform(-0.5, 0.5, (100, ROWS, 18))
     one, other = rows(task, mode, random=5), rows(task, mode)

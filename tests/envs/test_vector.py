@@ -162,7 +162,7 @@ def test_episode_that_ends_rests_until_its_reset_where_there_is_no_autoreset():
     assert done.all()
 
 
-@pytest.mark.parametrize("task", ["walk", "steer"])
+@pytest.mark.parametrize("task", ["steer", pytest.param("walk", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("mode", [*MODES, "Disabled"])
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
 def test_copies_carry_on_bit_for_bit(duplicate, mode, task):

@@ -86,7 +86,7 @@ def test_ornaments_of_a_pair_mirror_each_other():
 
 
 @every_body
-@pytest.mark.parametrize("camera", ["portrait", "profile"])
+@pytest.mark.parametrize("camera", ["portrait", pytest.param("profile", marks=pytest.mark.slow)])
 def test_near_cameras_frame_the_standing_body(body, camera):
     """Seen by segmentation, the body touches no edge of a 4:3 picture, yet fills most of its width or height."""
     environment = arc_suite.simulation.physics.Physics.from_body(body)
