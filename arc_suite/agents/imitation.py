@@ -21,7 +21,7 @@ from arc_suite.agents import networks, normaliser
 from arc_suite.agents.learner import Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
 from arc_suite.agents.rows import Imitation
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.demonstrator import first_preset
 from arc_suite.policies.network import Layer, forward
 
 ACTIVATION = "elu"
@@ -201,4 +201,4 @@ def best(body, task) -> str:
     """Return the preset that is imitated if none is given: that which follows commands, or the one that earns most."""
     if "command" in task.blocks:
         return "steered"
-    return next(name for name in ("refined", "tuned", "medium") if name in presets_of(body))
+    return first_preset(body, "refined", "tuned", "medium")

@@ -23,7 +23,7 @@ import arc_suite
 from arc_suite import policies
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
 from arc_suite.cli.live import Live, play
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.demonstrator import first_preset
 from arc_suite.models.outline import outline
 from arc_suite.simulation import opengl
 
@@ -49,7 +49,7 @@ def main() -> None:
     environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings | {"random": FLAGS.seed})
     steered = "command" in environment.task.definition.blocks
     usual = ("steered",) if steered else ("tuned", "medium")
-    preset = FLAGS.preset or next(preset for preset in usual if preset in presets_of(body))
+    preset = FLAGS.preset or first_preset(body, *usual)
     policy = policies.policy(FLAGS.policy, body, preset, task=environment.task.definition)
     live = Live(environment, policies.alone(policy, FLAGS.seed))
     opengl.require_window("`arc-suite render -o walk.html` writes a page that plays in any browser")

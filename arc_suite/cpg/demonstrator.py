@@ -166,6 +166,16 @@ def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread | Pla
     return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **STEERING, "sighted": tread, **PLANS}
 
 
+def first_preset(body: Body, *names: str) -> str:
+    """Return the first of some presets that a body has; every body has `medium`.
+
+    Raises:
+        ValueError: as `presets_of`.
+    """
+    presets = presets_of(body)
+    return next(name for name in names if name in presets)
+
+
 class Prescribed(NamedTuple):
     """Control by a preset's numbers: of one simulation, or with leading axes (rows, 1) of a batch.
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.demonstrator import Demonstrator, presets_of
+from arc_suite.cpg.demonstrator import Demonstrator, first_preset
 from arc_suite.envs.dm import load
 from arc_suite.export import motions
 from arc_suite.export.footfalls import TOUCH_DOWN, Footfall, footfalls, sole_heights
@@ -128,7 +128,7 @@ def clips(
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     if preset is None:
-        preset = "tuned" if "tuned" in presets_of(body) else "medium"
+        preset = first_preset(body, "tuned", "medium")
     model, takes = compiled(body), {}
     for name in progress(list(names)):
         shot = CLIPS[name]
