@@ -185,8 +185,12 @@ STUDIES = {
         "beyond the paper: imitation of the demonstrators, and PPO from nothing",
         (
             *(Row(robot, "imitation", 25_600) for robot in ROBOTS),
-            *(Row(robot, "ppo", 832_000 if robot == "tick" else 1_200_000) for robot in ROBOTS),
             Row("queen", "imitation", 38_400, task="steer", evaluate_every=38_400),
+            Row("queen", "ppo", 2_000_000, task="steer"),
+            *(
+                Row(robot, "ppo", 832_000 if robot == "tick" else 1_200_000, seed)
+                for seed, robot in itertools.product(range(3), ROBOTS)
+            ),
         ),
     ),
 }
