@@ -70,7 +70,8 @@ KINDS = (*FIELDS, *STEPS)
 class Terrain(Arena):
     """Lanes side by side; in the middle of lane i a body starts at `start(i)`.
 
-    Beside and beyond the lanes there is nothing; `height` goes on there at the edge's.
+    Beside and beyond the lanes there is nothing but the plane below stairs and trenches; `height` goes
+    on there at the edge's.
 
     Attributes:
         unit: m, the standing height of the body for which it is made: all lengths are multiples of it.
@@ -89,7 +90,7 @@ class Terrain(Arena):
         return (lane - len(self.lanes) // 2) * (WIDTH * self.unit)
 
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
-        """Add the height field `floor`, the boxes `floor_<number>`, and under trenches the plane `floor_bottom`."""
+        """Add the height field `floor`, the boxes `floor_<number>`, and under them the plane `floor_bottom`."""
         unit, nodes = self.unit, self._nodes
         if self._fields:
             middle = self.start(0.5 * (self._fields - 1))
@@ -99,8 +100,8 @@ class Terrain(Arena):
         boxes = (box for lane, heights in enumerate(self._profiles, self._fields) for box in self._boxes(lane, heights))
         for number, (size, pos) in enumerate(boxes):
             root.worldbody.add("geom", name=f"floor_{number}", type="box", size=size, pos=pos, conaffinity=1, **contact)
-        if any(kind == "gaps" for kind, _ in self.lanes):
-            bottom = (0.0, 0.0, -_TRENCH * unit)
+        if len(self._profiles):
+            bottom = (0.0, 0.0, self._bottom * unit)
             root.worldbody.add(
                 "geom", name="floor_bottom", type="plane", size=(0.0, 0.0, 1.0), pos=bottom, conaffinity=1, **contact
             )
@@ -111,7 +112,7 @@ class Terrain(Arena):
         A box is as long as the ground is nowhere lower than its top: higher steps stand in lower ones,
         since every box less is time saved.
         """
-        for top in np.unique(heights[heights > -_TRENCH]):
+        for top in np.unique(heights[heights > self._bottom]):
             edges = np.flatnonzero(np.diff(heights >= top, prepend=False, append=False))
             for first, last in edges.reshape(-1, 2) * _GRAIN:
                 size = np.array((0.5 * (last - first), 0.5 * WIDTH, 0.5 * _THICKNESS)) * self.unit
@@ -184,6 +185,11 @@ class Terrain(Arena):
             for lane, (kind, difficulty) in enumerate(self.lanes[self._fields :], self._fields)
         ]
         return np.array(profiles).reshape(len(profiles), len(x))
+
+    @functools.cached_property
+    def _bottom(self) -> float:
+        """The lowest height of stairs and trenches, in units: a plane, which costs less than boxes do."""
+        return self._profiles.min()
 
     def _random(self, lane: int) -> np.random.RandomState:
         """The stream of random numbers of a lane, by its kind and by how many of that kind are before it."""
