@@ -61,6 +61,17 @@ def test_what_an_episode_has_not_is_white():
     assert [bool((frame == 255).all()) for frame in frames] == [False] * 4 + [True] * 2
 
 
+def test_whoever_follows_commands_is_told_to_go_ahead():
+    """The schedule of seed 0 begins with a stop, at which the gait clock rests."""
+    environment = load("queen", "steer")
+    frames = frames_of(strips.strip(environment, policy("cpg", "queen", "steered", task=environment.task.definition)))
+    assert len({frame.tobytes() for frame in frames}) == strips.FRAMES
+    memory = environment.task.memory
+    assert memory.command.tolist() == [1.0, 0.0, 0.0]
+    assert memory.tick == strips.ticks(1.5, environment.control_timestep(), 1000)[-1]
+    assert np.hypot(*memory.place[:2]) > 0.5
+
+
 def test_without_a_gait_there_is_none():
     with gaitless.registered():
         assert strips.strip(load("queen", "stay"), Demonstrator("queen")) is None
