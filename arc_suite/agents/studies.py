@@ -102,11 +102,22 @@ class Row(NamedTuple):
             folder: of the run.
         """
         given = ["train", f"--robot={self.robot}", f"--task={self.task}", f"--algorithm={self.algorithm}"]
-        given += [f"--seed={self.seed}", f"--steps={self.steps}", f"--output={folder}"]
-        given += [f"--set={name}={_text(name, value)}" for name, value in self.task_kwargs.items()]
+        given += [f"--seed={self.seed}", f"--steps={self.steps}", f"--output={folder}", *self._settings()]
         given += [f"--row={name}={_text(name, value)}" for name, value in self.numbers.items()]
         given += [] if self.prior is None else [f"--prior={self.prior_id}"]
         return given + ([] if self.evaluate_every is None else [f"--evaluate_every={self.evaluate_every}"])
+
+    def page_arguments(self, folder: Path) -> list[str]:
+        """Return the arguments of `arc-suite` that make a page which plays the run's policy.
+
+        Args:
+            folder: of the run.
+        """
+        given = ["render", f"--robot={self.robot}", f"--task={self.task}", f"--policy={folder}", *self._settings()]
+        return [*given, f"--output={self.name}.html"]
+
+    def _settings(self) -> list[str]:
+        return [f"--set={name}={_text(name, value)}" for name, value in self.task_kwargs.items()]
 
 
 class Study(NamedTuple):

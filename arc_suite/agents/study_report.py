@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import evaluation, files
-from arc_suite.agents import studies, study_results
+from arc_suite.agents import studies, study_results, study_strips
 from arc_suite.agents.studies import Study
 from arc_suite.agents.study_results import Result
 
@@ -137,7 +137,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Final returns": [_FINALS, _finals(groups, demonstrators)],
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
         "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
-        "Style": [_STYLE, _style(groups)],
+        "Style": [_STYLE, _style(groups), *study_strips.paragraphs(name, groups, published)],
         "What the paper says": [_CLAIMS, _claims(found)],
     }
     with files.writing(published / CURVES) as temporary:

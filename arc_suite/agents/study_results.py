@@ -12,6 +12,7 @@ from arc_suite.agents import run_folder
 from arc_suite.agents.studies import Row
 
 DEMONSTRATORS = "demonstrators.csv"
+STRIP = "strip.png"  # of a run: frames of its latest policy, see `style.strips`
 
 
 class Result(NamedTuple):

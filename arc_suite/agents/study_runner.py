@@ -2,7 +2,7 @@
 
 The lock of a run is that of its log, which its process inherits: what a killed study has left behind goes on by
 itself, and no other study starts it a second time. Finished runs are published: their tables, a few kilobytes,
-and the style of their policies, go into a folder that is committed and that reports are made of.
+the style of their policies, and a strip of frames go into a folder that is committed and that reports are made of.
 """
 
 import contextlib
@@ -11,7 +11,7 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO, NamedTuple
 
@@ -24,9 +24,11 @@ from arc_suite.agents import run_folder, study_results
 from arc_suite.agents.studies import Row
 from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.data import collect
-from arc_suite.envs.dm import load
+from arc_suite.envs.dm import Environment, load
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import network
+from arc_suite.policies import Policy, network
+from arc_suite.simulation.opengl import RenderingUnavailable
+from arc_suite.style import strips
 
 PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
 
@@ -161,7 +163,9 @@ def remaining(states: Sequence[State], jobs: int) -> float | None:
 
 
 def publish(row: Row, folder: Path, published: Path) -> None:
-    """Copy the tables of a run that has been evaluated, and measure the style of its latest policy.
+    """Copy the tables of a run that has been evaluated, and measure and draw the style of its latest policy.
+
+    What is there already of the same policy stays, and where there is no OpenGL, no strip is drawn.
 
     Args:
         row: of the run.
@@ -183,8 +187,16 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         with files.writing(target / name) as temporary:
             temporary.write_text((source / name).read_text())
     step = int(evaluations["step"][-1])
-    measured = _table(target, "style")
-    if not measured or measured["step"][-1] != step:
+    measured, drawn = _table(target, "style"), target / study_results.STRIP
+    up_to_date = bool(measured) and measured["step"][-1] == step
+    if not up_to_date:
+        drawn.unlink(missing_ok=True)  # before the style is new: where it is, the strip is of the same policy
+    if not drawn.exists():
+        with contextlib.suppress(RenderingUnavailable), _played(row, source) as (environment, policy):
+            if (picture := strips.strip(environment, policy)) is not None:
+                with files.writing(drawn) as temporary:
+                    strips.write(temporary, picture)
+    if not up_to_date:
         text = _style(row, source, step)  # long work, in which a kill is to leave no temporary file
         with files.writing(target / "style.csv") as temporary:
             temporary.write_text(text)
@@ -226,13 +238,18 @@ def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
     return found
 
 
+@contextlib.contextmanager
+def _played(row: Row, folder: Path) -> Iterator[tuple[Environment, Policy]]:
+    """Open the environment of a run, and its latest policy."""
+    body = row.run().body
+    with contextlib.closing(load(body, row.task, row.task_kwargs)) as environment:
+        yield environment, policies.policy(folder / network.FILE, body, task=environment.task.definition)
+
+
 def _style(row: Row, folder: Path, step: int) -> str:
     """Return a table of the metrics of the episodes of the evaluation protocol."""
-    body = row.run().body
-    environment = load(body, row.task, row.task_kwargs)
-    with contextlib.closing(environment):
-        policy = policies.policy(folder / network.FILE, body, task=environment.task.definition)
-        lines = []
+    lines = []
+    with _played(row, folder) as (environment, policy):
         for seed in range(evaluation.EPISODES):
             measured = style.measure(style.record(environment, policy, seed))
             figures = {name: measured[name].value for name in METRICS if name in measured}

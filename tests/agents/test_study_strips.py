@@ -1,0 +1,88 @@
+"""Strips of studies: drawn of the policy whose style is measured, anew where missing, and shown where there are any."""
+
+import numpy as np
+import pytest
+import tiny_studies
+from PIL import Image
+from tqdm import tqdm
+
+from arc_suite import policies
+from arc_suite.agents import study_results, study_runner, study_strips
+from arc_suite.agents.studies import Row
+from arc_suite.agents.study_results import STRIP, Result
+from arc_suite.agents.training import train
+from arc_suite.envs.dm import load
+from arc_suite.simulation.opengl import RenderingUnavailable
+from arc_suite.style import strips
+
+
+def silent(*arguments, **keywords):
+    """A progress bar that shows nothing."""
+    return tqdm(*arguments, **keywords, disable=True)
+
+
+@pytest.fixture
+def finished(tmp_path):
+    """A row whose run is finished, the folder of its study, and one to publish to."""
+    row = tiny_studies.WITH_NUMPY.rows[0]._replace(steps=100)
+    assert train(row.run(), tmp_path / "runs" / row.name, progress=silent)
+    return row, tmp_path / "runs", tmp_path / "results"
+
+
+def unavailable(*arguments):
+    raise RenderingUnavailable("cannot render: no OpenGL")
+
+
+def test_a_strip_is_published_with_the_style(finished, monkeypatch):
+    row, runs, results = finished
+    drawn, style = results / row.name / STRIP, results / row.name / "style.csv"
+    study_runner.publish(row, runs, results)
+    first = drawn.read_bytes()
+    environment = load("tick", "walk", row.task_kwargs)
+    strips.write(drawn, strips.strip(environment, policies.policy(runs / row.name, "tick")))
+    assert drawn.read_bytes() == first
+    assert Image.open(drawn).size == (strips.FRAMES * (strips.WIDTH + strips.GAP) - strips.GAP, strips.HEIGHT)
+
+    # What is there stays; what is missing is drawn, though the style has been measured.
+    monkeypatch.setattr(strips, "strip", lambda environment, policy: np.zeros((20, 30, 3), np.uint8))
+    before = style.stat().st_mtime_ns
+    study_runner.publish(row, runs, results)
+    assert drawn.read_bytes() == first
+    drawn.unlink()
+    study_runner.publish(row, runs, results)
+    assert Image.open(drawn).size == (30, 20)
+    assert style.stat().st_mtime_ns == before
+
+    # Without OpenGL none is drawn, none of another run stays, and the style is measured all the same.
+    monkeypatch.setattr(strips, "strip", unavailable)
+    measured = style.read_text()
+    (results / row.name / "config.json").write_text("{}")
+    study_runner.publish(row, runs, results)
+    assert not drawn.exists()
+    assert style.read_text() == measured
+
+
+def test_without_a_gait_no_strip_is_published(finished, monkeypatch):
+    row, runs, results = finished
+    monkeypatch.setattr(strips, "strip", lambda environment, policy: None)
+    study_runner.publish(row, runs, results)
+    assert sorted(path.name for path in (results / row.name).iterdir()) == [
+        *("config.json", "evaluations.csv", "style.csv", "times.csv"),
+    ]
+
+
+def test_reports_show_the_strips_that_are_there(tmp_path):
+    """Of each kind one, of the first seed that has one; with the command of a page."""
+    rows = [Row("tick", name, 1000, seed, task_kwargs={"gait": "ripple"}) for name in ("sac", "ppo") for seed in (0, 1)]
+    empty = np.empty(0)
+    groups = study_results.grouped([Result(row, empty, empty, {}, empty, {}) for row in rows])
+    assert study_strips.paragraphs("mine", groups, tmp_path) == []
+    for row in rows[1:2]:
+        (tmp_path / row.name).mkdir()
+        (tmp_path / row.name / STRIP).touch()
+    _, title, picture = study_strips.paragraphs("mine", groups, tmp_path)
+    assert title == (
+        '**tick, walk, {"gait": "ripple"}: sac**, seed 1: `arc-suite render --robot=tick --task=walk '
+        "--policy=runs/mine/tick-walk-sac-1 --set=gait=ripple --output=tick-walk-sac-1.html`"
+    )
+    assert picture.endswith("](tick-walk-sac-1/strip.png)")
