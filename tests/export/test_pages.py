@@ -88,7 +88,7 @@ def test_steps_come_along():
     place, arena = environment.physics.data.qpos[:2], environment.task.definition.scene.arena
     unit = ROBOTS["tick"].torso.standing_height
     x, y = (place + np.random.default_rng(0).uniform((-3.0, -5.0), (10.0, 5.0), (500, 2)) * unit).T
-    heights = np.full(500, -np.inf)
+    heights = np.full(500, max(found["planes"]))
     for solid in found["solids"]:
         (half_x, half_y, half_z), (at_x, at_y, at_z) = solid["size"], solid["place"]
         over = (abs(x - at_x) <= half_x) & (abs(y - at_y) <= half_y)
