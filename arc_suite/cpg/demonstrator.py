@@ -8,6 +8,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite import checks, robots, rotations
+from arc_suite.cpg.balancing import BALANCES, Balance, Balanced
 from arc_suite.cpg.law import Ahead, Pattern, felt, joint_targets, torques
 from arc_suite.cpg.planner import PLANS, Plan, Planned
 from arc_suite.cpg.presets import TUNINGS, ByRank, Preset
@@ -85,6 +86,8 @@ class Demonstrator:
             self._law = Sighted(body, preset)
         elif isinstance(preset, Plan):
             self._law = Planned(body, preset)
+        elif isinstance(preset, Balance):
+            self._law = Balanced(body, preset)
         else:
             self._law = Steered(body, preset)
 
@@ -154,16 +157,18 @@ class OnClock:
         return action
 
 
-def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Tread | Plan]:
+def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Balance | Tread | Plan]:
     """Return a body's presets by name: of a robot its numbers, of any other its speed as a share of sqrt(g h).
 
-    Those that follow a command are the same for all.
+    Those that follow a command are the same for all but robots with numbers of their own.
 
     Raises:
         ValueError: a body of a robot's name that has other joints; one line.
     """
-    tread = robots.row(TREADS, body, "presets") or Tread()
-    return {**(robots.row(TUNINGS, body, "presets") or FROUDES), **STEERING, "sighted": tread, **PLANS}
+    own = robots.row(TUNINGS, body, "presets") or FROUDES
+    surefooted = robots.row(BALANCES, body, "presets") or STEERING["surefooted"]
+    sighted = robots.row(TREADS, body, "presets") or Tread()
+    return {**own, **STEERING, "surefooted": surefooted, "sighted": sighted, **PLANS}
 
 
 def first_preset(body: Body, *names: str) -> str:

@@ -117,3 +117,30 @@ def _rotations(axes, angles) -> np.ndarray:
     cross = sum(axes[..., i, None, None] * _CROSS[i] for i in range(3))
     sine, cosine = np.sin(angles)[..., None, None], np.cos(angles)[..., None, None]
     return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
+def flows(motion, places) -> np.ndarray:
+    """Return velocities (rows, places, 2) of places (..., places, 2 or 3) of a body that moves as (rows, 3).
+
+    Args:
+        motion: forward, left and turning, m/s and rad/s.
+        places: m from the centre of turning.
+    """
+    forward, left, turning = (motion[:, i : i + 1] for i in range(3))
+    return np.stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
+
+
+def weights(ways, across: float) -> np.ndarray:
+    """Return weights (..., 3, 3) of what is missing along ways (..., 2), across them, and in height.
+
+    Args:
+        ways: of feet, whatever their length.
+        across: how much it matters, beside its way and its height, that a foot slips across its way.
+    """
+    length = np.hypot(ways[..., 0], ways[..., 1])[..., None]
+    along = np.where(length > 1e-9, ways / np.maximum(length, 1e-9), (1.0, 0.0))
+    found = np.zeros((*along.shape[:-1], 3, 3))
+    found[..., 0, :2] = along
+    found[..., 1, 0], found[..., 1, 1] = -across * along[..., 1], across * along[..., 0]
+    found[..., 2, 2] = 1.0
+    return found

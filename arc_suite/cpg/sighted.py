@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.following import Following, phase
-from arc_suite.cpg.kinematics import Legs
+from arc_suite.cpg.kinematics import Legs, flows, weights
 from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
@@ -130,8 +130,8 @@ class Sighted:
         trust = self._tread.trust
         foreseen = trust * asked + (1.0 - trust) * commanded[:, 3:] * self._units
         feet = self._planned(cycle, asked, foreseen, size, quaternion)
-        weights = _weights(_flows(asked, feet))
-        planned = self._legs.reached(self._state.angles, feet, weights, _DAMPING * self._height, _STEPS)
+        aims = weights(flows(asked, feet), _ACROSS)
+        planned = self._legs.reached(self._state.angles, feet, aims, _DAMPING * self._height, _STEPS)
         targets, ahead = self._legs.by_joint(self._state.angles), self._legs.by_joint(planned)
         self._state.feet[:], self._state.angles[:] = feet, planned
         speeds = (ahead - targets) / self._step
@@ -157,12 +157,12 @@ class Sighted:
         feet, stands = self._state.feet, cycle < self._duty
         left = np.where(stands, 0.0, (1.0 - cycle) / self._cycles)  # control steps from then to landing
         early = np.minimum(left, _EARLY)
-        drift = _flows(foreseen, self._places) * self._step  # of the torso over the ground, a control step
+        drift = flows(foreseen, self._places) * self._step  # of the torso over the ground, a control step
         goal = self._landing(asked, drift * (left + 1.0)[..., None], stands | (left + 1.0 < _HELD / self._cycles))
         goal += drift * early[..., None]
         swung = feet[..., :2] + (goal - feet[..., :2]) / (np.floor(left - early) + 1.0)[..., None]
         stood = (cycle / self._cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
-        stood = feet[..., :2] - _flows(asked, feet) * self._step * stood
+        stood = feet[..., :2] - flows(asked, feet) * self._step * stood
         axes = rotations.matrix(quaternion)[:, 2]  # the world's vertical in the torso's frame
         tilt = axes[:, :1] * self._places[:, 0] + axes[:, 1:2] * self._places[:, 1]
         progress = ((cycle - self._duty) / (1.0 - self._duty)).clip(0.0)
@@ -178,7 +178,7 @@ class Sighted:
             moved: (rows, legs, 2) way of the torso until then, at the feet, m.
             held: (rows, legs) whether what was chosen stays.
         """
-        half = 0.5 * self._stance * _flows(asked, self._places)
+        half = 0.5 * self._stance * flows(asked, self._places)
         along = half / np.maximum(np.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
         landing, shifts = self._places[:, :2] + half, self._state.shifts
         view = footholds.View(self._state.heights, self._state.moved, self._reach)
@@ -190,23 +190,6 @@ class Sighted:
 def _at_ease(legs: Legs, soles, ride: float) -> np.ndarray:
     """Angles (legs, links), rad, at which soles stand under a torso at a height, m, as they (legs, 3) do."""
     goals = np.concatenate([soles[:, :2], np.full((len(soles), 1), -ride)], axis=-1)
-    weights = np.tile(np.diag((0.2, 0.2, 1.0)), (len(soles), 1, 1))
+    aims = np.tile(np.diag((0.2, 0.2, 1.0)), (len(soles), 1, 1))
     middle = 0.5 * (legs.low + legs.high)
-    return legs.reached(middle, goals, weights, _DAMPING * ride, 50)
-
-
-def _flows(motion, places) -> np.ndarray:
-    """Velocities (rows, places, 2) of places (..., places, 2 or 3) that move as (rows, 3) forward, left and turning."""
-    forward, left, turning = (motion[:, i : i + 1] for i in range(3))
-    return np.stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
-
-
-def _weights(ways) -> np.ndarray:
-    """Weights (..., 3, 3) of what is missing along ways (..., 2), across them, and in height."""
-    length = np.hypot(ways[..., 0], ways[..., 1])[..., None]
-    along = np.where(length > 1e-9, ways / np.maximum(length, 1e-9), (1.0, 0.0))
-    weights = np.zeros((*along.shape[:-1], 3, 3))
-    weights[..., 0, :2] = along
-    weights[..., 1, 0], weights[..., 1, 1] = -_ACROSS * along[..., 1], _ACROSS * along[..., 0]
-    weights[..., 2, 2] = 1.0
-    return weights
+    return legs.reached(middle, goals, aims, _DAMPING * ride, 50)

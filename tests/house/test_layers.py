@@ -209,7 +209,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     particular = texts - contract
     assert particular == {"tasks.walk", "tasks.steer", "tasks.ground", "tasks.disturbed", "tasks.navigate"}
     for name in modules():
-        know = ("registration", "cpg.steering", "cpg.sighted", "cpg.footholds", "cpg.planner")
+        know = ("registration", "cpg.steering", "cpg.balancing", "cpg.sighted", "cpg.footholds", "cpg.planner")
         if room(name) != "tasks" and name not in know:
             assert not particular & set(inside(trees()[name])), name
 
