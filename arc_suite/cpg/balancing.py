@@ -55,7 +55,7 @@ class Balance(NamedTuple):
     capture: float
 
 
-# Of robots whose `surefooted` keeps its balance; found by trying.
+# Of robots on which the preset `balanced` was tried; numbers found by hand.
 BALANCES = {
     "leaper": Balance(
         feet=((0.59, 0.9, -0.62), (-0.55, 0.64, -0.64)),

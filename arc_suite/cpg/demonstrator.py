@@ -24,7 +24,11 @@ from arc_suite.tasks.fitting import fitted_gait
 # Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
 FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
-MANNERS = (*STEERING, "sighted")  # presets that follow the command of a task; what is sighted needs to see the ground
+MANNERS = (
+    *STEERING,
+    "sighted",
+    "balanced",
+)  # presets that follow the command of a task; what is sighted needs to see the ground
 
 
 class Demonstrator:
@@ -49,8 +53,8 @@ class Demonstrator:
             robot: queen, bastion, tick or leaper, or any body.
             preset: slow, medium or fast; for the four robots also tuned, which earns most of what
                 the paper's law can earn in walk, and refined, which earns most of all, or numbers of
-                your own; steered, surefooted or sighted, which follow the command of a task; planned, which
-                finds its way among the pillars of a task.
+                your own; steered, surefooted or sighted, and for leaper balanced, which follow the command of
+                a task; planned, which finds its way among the pillars of a task.
             froude: wanted speed as a share of sqrt(g h), h being the standing height, in place of
                 a preset; negative ones walk backwards. Not for the four robots, which have presets
                 alone.
@@ -166,9 +170,8 @@ def presets_of(body: Body) -> Mapping[str, Preset | float | Manner | Balance | T
         ValueError: a body of a robot's name that has other joints; one line.
     """
     own = robots.row(TUNINGS, body, "presets") or FROUDES
-    surefooted = robots.row(BALANCES, body, "presets") or STEERING["surefooted"]
-    sighted = robots.row(TREADS, body, "presets") or Tread()
-    return {**own, **STEERING, "surefooted": surefooted, "sighted": sighted, **PLANS}
+    sighted, balance = robots.row(TREADS, body, "presets") or Tread(), robots.row(BALANCES, body, "presets")
+    return {**own, **STEERING, "sighted": sighted, **PLANS, **({"balanced": balance} if balance else {})}
 
 
 def first_preset(body: Body, *names: str) -> str:

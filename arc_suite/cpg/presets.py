@@ -59,7 +59,7 @@ class Preset(NamedTuple):
 
 
 SPEEDS = ("slow", "medium", "fast")  # the published ones
-PRESETS = (*SPEEDS, "tuned", "refined", "steered", "surefooted", "sighted", "planned")
+PRESETS = (*SPEEDS, "tuned", "refined", "steered", "surefooted", "sighted", "planned", "balanced")
 
 _hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=TRIPOD)
 _queen = functools.partial(

@@ -69,7 +69,7 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         (
             ["--policy=zero", "--preset=slow,fats"],
             "unknown preset 'fats'; did you mean 'fast'? "
-            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned)",
+            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced)",
         ),
         (["--robot=all", "--id=some-v0"], "--id=some-v0: names one dataset, and --robot=all makes 4"),
         (

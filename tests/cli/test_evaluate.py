@@ -92,7 +92,7 @@ def test_json_is_refused_before_the_work_starts():
         (
             ["--policy=zero", "--preset=fats"],
             "unknown preset 'fats'; did you mean 'fast'? "
-            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned)",
+            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced)",
         ),
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
         (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),

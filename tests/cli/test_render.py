@@ -177,7 +177,7 @@ def test_a_take_stays_at_its_end():
         (
             ["--preset=fats", "--output=a.png"],
             "unknown preset 'fats'; did you mean 'fast'? "
-            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned)",
+            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced)",
         ),
         (
             ["--camera=portait", "--output=a.png"],

@@ -8,7 +8,6 @@ import arc_suite
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.balancing import BALANCES, Balanced
 from arc_suite.cpg.demonstrator import presets_of
-from arc_suite.cpg.steering import STEERING, Steered
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 
@@ -34,8 +33,8 @@ def walked(law, task, difficulty, steps, rows=6):
 @pytest.mark.parametrize(("task", "difficulty", "further"), [("rough", 1.0 / 3.0, 0.05), ("slopes", 2.0 / 3.0, 0.2)])
 def test_balance_takes_leaper_further(task, difficulty, further):
     body = ROBOTS["leaper"]
-    before, _ = walked(Steered(body, STEERING["surefooted"]), task, difficulty, 400)
-    after, fell = walked(Demonstrator(body, "surefooted"), task, difficulty, 400)
+    before, _ = walked(Demonstrator(body, "surefooted"), task, difficulty, 400)
+    after, fell = walked(Demonstrator(body, "balanced"), task, difficulty, 400)
     assert after >= before + further and not fell, (before, after, fell)
 
 
@@ -51,8 +50,8 @@ def test_leaper_lifts_its_rear_feet():
 
 
 def test_rows_are_single_demonstrators():
-    rows, policy = VectorEnv("leaper", "rough", 3), Demonstrator("leaper", "surefooted")
-    single, alone = arc_suite.load("leaper", "rough"), Demonstrator("leaper", "surefooted")
+    rows, policy = VectorEnv("leaper", "rough", 3), Demonstrator("leaper", "balanced")
+    single, alone = arc_suite.load("leaper", "rough"), Demonstrator("leaper", "balanced")
     observations, timestep = rows.reset(seed=4)[0], single.reset(5)
     for step in range(40):
         actions = policy.act({name: block.astype(float) for name, block in rows.task.split(observations).items()})
@@ -64,7 +63,7 @@ def test_rows_are_single_demonstrators():
 
 
 def test_a_row_that_begins_again_does_as_the_first_time():
-    rows, policy = VectorEnv("leaper", "rough", 2), Demonstrator("leaper", "surefooted")
+    rows, policy = VectorEnv("leaper", "rough", 2), Demonstrator("leaper", "balanced")
 
     def acted():
         observations = rows.reset(seed=4)[0]
@@ -78,11 +77,12 @@ def test_a_row_that_begins_again_does_as_the_first_time():
     rows.close()
 
 
-def test_other_robots_and_other_presets_walk_as_they_did():
-    assert presets_of(ROBOTS["leaper"])["surefooted"] == BALANCES["leaper"]
-    assert presets_of(ROBOTS["leaper"])["steered"] == STEERING["steered"]
+def test_it_is_a_preset_of_leaper_alone():
+    assert presets_of(ROBOTS["leaper"])["balanced"] == BALANCES["leaper"]
     for body in (ROBOTS["queen"], ROBOTS["bastion"], ROBOTS["tick"], generator.random_body(4)):
-        assert presets_of(body)["surefooted"] == STEERING["surefooted"]
+        assert "balanced" not in presets_of(body)
+    with pytest.raises(ValueError, match="^unknown preset 'balanced'; did you mean 'planned'.*sighted, planned.$"):
+        Demonstrator("queen", "balanced")
 
 
 def test_balance_has_no_scale():

@@ -10,7 +10,7 @@ from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
-ALL = "slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned"
+ALL = "slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced"
 
 
 @pytest.mark.parametrize("name", POLICIES)
