@@ -24,11 +24,8 @@ from arc_suite.tasks.fitting import fitted_gait
 # Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
 FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
-MANNERS = (
-    *STEERING,
-    "sighted",
-    "balanced",
-)  # presets that follow the command of a task; what is sighted needs to see the ground
+# Presets that follow the command of a task; what is sighted needs to see the ground.
+MANNERS = (*STEERING, "sighted", "balanced")
 
 
 class Demonstrator:
