@@ -2,7 +2,8 @@
 
     python tools/check_clients.py
 
-A section with a `pip install` line is a client; what one leaves in Minari's folder of datasets, the later ones find.
+A section with a `pip install` line is a client. What one leaves in Minari's folder of datasets, or in the folder where
+its code runs, the later ones find.
 Prints a line for each and exits with status 1 if one fails.
 """
 
