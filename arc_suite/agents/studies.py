@@ -192,6 +192,19 @@ STUDIES = {
             if row.prior is not None
         ),
     ),
+    # What learners make of tasks in which feedback pays.
+    "tasks": Study(
+        "following a command, and rough ground: PPO, and SAC without and with 100 episodes of a demonstrator",
+        tuple(
+            row
+            for task, preset in (("steer", "steered"), ("rough", "surefooted"))
+            for row in (
+                Row("tick", "ppo", 1_000_000, task=task),
+                Row("tick", "sac", 50_000, task=task, evaluate_every=5000),
+                Row("tick", "sacfd", 50_000, task=task, evaluate_every=5000, prior=Prior(preset, 100)),
+            )
+        ),
+    ),
     "beyond": Study(
         "beyond the paper: imitation of the demonstrators, and PPO from nothing",
         (
