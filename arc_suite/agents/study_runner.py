@@ -35,7 +35,8 @@ PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
 # Metrics of `arc_suite.style` by which the final policies are compared.
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 
-PRESETS = ("medium", "refined")  # of demonstrators whose returns are published beside those of runs
+# Of demonstrators whose returns are published beside those of runs: in `walk`, and where there is a command.
+PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
 
 _PAUSE = 0.2  # s between two looks at the processes
 
@@ -231,7 +232,7 @@ def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
     body, found = row.run().body, {}
     rows = VectorEnv(body, row.task, evaluation.EPISODES, 1, AutoresetMode.DISABLED, task_kwargs=dict(row.task_kwargs))
     with contextlib.closing(rows):
-        for preset in PRESETS:
+        for preset in COMMANDED if "command" in rows.task.blocks else PRESETS:
             if preset in presets_of(body):
                 policy = policies.policy("cpg", body, preset, evaluation.EPISODES, task=rows.task)
                 found[preset] = evaluation.episodes_in_rows(rows, policy)
