@@ -188,8 +188,11 @@ class Terrain(Arena):
 
     @functools.cached_property
     def _bottom(self) -> float:
-        """The lowest height of stairs and trenches, in units: a plane, which costs less than boxes do."""
-        return self._profiles.min()
+        """Height of the plane below stairs and trenches, in units: their lowest, as a plane costs less than boxes.
+
+        Beside a height field it is below that, or feet would touch both.
+        """
+        return -_TRENCH if self._fields else self._profiles.min()
 
     def _random(self, lane: int) -> np.random.RandomState:
         """The stream of random numbers of a lane, by its kind and by how many of that kind are before it."""

@@ -29,13 +29,15 @@ def opened(kind="stairs", robot="tick", **settings):
     return environment, environment.task.definition, environment.task.memory
 
 
-@pytest.mark.parametrize("curriculum", [False, True])
-def test_height_is_that_of_rays_in_every_lane(curriculum):
-    task, model = prepared("leaper", "course", {"curriculum": curriculum})
+@pytest.mark.parametrize(
+    ("name", "curriculum", "kinds", "lanes"),
+    [("course", False, KINDS, 8), ("course", True, KINDS, 4 * LEVELS), ("stairs", False, ["stairs"], 4)],
+)
+def test_height_is_that_of_rays_in_every_lane(name, curriculum, kinds, lanes):
+    task, model = prepared("leaper", name, {"curriculum": curriculum})
     arena, data = task.scene.arena, mujoco.MjData(model)
-    lanes = len(arena.lanes)
-    assert lanes == (4 * LEVELS if curriculum else 4 * 2)
-    assert {kind for kind, _ in arena.lanes} == set(KINDS)
+    assert len(arena.lanes) == lanes
+    assert {kind for kind, _ in arena.lanes} == set(kinds)
     data.qpos[2] = 1e3
     mujoco.mj_forward(model, data)
     random, hit = np.random.RandomState(0), np.zeros(1, np.int32)
@@ -77,6 +79,12 @@ def test_a_lane_is_the_same_beside_others():
     heights = [arena.height(places, arena.start(lane) + 0.0 * places) for arena, lane in ((alone, 0), (beside, 2))]
     assert heights[0].any()
     assert_array_equal(*heights)
+
+
+def test_a_height_field_lies_over_the_plane_below_stairs():
+    """Of two surfaces at one height both would touch a foot."""
+    model = compiled(ROBOTS["tick"], terrain.made(ROBOTS["tick"], {"rough": 1, "stairs": 1}, 20.0))
+    assert model.geom("floor_bottom").pos[2] < model.geom("floor").pos[2]
 
 
 @pytest.mark.parametrize("kind", ["rough", "slopes"])
