@@ -24,7 +24,7 @@ from arc_suite.tasks.fitting import fitted_gait
 # Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
 FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
-# Presets that follow the command of a task; what is sighted needs to see the ground.
+# Presets that follow the command of a task; what is sighted needs to see the ground, and balanced is Leaper's alone.
 MANNERS = (*STEERING, "sighted", "balanced")
 
 
