@@ -55,7 +55,7 @@ class Balance(NamedTuple):
     capture: float
 
 
-# Of robots on which the preset `balanced` was tried; numbers found by hand.
+# Of robots that have the preset `balanced`; found by trying.
 BALANCES = {
     "leaper": Balance(
         feet=((0.59, 0.9, -0.62), (-0.55, 0.64, -0.64)),
@@ -71,13 +71,12 @@ BALANCES = {
     )
 }
 
-_STEEP = 0.3  # sine of the torso's tilt, over which it walks slower, and at twice which not at all
+_STEEP = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
 _KEPT = 0.6  # share of the shift for balance that is left when a foot takes off
 _ACROSS = 1.0  # how much it matters, beside its way and its height, that a foot does not slip across its way
 _USED = 0.98  # share of a joint's range, about its middle, that targets may use
 _DAMPING = 0.02  # of inverse kinematics, in standing heights
 _STEPS = 3  # of it in a control step
-_SETTLING = 50  # steps of it to the pose at ease
 
 
 class Balanced:
@@ -101,15 +100,11 @@ class Balanced:
         self._units = velocity_units(body, parameters.target_velocity)
         self._stiffness, self._damping = position_gains(body, pose.inertias)
         self._following = Following(balance.gain, balance.integral, self._cycles)
-        sides = [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
-        places = np.array([balance.feet[rank] for rank in body.ranks]) * pose.height
-        places[:, 1] *= sides
-        self._places = places
-        self._ride = -places[:, 2].mean()
+        self._places = np.array([balance.feet[rank] for rank in body.ranks]) * pose.height
+        self._places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
+        self._ride = -self._places[:, 2].mean()
         self._fall = math.sqrt(self._ride / GRAVITY)  # s, of an inverted pendulum as high
-        aims = np.tile(np.eye(3), (len(places), 1, 1))
-        middle = 0.5 * (self._legs.low + self._legs.high)
-        self._first = self._legs.reached(middle, places, aims, _DAMPING * pose.height, _SETTLING)
+        self._first = self._legs.at_ease(self._places, np.eye(3), _DAMPING * pose.height)
         self._angles = None
 
     def begin(self, rows: Sequence[int]) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 from arc_suite.robots.spec import Body
 
 _USED = 0.95  # share of a joint's range, about its middle, that targets may use
+_SETTLING = 50  # steps of the search for a pose at ease
 # Cross products with the unit vectors, as matrices.
 _CROSS = np.array(
     [[[0, 0, 0], [0, 0, -1], [0, 1, 0]], [[0, 0, 1], [0, 0, 0], [-1, 0, 0]], [[0, -1, 0], [1, 0, 0], [0, 0, 0]]]
@@ -104,6 +105,17 @@ class Legs(NamedTuple):
             change = _least(np.where(bound[..., None, :], 0.0, weighed), missing, damping)
             angles = (angles + change).clip(self.low, self.high)
         return angles
+
+    def at_ease(self, places, weights, damping: float) -> np.ndarray:
+        """Return the angles (legs, links), rad, near the middle of the joints' ranges, that bring soles near places.
+
+        Args:
+            places: (legs, 3) m.
+            weights: (3, 3) as for `reached`, of all legs.
+            damping: m.
+        """
+        weights = np.tile(weights, (len(places), 1, 1))
+        return self.reached(0.5 * (self.low + self.high), places, weights, damping, _SETTLING)
 
 
 def _least(jacobian, missing, damping: float) -> np.ndarray:

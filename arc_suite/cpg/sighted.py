@@ -102,7 +102,8 @@ class Sighted:
         self._reach = reach(body)
         self._stiffness, self._damping = position_gains(body, pose.inertias)
         self._following = Following(tread.gain, tread.integral, self._cycles)
-        angles = _at_ease(self._legs, pose.soles, tread.ride * pose.height)
+        soles = np.where((True, True, False), pose.soles, -tread.ride * pose.height)
+        angles = self._legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), _DAMPING * tread.ride * pose.height)
         self._places = self._legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
         self._first = _State(self._places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
@@ -185,11 +186,3 @@ class Sighted:
         found = footholds.shifts(view, landing + moved, along, self._places[:, :2], self._height)
         shifts[:] = np.where(held, shifts, found)
         return landing + shifts[..., None] * along
-
-
-def _at_ease(legs: Legs, soles, ride: float) -> np.ndarray:
-    """Angles (legs, links), rad, at which soles stand under a torso at a height, m, as they (legs, 3) do."""
-    goals = np.concatenate([soles[:, :2], np.full((len(soles), 1), -ride)], axis=-1)
-    aims = np.tile(np.diag((0.2, 0.2, 1.0)), (len(soles), 1, 1))
-    middle = 0.5 * (legs.low + legs.high)
-    return legs.reached(middle, goals, aims, _DAMPING * ride, 50)
