@@ -14,7 +14,8 @@ import pytest
 import tiny_studies
 
 from arc_suite import policies, style
-from arc_suite.agents import run_folder, studies, study_runner
+from arc_suite.agents import run_folder, studies, study_results, study_runner
+from arc_suite.agents.studies import Row
 from arc_suite.agents.study_runner import METRICS, State
 from arc_suite.envs.dm import load
 
@@ -233,3 +234,11 @@ def test_without_submitit_it_says_what_to_install(tmp_path):
     line = "arc-suite study: --submit needs submitit: pip install 'arc_suite[cluster]' ("
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith(line) and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(("task", "presets"), [("walk", ["medium", "refined"]), ("rough", ["steered", "surefooted"])])
+def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, task, presets):
+    row = Row("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
+    study_runner.publish_all([row], tmp_path / "runs", tmp_path)
+    found = study_results.demonstrators(tmp_path)[row.place]
+    assert list(found) == presets and all(len(totals) == 10 for totals in found.values())
