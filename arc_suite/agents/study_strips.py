@@ -9,7 +9,8 @@ from arc_suite.agents.study_results import STRIP, Result
 _STRIPS = (
     "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle, to the nearest "
     "control step: the fifth cycle, or the latest whole one before a fall. The camera goes along and keeps its "
-    "direction; where the task tells a command, it is straight ahead. The command line makes a page that plays the policy."
+    "direction; where the task tells a command, it is straight ahead. The command line makes a page that plays the "
+    "policy."
 )
 
 
