@@ -164,14 +164,18 @@ _IMPROVEMENT = (
     "at the latest step that both have reached. With one seed, episodes stand for runs: the interval then tells "
     "nothing of other seeds."
 )
-_STYLE = "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each."
+_STYLE = (
+    "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each. "
+    "Heading and drift are told from the x axis, which is not the way where a command turns."
+)
 _CLAIMS = (
     "How far each sentence is from being false, in its own unit: above zero it holds. The paper's figure is from its "
     "final returns after 1,000,000 steps, where those tell. Ours are of finished runs alone, at the steps they have."
 )
 _LEADERBOARD = (
     "Of all studies whose tables lie here, written by `arc-suite study NAME --report`. Return: mean of the latest "
-    "evaluation, and interquartile mean with 95 % bootstrap interval over seeds, or of a single seed over episodes."
+    "evaluation, and interquartile mean with 95 % bootstrap interval over seeds, or of a single seed over episodes. "
+    "Then the task's own figure, speed in m/s; headings are told from the x axis, which is not the way of a command."
 )
 
 
@@ -318,16 +322,15 @@ def _leaderboard(folder: Path) -> str:
     cells = []
     for name, seeds in lines:
         row, values = seeds[0].row, study_results.scores(seeds)
-        tracking = np.mean([np.mean(next(iter(each.progress.values()))) for each in seeds])
+        figure = next(iter(seeds[0].progress))
+        own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
         style = [_size(name, seeds) for name in ("gait_compliance", "heading_error", "torso_pitch")]
         command = shlex.join(["arc-suite", *row.arguments(Path("runs", name, row.name))])
         steps = f"{min(each.steps[-1] for each in seeds):,} of {row.steps:,}"
         cpu = f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}"
         result = f"{np.mean([each.final for each in seeds]):.1f}"
         link = f"[{name}]({name}/{REPORT})"
-        cells.append(
-            (row.place, row.kind, result, _iqm(values), f"{tracking:.3f}", *style, steps, cpu, link, f"`{command}`")
-        )
-    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "speed, m/s", "gait compliance")
+        cells.append((row.place, row.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
+    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "figure", "gait compliance")
     heads += ("heading error, rad", "torso pitch, rad")
     return _table((*heads, "steps", "CPU min", "study", "command of seed 0"), cells)
