@@ -16,7 +16,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.following import Following, phase
-from arc_suite.cpg.kinematics import Legs, flows, weights
+from arc_suite.cpg.kinematics import Legs, flows, rises, weights
 from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.models.sizing import GRAVITY, control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
@@ -149,7 +149,6 @@ class Balanced:
         half = 0.5 * self._stance * flows(asked, self._places)
         kept = _KEPT + (1.0 - _KEPT) * 0.5 * (1.0 + along)
         ground = self._places[:, :2] + size[..., None] * (along * half + kept * shift[:, None])
-        tilt = vertical[:, :1] * self._places[:, 0] + vertical[:, 1:2] * self._places[:, 1]
         lift = self._balance.lift * self._height * np.sin(np.pi * swung)
-        heights = self._places[:, 2] + size * (lift + self._balance.attitude * tilt)
+        heights = self._places[:, 2] + size * (lift + self._balance.attitude * rises(vertical, self._places))
         return np.concatenate([ground, heights[..., None]], axis=-1)

@@ -27,6 +27,9 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 # Presets that follow the command of a task; what is sighted needs to see the ground, and balanced is Leaper's alone.
 MANNERS = (*STEERING, "sighted", "balanced")
 
+# The law of each kind of preset that goes by what a task says; all others go by a clock of their own.
+LAWS = {Manner: Steered, Tread: Sighted, Balance: Balanced, Plan: Planned}
+
 
 class Demonstrator:
     """A policy that walks one body by a preset, in one environment or in the rows of a batch.
@@ -83,14 +86,8 @@ class Demonstrator:
             self._law = OnClock(body, Prescribed.fit(body, preset, gait))
         elif gait is not None:
             raise ValueError("gait: expected none, as the preset walks in the gait of the task")
-        elif isinstance(preset, Tread):
-            self._law = Sighted(body, preset)
-        elif isinstance(preset, Plan):
-            self._law = Planned(body, preset)
-        elif isinstance(preset, Balance):
-            self._law = Balanced(body, preset)
         else:
-            self._law = Steered(body, preset)
+            self._law = LAWS[type(preset)](body, preset)
 
     def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start episodes in some rows, given by their indices; seeds make no difference."""

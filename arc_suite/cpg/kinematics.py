@@ -142,6 +142,16 @@ def flows(motion, places) -> np.ndarray:
     return np.stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
 
 
+def rises(vertical, places) -> np.ndarray:
+    """Return how much higher (rows, places), m, places of the torso are than they would be were it level.
+
+    Args:
+        vertical: (rows, 3) the world's, in the torso's frame.
+        places: (places, 2 or 3) m from the centre.
+    """
+    return vertical[:, :1] * places[:, 0] + vertical[:, 1:2] * places[:, 1]
+
+
 def weights(ways, across: float) -> np.ndarray:
     """Return weights (..., 3, 3) of what is missing along ways (..., 2), across them, and in height.
 

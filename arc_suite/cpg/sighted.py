@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.following import Following, phase
-from arc_suite.cpg.kinematics import Legs, flows, weights
+from arc_suite.cpg.kinematics import Legs, flows, rises, weights
 from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
@@ -164,8 +164,7 @@ class Sighted:
         swung = feet[..., :2] + (goal - feet[..., :2]) / (np.floor(left - early) + 1.0)[..., None]
         stood = (cycle / self._cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
         stood = feet[..., :2] - flows(asked, feet) * self._step * stood
-        axes = rotations.matrix(quaternion)[:, 2]  # the world's vertical in the torso's frame
-        tilt = axes[:, :1] * self._places[:, 0] + axes[:, 1:2] * self._places[:, 1]
+        tilt = rises(rotations.matrix(quaternion)[:, 2], self._places)  # by the world's vertical in the torso's frame
         progress = ((cycle - self._duty) / (1.0 - self._duty)).clip(0.0)
         lift = size * self._tread.lift * self._height * np.sin(np.pi * progress)
         heights = self._places[:, 2] + lift + self._tread.attitude * tilt

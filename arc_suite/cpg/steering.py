@@ -14,6 +14,7 @@ import numpy as np
 
 from arc_suite import robots, rotations
 from arc_suite.cpg.following import Following, phase
+from arc_suite.cpg.kinematics import flows, rises
 from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.cpg.stride import lifted
 from arc_suite.models.sizing import control_timestep, position_gains, sized
@@ -126,8 +127,8 @@ class Steered:
         self._units = velocity_units(body, parameters.target_velocity)
         self._stiffness, self._damping = position_gains(body, pose.inertias)
         self._following = Following(manner.gain, manner.integral, self._cycles)
-        feet = [np.hypot(*leg.foot) + spec.foot.radius for leg, spec in zip(self._legs, body.legs, strict=True)]
-        self.extent = float(max(feet))
+        self._feet = np.array([leg.foot for leg in self._legs])
+        self.extent = float(max(np.hypot(*self._feet.T) + [leg.foot.radius for leg in body.legs]))
 
     def begin(self, rows: Sequence[int]) -> None:
         """Start episodes in some rows, given by their indices."""
@@ -148,14 +149,13 @@ class Steered:
         """Sweeps, raised poses and lifts of all joints, (rows, joints) each."""
         shape = (len(asked), len(self._neutral))
         sweeps, raised, lifts = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-        axes = rotations.matrix(quaternion)[:, 2]  # the world's vertical in the torso's frame
-        for leg in self._legs:
-            x, y = leg.foot
-            way = 0.5 * self._stance * np.stack([asked[:, 0] - asked[:, 2] * y, asked[:, 1] + asked[:, 2] * x], axis=-1)
-            sweep, able = _sweep(leg, way, self._level)
+        ways = 0.5 * self._stance * flows(asked, self._feet)
+        # The low side of the torso is pushed up: its feet go down.
+        lows = -rises(rotations.matrix(quaternion)[:, 2], self._feet) / self._height
+        for index, leg in enumerate(self._legs):
+            sweep, able = _sweep(leg, ways[:, index], self._level)
             sweeps[:, leg.joints] = sweep
-            # The low side of the torso is pushed up: its feet go down.
-            low = -(axes[:, :1] * x + axes[:, 1:2] * y) / self._height
+            low = lows[:, index : index + 1]
             raised[:, leg.joints] = ((1.0 - able) * self._unload - self._manner.attitude * low) * leg.lift
             lifts[:, leg.joints] = leg.lift
         return sweeps, raised, lifts
