@@ -98,11 +98,7 @@ def run(
         ValueError: a row that does not fit, or the folder of another run; one line.
         OSError: something cannot be written; one line.
     """
-    files.folder(folder)
-    words = ["finished" if is_finished(row, folder / row.name) else "waiting" for row in rows]
-    waiting = [row for row, word in zip(rows, words, strict=True) if word == "waiting"]
-    for row in {row.prior_id: row for row in waiting if row.prior is not None}.values():
-        collect(row.prior_id, row.prior_settings, row.prior.episodes, threads=jobs, progress=progress)
+    words = prepared(rows, folder, jobs, progress)
     running: dict[int, tuple[subprocess.Popen, IO]] = {}
 
     def states():
@@ -112,7 +108,7 @@ def run(
         while not {"waiting", "elsewhere", "running"}.isdisjoint(words):
             for place, row in enumerate(rows):
                 if words[place] in ("waiting", "elsewhere") and len(running) < jobs:
-                    log = _claimed(folder / f"{row.name}.log")
+                    log = claimed(folder / f"{row.name}.log")
                     words[place] = "running" if log else "elsewhere"
                     if log:
                         running[place] = _started(row, folder / row.name, log), log
@@ -131,6 +127,30 @@ def run(
             process.wait()
     publish_all(rows, folder, published)  # those too that were finished before, or made elsewhere
     return states()
+
+
+def prepared(rows: Sequence[Row], folder: Path, threads: int, progress: Callable = tqdm) -> list[str]:
+    """Collect the prior data of the runs that are not finished, and return the word for each run, as in `State`.
+
+    Raises:
+        ValueError: a row that does not fit, or the folder of another run; one line.
+        OSError: something cannot be written; one line.
+    """
+    files.folder(folder)
+    words = ["finished" if is_finished(row, folder / row.name) else "waiting" for row in rows]
+    waiting = [row for row, word in zip(rows, words, strict=True) if word == "waiting"]
+    for row in {row.prior_id: row for row in waiting if row.prior is not None}.values():
+        collect(row.prior_id, row.prior_settings, row.prior.episodes, threads=threads, progress=progress)
+    return words
+
+
+def claimed(log: Path) -> IO | None:
+    """Return the open log of a run, locked; None where another process goes on with the run."""
+    file = log.open("ab")
+    if files.lock(file):
+        return file
+    file.close()
+    return None
 
 
 def state(row: Row, folder: Path, word: str) -> State:
@@ -256,15 +276,6 @@ def _style(row: Row, folder: Path, step: int) -> str:
             figures = {name: measured[name].value for name in METRICS if name in measured}
             lines.append(",".join(map(repr, (step, seed, *figures.values()))))
     return "\n".join([",".join(("step", "seed", *figures)), *lines]) + "\n"
-
-
-def _claimed(log: Path) -> IO | None:
-    """Return the open log of a run, locked; None where another process goes on with the run."""
-    file = log.open("ab")
-    if files.lock(file):
-        return file
-    file.close()
-    return None
 
 
 def _started(row: Row, folder: Path, log: IO) -> subprocess.Popen:

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from tqdm import tqdm
 from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.agents import run_folder
 from arc_suite.agents.algorithms import Algorithm
+from arc_suite.agents.calls import Call, advancing, alone
 from arc_suite.agents.learner import ENVIRONMENT, MOST_SEEDS, Diverged, Learner, Stage
 from arc_suite.agents.run_folder import RunFolder
 from arc_suite.data.settings import model_sha256
@@ -125,6 +126,18 @@ def train(
         Diverged: numbers of the learner are no longer finite; the checkpoint before stays.
         OSError: the disk is full, or the like; the checkpoint before stays.
     """
+    return alone(training(run, folder, minutes, threads, progress, told))
+
+
+def training(
+    run: Run,
+    folder: Path,
+    minutes: float | None = None,
+    threads: int = 1,
+    progress: Callable = tqdm,
+    told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
+) -> Generator[Call, Any, bool]:
+    """Do what `train` does, and yield the calls that its learner leaves to whoever drives it."""
     began = time.monotonic()
     config, definition = run.config(), run.definition
     module = definition.module
@@ -142,7 +155,7 @@ def train(
                 if minutes is not None and time.monotonic() - began > 60.0 * minutes:
                     return False
                 due = min((state["evaluated"] // run.interval + 1) * run.interval, run.steps)
-                figures = learner.advance(due)
+                figures = yield from advancing(learner, due)
                 bar.update(learner.step - bar.n)
                 arrays = learner.arrays()
                 _check_finite(arrays, learner.step)

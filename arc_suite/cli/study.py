@@ -8,23 +8,31 @@ enough to be committed, and the report is made of that folder alone.
   arc-suite study first-steps --report
   arc-suite study paper --jobs 8 --shard 3/16
   arc-suite study paper --submit 16 --hours 24
+  arc-suite study paper --together 10
   arc-suite study my_studies:MINE
 """
 
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from absl import flags
 
 from arc_suite.agents import studies, study_report, study_runner
+from arc_suite.agents.studies import Row
 from arc_suite.agents.study_runner import State
-from arc_suite.cli.program import progress
+from arc_suite.cli.program import progress, use_one_thread
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
+flags.DEFINE_integer(
+    "together",
+    None,
+    "Runs that learn alike, side by side in this process: for a GPU, in place of --jobs.",
+    lower_bound=1,
+)
 flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth, from the ith on, which counts from 0.")
 flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
 flags.DEFINE_float("hours", 24.0, "Of a job; it comes back until its share is done.", lower_bound=0.1)
@@ -51,13 +59,32 @@ def main(name: str | None = None) -> int:
         return 0
     if FLAGS.submit is not None:
         return submit(name, folder, results)
-    jobs = FLAGS.jobs or os.cpu_count()
-    states = study_runner.run(rows, folder, results, jobs, shown(jobs), progress)
+    if FLAGS.together is not None:
+        jobs, states = FLAGS.together, together(rows, folder, results, FLAGS.together)
+    else:
+        jobs = FLAGS.jobs or os.cpu_count()
+        states = study_runner.run(rows, folder, results, jobs, shown(jobs), progress)
     print(table(states, jobs))
     failed = [each.row.name for each in states if each.word == "failed"]
     for run in failed:
         print(f"{folder / run}.log: {last_line(folder / f'{run}.log')}", file=sys.stderr)
     return 1 if failed else 0
+
+
+def together(rows: Sequence[Row], folder: Path, results: Path, width: int) -> list[State]:
+    """Make runs side by side in this process.
+
+    Raises:
+        ValueError: JAX is not installed, or a flag contradicts; one line.
+    """
+    if FLAGS.jobs is not None:
+        raise ValueError("--together and --jobs: one process, or several; give one of them")
+    use_one_thread()
+    try:
+        from arc_suite.agents import study_together
+    except ImportError as error:
+        raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
+    return study_together.run(rows, folder, results, width, shown(width), progress)
 
 
 def submit(name: str, folder: Path, results: Path) -> int:

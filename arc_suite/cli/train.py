@@ -15,7 +15,6 @@ and losses, a checkpoint, the policy, and a picture of its returns, which grows 
 
 import contextlib
 import importlib.util
-import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -25,7 +24,7 @@ from arc_suite import evaluation, files
 from arc_suite.agents import algorithms, run_folder
 from arc_suite.agents.training import Run, train
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, named_values, only_body, task
-from arc_suite.cli.program import progress
+from arc_suite.cli.program import progress, use_one_thread
 from arc_suite.policies import network, onnx_file
 
 FLAGS = flags.FLAGS
@@ -47,14 +46,10 @@ flags.DEFINE_integer("threads", 1, "Threads to simulate on; the run does not dep
 flags.DEFINE_bool("tensorboard", False, "Write figures for TensorBoard too, into the folder of the run.")
 flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TASK-ALGORITHM-SEED]", short_name="o")
 
-# One thread a run: two runs on two cores learn twice as much, two threads in a run hardly more than one.
-_ONE_THREAD = {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
-
 
 def main() -> None:
     """Train, and print what the policy earns."""
-    for name, value in _ONE_THREAD.items():
-        os.environ.setdefault(name, value)  # read when JAX is imported
+    use_one_thread()
     definition = algorithms.algorithm(FLAGS.algorithm).with_row(named_values("row", FLAGS.row))
     body = only_body(_ROBOT)
     steps = FLAGS.steps or definition.steps

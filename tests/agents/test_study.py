@@ -159,13 +159,13 @@ def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
 def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
     """It is not started twice, whoever makes it."""
     log = tmp_path / "a.log"
-    held = study_runner._claimed(log)
-    assert study_runner._claimed(log) is None
+    held = study_runner.claimed(log)
+    assert study_runner.claimed(log) is None
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, stdout=held)
     held.close()
-    assert study_runner._claimed(log) is None, "the process of the run holds it too"
+    assert study_runner.claimed(log) is None, "the process of the run holds it too"
     child.communicate(b"\n")
-    study_runner._claimed(log).close()
+    study_runner.claimed(log).close()
 
 
 def test_remaining_time():
