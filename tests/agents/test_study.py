@@ -74,7 +74,7 @@ def contents(folder):
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["WITH_NUMPY", "WITH_JAX"])
 def test_killed_twice(name, tmp_path, begun):
     """First with all its processes, then alone, so that its runs go on; two jobs make what one makes."""

@@ -11,7 +11,7 @@ from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.robots import ROBOTS, generator
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(("task", "difficulty", "further"), [("rough", 1.0 / 3.0, 0.05), ("slopes", 2.0 / 3.0, 0.2)])
 def test_balance_takes_leaper_further(task, difficulty, further):
     ground = {"difficulty": difficulty, "terrain_seed": 1}

@@ -12,6 +12,7 @@ import sys
 
 import minari
 import pytest
+from tiers import never, tiers
 from tqdm import tqdm
 
 from arc_suite import data
@@ -85,11 +86,10 @@ def killed_at(count, **arguments):
     return process.exitcode == 9
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "scenario",
-    ["new", "more episodes", *(slowly(name) for name in ("new after another", "overwrite", "overwrite twice"))],
-)
+SCENARIOS = ("new", "more episodes", "new after another", "overwrite", "overwrite twice")
+
+
+@pytest.mark.parametrize("scenario", tiers(SCENARIOS, never, lambda name: name in ("new", "overwrite twice")))
 def test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it(root, scenario):
     old = SETTINGS._replace(seed=9)
     collect("arc_suite/test/old-v0", old, 3)

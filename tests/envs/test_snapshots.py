@@ -5,6 +5,7 @@ import io
 import numpy as np
 import pytest
 from gymnasium.error import ResetNeeded
+from tiers import tiers
 
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import TASKS
@@ -30,9 +31,12 @@ def assert_equal_steps(one, other, actions):
             np.testing.assert_array_equal(mine, theirs)
 
 
-@pytest.mark.parametrize("mode", ["SameStep", pytest.param("NextStep", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
-    "task", [t if t in ("walk", "gaps") else pytest.param(t, marks=pytest.mark.slow) for t in TASKS]
+    ("task", "mode"),
+    tiers(
+        [(task, mode) for task in TASKS for mode in ("SameStep", "NextStep")],
+        check=lambda task, mode: task in ("walk", "gaps") and mode == "SameStep",
+    ),
 )
 def test_another_environment_goes_on_to_the_bit(task, mode):
     actions = np.random.default_rng(0).uniform(-0.5, 0.5, (100, ROWS, 18))

@@ -7,6 +7,7 @@ import gltf_reader
 import mujoco
 import numpy as np
 import pytest
+from tiers import never, tiers
 
 import arc_suite
 from arc_suite import export, policies
@@ -207,8 +208,7 @@ def test_forward_is_z_and_left_is_x():
     assert rest["l1_foot"][0, 2, 3] > rest["l3_foot"][0, 2, 3]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("robot", "preset"), PRESETS)
+@pytest.mark.parametrize(("robot", "preset"), tiers(PRESETS, never, lambda robot, preset: preset == "tuned"))
 def test_presets_return(robot, preset):
     """Within half a degree before the seam is mended; as fast as the walk; two events a foot and cycle for tuned."""
     body = ROBOTS[robot]
@@ -226,8 +226,7 @@ def test_presets_return(robot, preset):
         assert clip.cycles == 3
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", tiers(range(20), never, lambda seed: seed < 4))
 def test_random_bodies_step_once_a_cycle(seed):
     body = random_body(seed)
     (clip,) = export.clips(body, ["walk"])
@@ -288,8 +287,7 @@ def test_a_stop_walks_and_then_stands(robot):
     assert abs(np.diff(motion.joints[-10:], axis=0)).max() < np.radians(1.0)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "tick"))
 def test_between_frames_a_clip_is_near_the_physics(robot):
     """Played at every substep, parts are within 6 mm of where substeps have them."""
     body = ROBOTS[robot]
@@ -337,8 +335,7 @@ def test_errors_are_one_line(arguments, message):
     assert str(caught.value).startswith(message) and "\n" not in str(caught.value)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "queen"))
 def test_every_clip_can_be_made(robot):
     body = ROBOTS[robot]
     clips = export.clips(body, list(CLIPS))

@@ -14,7 +14,7 @@ from dm_control.rl.control import PhysicsError
 import arc_suite
 
 FOLDER = pathlib.Path(__file__).parents[1]
-STEPS = 60
+STEPS = 20
 ENVIRON = os.environ | {"PYTHONPATH": str(FOLDER.parent)}
 
 

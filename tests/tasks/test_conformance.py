@@ -12,6 +12,7 @@ from dm_control.rl import control
 from dm_env import specs
 from dm_env.test_utils import EnvironmentTestMixin
 from numpy.testing import assert_array_equal
+from tiers import never, tiers
 
 import arc_suite
 from arc_suite.tasks import TASKS
@@ -20,11 +21,7 @@ JOINTS = {"queen": 18, "bastion": 12, "tick": 18, "leaper": 12}
 # Robots take turns from task to task in `make check`; `make test` takes all pairs.
 TURNS = {(list(JOINTS)[index % len(JOINTS)], task) for index, task in enumerate(TASKS)}
 every_task = pytest.mark.parametrize(
-    ("domain", "task"),
-    [
-        pytest.param(*pair, marks=() if pair in TURNS or pair[1] == "walk" else pytest.mark.slow)
-        for pair in arc_suite.ALL_TASKS
-    ],
+    ("domain", "task"), tiers(arc_suite.ALL_TASKS, lambda domain, task: (domain, task) in TURNS or task == "walk")
 )
 
 
@@ -166,8 +163,7 @@ def test_bad_action_is_refused_and_changes_nothing(domain, task):
 CALM = [pair for pair in arc_suite.ALL_TASKS if "kicks" not in TASKS[pair[1]].modifiers]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(("domain", "task"), CALM)
+@pytest.mark.parametrize(("domain", "task"), tiers(CALM, never, lambda *pair: pair in TURNS))
 def test_episode_is_1000_steps_of_50_ms(domain, task):
     environment = load(domain, task, healthy_range=(-10.0, 10.0))
     timestep, length = environment.reset(), 0

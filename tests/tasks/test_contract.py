@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.testing import assert_array_equal
+from tiers import tiers
 
 import arc_suite
 from arc_suite.envs.scene import prepared
@@ -27,15 +28,15 @@ PLACES = [
     for name, task in TASKS.items()
     for settings in ([{}] if task.own_arena else [{"arena": "flat"}, {"arena": "bumps"}, {"arena": "stairs"}])
 ]
-# Bodies take turns from place to place in `make check`; `make test` takes all pairs.
 _PAIRS = [(name, settings, body) for name, settings in PLACES for body in BODIES]
-every_place_and_body = pytest.mark.parametrize(
-    ("task_name", "settings", "body"),
-    [
-        pytest.param(*pair, marks=() if index // len(BODIES) % len(BODIES) == index % len(BODIES) else pytest.mark.slow)
-        for index, pair in enumerate(_PAIRS)
-    ],
-)
+
+
+def turn(name, settings, body, bodies=1):
+    """Whether it is the turn of a body, which go from place to place, so many in each."""
+    return (PLACES.index((name, settings)) - list(BODIES).index(body)) % len(BODIES) < bodies
+
+
+every_place_and_body = pytest.mark.parametrize(("task_name", "settings", "body"), tiers(_PAIRS, turn))
 
 
 def frozen(memory):
@@ -130,8 +131,14 @@ class Counting(np.random.RandomState):
         return drawn
 
 
-@every_place_and_body
-@pytest.mark.parametrize("threads", [pytest.param(1, marks=pytest.mark.slow), 3])
+@pytest.mark.parametrize(
+    ("task_name", "settings", "body", "threads"),
+    tiers(
+        [(*pair, threads) for pair in _PAIRS for threads in (1, 3)],
+        check=lambda *case: case[-1] == 3 and turn(*case[:-1]),
+        test=lambda *case: case[-1] == 3 and turn(*case[:-1], bodies=2),
+    ),
+)
 def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
     """Over several episodes, among rows that fall or stand still at other times."""
     settings = settings | {"time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}

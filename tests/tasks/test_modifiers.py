@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.testing import assert_allclose, assert_array_equal
+from tiers import never, tiers
 
 import arc_suite
 from arc_suite.envs.scene import prepared
@@ -41,10 +42,10 @@ CASES = EACH | {"all": ALL}
 # All at once in the fast tests, each by itself in the slow ones.
 every_case_and_task = pytest.mark.parametrize(
     ("case", "task_name"),
-    [
-        pytest.param(case, task, marks=() if (case, task) in (("all", "walk"), ("all", "steer")) else pytest.mark.slow)
-        for case, task in [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)]
-    ],
+    tiers(
+        [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)],
+        check=lambda case, task: (case, task) in (("all", "walk"), ("all", "steer")),
+    ),
 )
 every_body = pytest.mark.parametrize("body", BODIES)
 
@@ -104,12 +105,18 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
         assert_array_equal(flat(once), flat(other))
 
 
-@pytest.mark.slow
+ROWS = [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", task, 3) for task in TASKS)]
+
+
+def turn(case, body):
+    """Whether it is the turn of a body, which go from case to case."""
+    return ROWS.index(case) % len(BODIES) == list(BODIES).index(body)
+
+
 @pytest.mark.parametrize(
-    ("case", "task_name", "threads"),
-    [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", task, 3) for task in TASKS)],
+    ("case", "task_name", "threads", "body"),
+    tiers([(*case, body) for case in ROWS for body in BODIES], never, lambda *case: turn(case[:-1], case[-1])),
 )
-@every_body
 def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
     """Over three episodes with kicks and limping, a snapshot and a pickle, among rows that start at other times."""
     length = 50 * prepared(BODIES[body], "walk")[0].scene.control_timestep

@@ -37,7 +37,7 @@ def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_
     assert straight.candidates == 48
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_search_learns():
     search = Search(**SETTINGS | {"episodes": 1, "steps": 80})
     first = search.step()
