@@ -10,12 +10,14 @@ Example:
 """
 
 import contextlib
+import itertools
 
 import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies, rotations
 from arc_suite.cli import program
+from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 
@@ -77,6 +79,8 @@ def line(first: str, cells) -> str:
 def main() -> None:
     """Print a table for each robot, or one for the task."""
     robots = {name: ROBOTS[checks.name(name, ROBOTS, "robot")] for name in FLAGS.robots}
+    for body, preset in itertools.product(robots.values(), FLAGS.presets):
+        checks.name(preset, presets_of(body), "preset")
     if FLAGS.task is not None:
         players = [("zero", "medium"), *(("cpg", preset) for preset in FLAGS.presets)]
         print(line(FLAGS.task, ["zero", *FLAGS.presets]), line("---", ["---"] * len(players)), sep="\n")

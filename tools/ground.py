@@ -15,6 +15,7 @@ from absl import flags
 from arc_suite import checks, evaluation, policies
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
+from arc_suite.cpg.demonstrator import presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 
@@ -46,20 +47,33 @@ def cell(episodes: list[evaluation.Episode]) -> str:
     return f"{means['distance']:.2f}, {total:.0f}" + (f" ({', '.join(notes)})" if notes else "")
 
 
+def difficulty(text: str) -> float:
+    """Return the number that a text of `--difficulties` stands for."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = text
+    return checks.number("--difficulties", value, 0.0, 1.0)
+
+
 def main() -> None:
     """Print a table for each task."""
     for robot in FLAGS.robots:
-        checks.name(robot, ROBOTS, "robot")
+        presets = presets_of(ROBOTS[checks.name(robot, ROBOTS, "robot")])
+        for preset in FLAGS.presets:
+            checks.name(preset, ("zero", *presets), "preset")
     for task in FLAGS.tasks:
         checks.name(task, (*terrain.KINDS, "course"), "task of ground")
+    difficulties = [difficulty(text) for text in FLAGS.difficulties]
+    for task in FLAGS.tasks:
         print(
             f"| {task} | difficulty | {' | '.join(FLAGS.presets)} |", "|---" * (2 + len(FLAGS.presets)) + "|", sep="\n"
         )
         for robot in FLAGS.robots:
-            for difficulty in FLAGS.difficulties:
-                bar = program.progress(FLAGS.presets, desc=f"{task} {robot} {difficulty}", leave=False)
-                cells = [cell(played(task, robot, preset, float(difficulty))) for preset in bar]
-                print(f"| {robot} | {float(difficulty):.2f} | {' | '.join(cells)} |", flush=True)
+            for share in difficulties:
+                bar = program.progress(FLAGS.presets, desc=f"{task} {robot} {share:g}", leave=False)
+                cells = [cell(played(task, robot, preset, share)) for preset in bar]
+                print(f"| {robot} | {share:.2f} | {' | '.join(cells)} |", flush=True)
         print()
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+jax = pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
 from conftest import SHORT, small
 
 from arc_suite import data
-from arc_suite.agents import off_policy
+from arc_suite.agents import algorithms, off_policy
 from arc_suite.agents import soft_actor_critic as sac
 from arc_suite.agents.learner import Stage
 from arc_suite.robots import ROBOTS
@@ -154,6 +154,27 @@ def test_what_the_policy_does_next_is_computed_once(learner, batches):
         expected = sac.distribution(agent._state.policy, every)
         assert np.allclose(mean, expected[0], atol=1e-6)
         assert np.allclose(log_std, expected[1], atol=1e-6)
+
+
+def test_networks_begin_as_published():
+    """Xavier-uniform weights, zero biases, a layer norm that changes nothing, copies as targets, temperature 1."""
+    row, size, joints = algorithms.algorithm("sac").row, 199, 18
+    state = sac.begin(row, np.random.default_rng(0), size, joints)
+    shapes = [[(size + joints, 256), (256, 256), (256, 1)]] * 2 + [[(size, 256), (256, 256), (256, joints)]]
+    policy = (*state.policy["trunk"], state.policy["mean"])
+    for layers, expected in zip((*state.critics, policy), shapes, strict=True):
+        assert [layer["weight"].shape for layer in layers] == expected
+    for layer in (*state.critics[0], *state.critics[1], *policy, state.policy["log_std"]):
+        weight = np.array(layer["weight"])
+        bound = np.sqrt(6.0 / sum(weight.shape))
+        assert 0.9 * bound < np.abs(weight).max() <= bound
+        assert weight.std() == pytest.approx(bound / np.sqrt(3.0), rel=0.1)
+        assert not np.array(layer["bias"]).any()
+        assert np.all(np.array(layer.get("scale", 1.0)) == 1.0) and not np.any(np.array(layer.get("offset", 0.0)))
+    assert not np.array_equal(state.critics[0][1]["weight"], state.critics[1][1]["weight"])
+    for mine, theirs in zip(jax.tree.leaves(state.critics), jax.tree.leaves(state.targets), strict=True):
+        assert np.array_equal(mine, theirs)
+    assert float(state.log_alpha) == 0.0
 
 
 @pytest.mark.parametrize("dropout", [0.01, 0.3])

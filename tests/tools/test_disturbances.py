@@ -42,7 +42,14 @@ def test_a_table_of_a_task():
     assert re.fullmatch(r"\| tick( \| \d+, \d\.\d\d \(0%\)){2} \|", row)
 
 
-def test_an_unknown_robot_is_one_line():
-    done = programs.run(TOOL, "--robots=tik")
+@pytest.mark.parametrize(
+    ("flag", "line"),
+    [
+        ("--robots=tik", "unknown robot 'tik'; did you mean 'tick'?"),
+        ("--presets=tuned,steerd", "unknown preset 'steerd'; did you mean 'steered'?"),
+    ],
+)
+def test_an_unknown_name_is_one_line_before_the_table(flag, line):
+    done = programs.run(TOOL, flag)
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith("disturbances.py: unknown robot 'tik'; did you mean 'tick'?")
+    assert done.stderr.startswith(f"disturbances.py: {line}")
