@@ -23,7 +23,7 @@ def tune(*arguments):
     return subprocess.run(command(*arguments), capture_output=True, text=True)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     straight, broken = tmp_path / "straight", tmp_path / "broken"
     done = tune("--generations=4", f"--output={straight}")

@@ -38,8 +38,7 @@ def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
             assert each.mean() <= medium.mean(), cost
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot in ("queen", "leaper")))
 def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
     environment = arc_suite.load(robot, "walk")
     episodes = {preset: evaluation.run(environment, Demonstrator(robot, preset), seed=1) for preset in TUNINGS[robot]}

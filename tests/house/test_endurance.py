@@ -35,7 +35,7 @@ def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_row():
     assert all(len(set(kind)) == len(walks) for kind in zip(*walks, strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="reads Linux's /proc")
 def test_soak_in_short():
     command = [sys.executable, FOLDER / "soak.py", "--steps=8000", "--block=2000", "--lives=4", "--slope=1000"]

@@ -36,7 +36,9 @@ def turn(name, settings, body, bodies=1):
     return (PLACES.index((name, settings)) - list(BODIES).index(body)) % len(BODIES) < bodies
 
 
-every_place_and_body = pytest.mark.parametrize(("task_name", "settings", "body"), tiers(_PAIRS, turn))
+every_place_and_body = pytest.mark.parametrize(
+    ("task_name", "settings", "body"), tiers(_PAIRS, turn, lambda *pair: turn(*pair, bodies=2))
+)
 
 
 def frozen(memory):
