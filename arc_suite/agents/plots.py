@@ -69,7 +69,7 @@ def study(
                 axis.plot(steps, middle, color=colours[kind], label=kind, marker="." if len(steps) < 15 else None)
         for axis, title in ((left, "mean, standard deviation"), (right, "interquartile mean, 95 % interval")):
             _finish(axis, f"{place}: {title}", lines.get(place, {}))
-        right.legend(frameon=False, fontsize=8)
+        right.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))  # off the curves
         left.set_ylabel("return of an evaluation")
     return figure
 
