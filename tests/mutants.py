@@ -251,8 +251,9 @@ def caught_by(project: pathlib.Path, first: str = "") -> str | None:
         project: its folder.
         first: a folder of tests to try before all others.
     """
-    near = [["-m", "not slow", f"tests/{first}"]] if first and (project / "tests" / first).is_dir() else []
-    for selection in (*near, ["-m", "not slow"], ["-m", "slow"]):
+    fast = ["-m", "not slow and not long"]
+    near = [[*fast, f"tests/{first}"]] if first and (project / "tests" / first).is_dir() else []
+    for selection in (*near, fast, ["-m", "slow and not long"], ["-m", "long"]):
         command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *selection]
         environment = {**os.environ, "PYTHONPATH": str(project)}
         result = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True)

@@ -11,6 +11,7 @@ from arc_suite.agents import algorithms
 from arc_suite.agents.training import Run
 from arc_suite.data import Settings
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import Body
 
 _EPISODES = 1000  # of prior data, as the paper has them
 
@@ -65,6 +66,11 @@ class Row(NamedTuple):
         return f"{self.robot}-{registry.task_of(self.task).name}-{self.kind}-{self.seed}".replace(":", ".")
 
     @property
+    def body(self) -> Body:
+        """The robot's."""
+        return ROBOTS[checks.name(self.robot, ROBOTS, "robot")]
+
+    @property
     def place(self) -> str:
         """The robot and what it does, with the settings of the task."""
         settings = f", {checks.json_text('task_kwargs', self.task_kwargs)}" if self.task_kwargs else ""
@@ -73,7 +79,7 @@ class Row(NamedTuple):
     @property
     def prior_settings(self) -> Settings:
         """The settings of its prior data."""
-        return Settings(ROBOTS[self.robot], "cpg", (self.prior.preset,), task=self.task, task_kwargs=self.task_kwargs)
+        return Settings(self.body, "cpg", (self.prior.preset,), task=self.task, task_kwargs=self.task_kwargs)
 
     @property
     def prior_id(self) -> str | None:
@@ -91,9 +97,8 @@ class Row(NamedTuple):
             ValueError: no such robot, algorithm or number; one line.
         """
         definition = algorithms.algorithm(self.algorithm).with_row(dict(self.numbers))
-        body = ROBOTS[checks.name(self.robot, ROBOTS, "robot")]
         places = self.task, self.task_kwargs, self.seed, self.steps, self.prior_id, self.evaluate_every
-        return Run(body, self.algorithm, definition, *places)
+        return Run(self.body, self.algorithm, definition, *places)
 
     def arguments(self, folder: Path) -> list[str]:
         """Return the arguments of `arc-suite` that make the run.

@@ -163,7 +163,7 @@ def state(row: Row, folder: Path, word: str) -> State:
     return State(row, word, int(step), result, float(wall), float(cpu))
 
 
-def remaining(states: Sequence[State], jobs: int) -> float | None:
+def remaining(states: Sequence[State], jobs: float) -> float | None:
     """Return about how many seconds a study still takes; None where nothing tells yet.
 
     A run goes on as fast as it has gone so far, or as the others of its kind, or as all others.
@@ -249,7 +249,7 @@ def publish_all(rows: Sequence[Row], folder: Path, published: Path) -> None:
 
 def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
     """Return the episodes of the evaluation protocol by the demonstrators of a run's body, by preset."""
-    body, found = row.run().body, {}
+    body, found = row.body, {}
     rows = VectorEnv(body, row.task, evaluation.EPISODES, 1, AutoresetMode.DISABLED, task_kwargs=dict(row.task_kwargs))
     with contextlib.closing(rows):
         for preset in COMMANDED if "command" in rows.task.blocks else PRESETS:
@@ -262,9 +262,8 @@ def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
 @contextlib.contextmanager
 def _played(row: Row, folder: Path) -> Iterator[tuple[Environment, Policy]]:
     """Open the environment of a run, and its latest policy."""
-    body = row.run().body
-    with contextlib.closing(load(body, row.task, row.task_kwargs)) as environment:
-        yield environment, policies.policy(folder / network.FILE, body, task=environment.task.definition)
+    with contextlib.closing(load(row.body, row.task, row.task_kwargs)) as environment:
+        yield environment, policies.policy(folder / network.FILE, row.body, task=environment.task.definition)
 
 
 def _style(row: Row, folder: Path, step: int) -> str:

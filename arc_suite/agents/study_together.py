@@ -1,19 +1,24 @@
 """Runs studies in this process: runs of equal shape advance side by side, in one program, as a GPU wants them."""
 
-import contextlib
 import functools
-from collections.abc import Callable, Generator, Hashable, Iterator, Sequence
+import math
+import os
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from tqdm import tqdm
 
-from arc_suite import checks
 from arc_suite.agents import study_runner, training
 from arc_suite.agents.calls import Call
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_runner import State
 from arc_suite.agents.together import together
+
+_EVERY = 2.0  # s between two looks at all runs
+_no_bar = functools.partial(tqdm, disable=True)
 
 
 def run(
@@ -26,8 +31,8 @@ def run(
 ) -> list[State]:
     """Make the runs that are not finished, side by side, and publish them.
 
-    The folders are those that a process for each run would leave, but for the last digits, which depend on the
-    width. Runs that another process makes are left to it.
+    Folders are those that `arc-suite train` makes, without its picture of returns and ONNX file; the last digits of
+    what is learned are others, and depend on the width. What another process goes on with is waited for.
 
     Args:
         rows: of the study.
@@ -44,33 +49,50 @@ def run(
         ValueError: a row that does not fit, or the folder of another run; one line.
         OSError: something cannot be written; one line.
     """
-    found = study_runner.prepared(rows, folder, 1, progress)
+    found = study_runner.prepared(rows, folder, os.cpu_count(), progress)
     words = {row.name: word for row, word in zip(rows, found, strict=True)}
+    latest = -math.inf
 
-    def states():
-        return [study_runner.state(row, folder / row.name, words[row.name]) for row in rows]
+    def look(at_once: bool = False) -> None:
+        nonlocal latest
+        if at_once or time.monotonic() - latest >= _EVERY:
+            latest = time.monotonic()
+            shown([study_runner.state(row, folder / row.name, words[row.name]) for row in rows])
 
-    for group in groups([row for row in rows if words[row.name] == "waiting"], width):
-        with contextlib.ExitStack() as stack:
-            logs = {row.name: study_runner.claimed(folder / f"{row.name}.log") for row in group}
-            mine = [row for row in group if logs[row.name]]
-            works = []
-            for row in mine:
-                log = stack.enter_context(logs[row.name])
-                works.append(_work(row, folder / row.name, log, lambda *_: shown(states())))
-            words |= {row.name: "running" if logs[row.name] else "elsewhere" for row in group}
-            shown(states())
-            ends = together(works, width)
-        words |= {row.name: word for row, word in zip(mine, ends, strict=True)}
-        for row in mine:
-            study_runner.publish(row, folder, published)
+    def work(row: Row, beside: int) -> Generator[Call, Any, None]:
+        """Train a run that no other process goes on with, and publish it."""
+        if (log := study_runner.claimed(folder / f"{row.name}.log")) is None:
+            words[row.name] = "elsewhere"
+            return
+        with log:
+            words[row.name] = "running"
+            look(at_once=True)
+            try:
+                yield from training.training(
+                    row.run(), folder / row.name, progress=_no_bar, told=lambda *_: look(), beside=beside
+                )
+                words[row.name] = "finished"
+            except (ValueError, OSError) as error:
+                log.write(f"arc-suite train: {' '.join(str(error).split())}\n".encode())
+                words[row.name] = "failed"
+            except Exception:
+                log.write(traceback.format_exc().encode())
+                words[row.name] = "failed"
+        study_runner.publish(row, folder, published)
+        look(at_once=True)
+
+    while waiting := [row for row in rows if words[row.name] in ("waiting", "elsewhere")]:
+        for group in groups(waiting, width):
+            together([work(row, len(group)) for row in group], width)
+        if "elsewhere" in words.values():
+            time.sleep(_EVERY)
     study_runner.publish_all(rows, folder, published)
-    return states()
+    return [study_runner.state(row, folder / row.name, words[row.name]) for row in rows]
 
 
 def groups(rows: Sequence[Row], width: int) -> Iterator[tuple[Row, ...]]:
-    """Yield runs whose calls are of equal shape, so many at a time at most; the order is that of the rows."""
-    alike: dict[Hashable, list[Row]] = {}
+    """Yield runs whose calls are of equal shape, at most `width` at a time, groups in the order of their first rows."""
+    alike: dict[str, list[Row]] = {}
     for row in rows:
         alike.setdefault(_shape(row), []).append(row)
     for several in alike.values():
@@ -78,19 +100,11 @@ def groups(rows: Sequence[Row], width: int) -> Iterator[tuple[Row, ...]]:
             yield tuple(several[first : first + width])
 
 
-def _shape(row: Row) -> Hashable:
-    """What is equal where runs learn alike, in bodies with as many legs and joints."""
-    run = row.run()
-    settings = checks.json_text("task_kwargs", row.task_kwargs)
-    return run.definition, row.task, settings, len(run.body.legs), len(run.body.joint_names)
-
-
-def _work(row: Row, folder: Path, log: IO, told: Callable) -> Generator[Call, Any, str]:
-    """Train a run, and return the word for how it ended."""
+def _shape(row: Row) -> str:
+    """What is equal where runs learn alike, in bodies with the same number of legs and of joints."""
     try:
-        yield from training.training(row.run(), folder, progress=functools.partial(tqdm, disable=True), told=told)
-    except (ValueError, OSError) as error:
-        log.write(f"arc-suite train: {' '.join(str(error).split())}\n".encode())
-        log.flush()
-        return "failed"
-    return "finished"
+        run = row.run()
+    except ValueError:
+        return row.name  # which fails by itself, with the reason in its log
+    sizes = len(run.body.legs), len(run.body.joint_names)
+    return repr((run.definition, row.task, sorted(row.task_kwargs.items()), sizes))

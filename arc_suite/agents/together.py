@@ -5,6 +5,7 @@ processor it gains nothing. A program is always of the same width, with copies i
 that the bits of a run depend on that width, and on nothing that the other runs do.
 """
 
+import contextlib
 import functools
 from collections.abc import Generator, Mapping, Sequence
 from typing import Any
@@ -19,13 +20,17 @@ from arc_suite.agents.calls import Call
 def together(works: Sequence[Generator[Call, Any, Any]], width: int) -> list[Any]:
     """Make the calls that generators yield, in rounds of one call of each, and return what they return.
 
+    Whatever a generator or a program raises ends all of them; they are closed, and what they hold open with them.
+
     Args:
         works: each goes on as if it were alone.
         width: calls of one program; more of equal shape are several programs.
     """
     results = [None] * len(works)
     answers = dict.fromkeys(range(len(works)))
-    try:
+    with contextlib.ExitStack() as stack:
+        for work in works:
+            stack.enter_context(contextlib.closing(work))
         while answers:
             calls = {}
             for index, answer in answers.items():
@@ -34,9 +39,6 @@ def together(works: Sequence[Generator[Call, Any, Any]], width: int) -> list[Any
                 except StopIteration as end:
                     results[index] = end.value
             answers = _answers(calls, width)
-    finally:
-        for work in works:
-            work.close()
     return results
 
 
@@ -59,12 +61,13 @@ def _answers(calls: Mapping[int, Call], width: int) -> dict[int, Any]:
 
 
 def _column(leaves: Sequence):
-    """The same array of several calls: one array of what comes from the host, which is sent there at once."""
+    """One argument of several calls: NumPy arrays stacked, for one transfer to the device, others apart."""
     return np.stack(leaves) if all(isinstance(leaf, np.ndarray) for leaf in leaves) else tuple(leaves)
 
 
 @functools.partial(jax.jit, static_argnums=(0, 1, 2, 3))
 def _many(function, static: tuple, structure, width: int, columns: list) -> list:
     stacked = [jnp.stack(column) if isinstance(column, tuple) else column for column in columns]
-    made = jax.vmap(lambda *leaves: function(*static, *jax.tree.unflatten(structure, leaves)))(*stacked)
+    with jax.default_matmul_precision("highest"):  # GPUs would round what they multiply to 10 bits
+        made = jax.vmap(lambda *leaves: function(*static, *jax.tree.unflatten(structure, leaves)))(*stacked)
     return [jax.tree.map(lambda leaf, place=place: leaf[place], made) for place in range(width)]

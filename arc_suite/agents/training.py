@@ -136,8 +136,14 @@ def training(
     threads: int = 1,
     progress: Callable = tqdm,
     told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
+    beside: int = 1,
 ) -> Generator[Call, Any, bool]:
-    """Do what `train` does, and yield the calls that its learner leaves to whoever drives it."""
+    """Do what `train` does, and yield the calls that its learner leaves to whoever drives it.
+
+    Args:
+        run, folder, minutes, threads, progress, told: as `train` takes them.
+        beside: runs that this process makes at a time; each is counted its share of the processor's seconds.
+    """
     began = time.monotonic()
     config, definition = run.config(), run.definition
     module = definition.module
@@ -148,7 +154,7 @@ def training(
         if run_files.arrays is not None:
             _restore(learner, run_files)
         judge = _Judge(run, threads)
-        clock = _Clock(state)
+        clock = _Clock(state, beside)
         bar = progress(total=run.steps, initial=learner.step, desc=Path(folder).name, unit="step", unit_scale=True)
         with bar, contextlib.closing(judge):
             while state["evaluated"] < run.steps:
@@ -208,11 +214,15 @@ def _shown(figures: Mapping[str, float], state: Mapping[str, Any]) -> str:
 class _Clock:
     """Adds seconds up over all processes of a run, into its times."""
 
-    def __init__(self, state: dict[str, Any]):
-        self._state, self._latest = state, (time.monotonic(), time.process_time())
+    def __init__(self, state: dict[str, Any], beside: int):
+        self._state, self._beside = state, beside
+        self._latest = self._now()
+
+    def _now(self) -> tuple[float, float]:
+        return time.monotonic(), time.process_time() / self._beside
 
     def read(self, run_files: RunFolder, step: int, write: bool) -> None:
-        now = time.monotonic(), time.process_time()
+        now = self._now()
         for name, here, there in zip(("wall", "cpu"), now, self._latest, strict=True):
             self._state[name] += here - there
         self._latest = now

@@ -30,7 +30,7 @@ flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]"
 flags.DEFINE_integer(
     "together",
     None,
-    "Runs that learn alike, side by side in this process: for a GPU, in place of --jobs.",
+    "Runs at a time in this process, those that learn alike in one program: for a GPU, in place of --jobs.",
     lower_bound=1,
 )
 flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth, from the ith on, which counts from 0.")
@@ -57,10 +57,12 @@ def main(name: str | None = None) -> int:
         study_runner.publish_all(rows, folder, results)
         print(study_report.write(name, study, results))
         return 0
+    if FLAGS.together is not None and (FLAGS.jobs, FLAGS.submit) != (None, None):
+        raise ValueError("--together, --jobs, --submit: one process, several, or a cluster; give one of them")
     if FLAGS.submit is not None:
         return submit(name, folder, results)
     if FLAGS.together is not None:
-        jobs, states = FLAGS.together, together(rows, folder, results, FLAGS.together)
+        jobs, states = 1, together(rows, folder, results, FLAGS.together)
     else:
         jobs = FLAGS.jobs or os.cpu_count()
         states = study_runner.run(rows, folder, results, jobs, shown(jobs), progress)
@@ -75,16 +77,15 @@ def together(rows: Sequence[Row], folder: Path, results: Path, width: int) -> li
     """Make runs side by side in this process.
 
     Raises:
-        ValueError: JAX is not installed, or a flag contradicts; one line.
+        ValueError: JAX is not installed; one line.
     """
-    if FLAGS.jobs is not None:
-        raise ValueError("--together and --jobs: one process, or several; give one of them")
     use_one_thread()
     try:
         from arc_suite.agents import study_together
     except ImportError as error:
         raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
-    return study_together.run(rows, folder, results, width, shown(width), progress)
+    at_a_time = len(rows) / len(list(study_together.groups(rows, width)))
+    return study_together.run(rows, folder, results, width, shown(at_a_time), progress)
 
 
 def submit(name: str, folder: Path, results: Path) -> int:
@@ -116,7 +117,7 @@ def shard(text: str) -> tuple[int, int]:
     return int(part), int(parts)
 
 
-def table(states: list[State], jobs: int) -> str:
+def table(states: list[State], jobs: float) -> str:
     """Return as text how the runs stand, and how long they still take."""
     width = max(len(each.row.name) for each in states)
     lines = [f"{'run':<{width}}  {'state':<9} {'steps':>19} {'return':>8} {'CPU min':>8}"]
@@ -136,7 +137,7 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min"
 
 
-def shown(jobs: int) -> Callable[[list[State]], None]:
+def shown(jobs: float) -> Callable[[list[State]], None]:
     """Return what shows states: on a terminal a table in its place, elsewhere a line for each change."""
     words, latest = {}, [0.0]
 

@@ -14,11 +14,11 @@ from dm_control.rl.control import PhysicsError
 import arc_suite
 
 FOLDER = pathlib.Path(__file__).parents[1]
-STEPS = 20
+STEPS = 60
 ENVIRON = os.environ | {"PYTHONPATH": str(FOLDER.parent)}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_row():
     found = {}
     for threads in (["1", "8"], ["2"]):
