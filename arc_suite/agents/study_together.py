@@ -59,7 +59,10 @@ def run(
             latest = time.monotonic()
             shown([study_runner.state(row, folder / row.name, words[row.name]) for row in rows])
 
-    def work(row: Row, beside: int) -> Generator[Call, Any, None]:
+    def beside() -> int:
+        return list(words.values()).count("running")
+
+    def work(row: Row) -> Generator[Call, Any, None]:
         """Train a run that no other process goes on with, and publish it."""
         if (log := study_runner.claimed(folder / f"{row.name}.log")) is None:
             words[row.name] = "elsewhere"
@@ -83,7 +86,7 @@ def run(
 
     while waiting := [row for row in rows if words[row.name] in ("waiting", "elsewhere")]:
         for group in groups(waiting, width):
-            together([work(row, len(group)) for row in group], width)
+            together([work(row) for row in group], width)
         if "elsewhere" in words.values():
             time.sleep(_EVERY)
     study_runner.publish_all(rows, folder, published)

@@ -136,13 +136,13 @@ def training(
     threads: int = 1,
     progress: Callable = tqdm,
     told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
-    beside: int = 1,
+    beside: Callable[[], int] = lambda: 1,
 ) -> Generator[Call, Any, bool]:
     """Do what `train` does, and yield the calls that its learner leaves to whoever drives it.
 
     Args:
         run, folder, minutes, threads, progress, told: as `train` takes them.
-        beside: runs that this process makes at a time; each is counted its share of the processor's seconds.
+        beside: tells how many runs this process is making; each is counted its share of the processor's seconds.
     """
     began = time.monotonic()
     config, definition = run.config(), run.definition
@@ -214,17 +214,13 @@ def _shown(figures: Mapping[str, float], state: Mapping[str, Any]) -> str:
 class _Clock:
     """Adds seconds up over all processes of a run, into its times."""
 
-    def __init__(self, state: dict[str, Any], beside: int):
-        self._state, self._beside = state, beside
-        self._latest = self._now()
-
-    def _now(self) -> tuple[float, float]:
-        return time.monotonic(), time.process_time() / self._beside
+    def __init__(self, state: dict[str, Any], beside: Callable[[], int]):
+        self._state, self._beside, self._latest = state, beside, (time.monotonic(), time.process_time())
 
     def read(self, run_files: RunFolder, step: int, write: bool) -> None:
-        now = self._now()
-        for name, here, there in zip(("wall", "cpu"), now, self._latest, strict=True):
-            self._state[name] += here - there
+        now = time.monotonic(), time.process_time()
+        self._state["wall"] += now[0] - self._latest[0]
+        self._state["cpu"] += (now[1] - self._latest[1]) / self._beside()
         self._latest = now
         if write:
             seconds = {f"{name}_seconds": round(self._state[name], 3) for name in ("wall", "cpu")}

@@ -51,6 +51,8 @@ def main(name: str | None = None) -> int:
     study = studies.study(name)
     part, parts = shard(FLAGS.shard)
     rows = study.rows[part::parts]
+    if not rows:
+        raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.rows)}")
     folder = Path(FLAGS.runs or Path("runs", name.replace(":", ".")))
     results = Path(FLAGS.results or Path("studies", name.replace(":", ".")))
     if FLAGS.report:
@@ -60,7 +62,7 @@ def main(name: str | None = None) -> int:
     if FLAGS.together is not None and (FLAGS.jobs, FLAGS.submit) != (None, None):
         raise ValueError("--together, --jobs, --submit: one process, several, or a cluster; give one of them")
     if FLAGS.submit is not None:
-        return submit(name, folder, results)
+        return submit(name, min(FLAGS.submit, len(rows)), folder, results)
     if FLAGS.together is not None:
         jobs, states = 1, together(rows, folder, results, FLAGS.together)
     else:
@@ -88,8 +90,8 @@ def together(rows: Sequence[Row], folder: Path, results: Path, width: int) -> li
     return study_together.run(rows, folder, results, width, shown(at_a_time), progress)
 
 
-def submit(name: str, folder: Path, results: Path) -> int:
-    """Submit the study to a cluster, and print the jobs.
+def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
+    """Submit the study to a cluster in so many jobs, and print them.
 
     Raises:
         ValueError: submitit is not installed; one line.
@@ -100,7 +102,7 @@ def submit(name: str, folder: Path, results: Path) -> int:
         raise ValueError(f"--submit needs submitit: pip install 'arc_suite[cluster]' ({error})") from None
     arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
     parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
-    for job in cluster.submit(arguments, FLAGS.submit, FLAGS.hours, folder / "jobs", **parameters):
+    for job in cluster.submit(arguments, jobs, FLAGS.hours, folder / "jobs", **parameters):
         print(f"submitted {job.job_id}")
     return 0
 

@@ -187,6 +187,7 @@ def test_remaining_time():
         ([], "arc-suite study: expected a study: paper, exact-tick, short, "),
         (["papr"], "arc-suite study: unknown study 'papr'; did you mean 'paper'? (there are: "),
         (["paper", "--shard=4/4"], "arc-suite study: --shard=4/4: expected i/n with i from 0 to n - 1, such as 0/4"),
+        (["first-steps", "--shard=6/7"], "arc-suite study: --shard=6/7: no run, as the study has 6"),
         (["arc_suite:load"], "arc-suite study: study 'arc_suite:load': expected a Study, got function"),
         (["tiny_studies:TWICE"], "arc-suite study: study 'tiny_studies:TWICE': 2 rows are named tick-walk-sac-0; a "),
     ],
