@@ -33,6 +33,7 @@ def unavailable(*arguments):
     raise RenderingUnavailable("cannot render: no OpenGL")
 
 
+@pytest.mark.slow
 def test_a_strip_is_published_with_the_style(finished, monkeypatch):
     row, runs, results = finished
     drawn, style = results / row.name / STRIP, results / row.name / "style.csv"

@@ -88,6 +88,7 @@ def test_unknown_answer_to_divergence():
         load(on_divergence="stop")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @every_accident
 def test_one_row_of_64_diverges_and_the_others_notice_nothing(accident, mode):
