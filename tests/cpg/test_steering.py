@@ -65,6 +65,7 @@ def test_an_open_loop_does_not():
     assert abs(motion - COMMANDS).mean() > 0.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "task", "preset", "steps"),
     [

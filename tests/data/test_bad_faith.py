@@ -105,6 +105,7 @@ def test_versions_are_told_in_one_line(root, value):
     refused(verify, "was collected with version ", " of walk; ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "domain", ["/dev/zero", "spider.json", "", "nobody", "{", "{}", "[" * 9999, None, 3, ["queen"], {"name": "queen"}]
 )
@@ -114,6 +115,7 @@ def test_domains_are_registered_names_and_inline_bodies_alone(root, domain):
     refused(data.open, "metadata.json: ")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "value"),
     [

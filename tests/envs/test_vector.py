@@ -318,6 +318,7 @@ def test_nan_is_refused_before_anything_moves():
     assert same(batch.step(actions * 100), twin.step(np.sign(actions)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "wrap",
     [

@@ -156,6 +156,7 @@ def glow_in(physics) -> np.ndarray:
     return physics.decorated().model.mat("glow").rgba.copy()
 
 
+@pytest.mark.slow
 @every_robot
 def test_visualize_reward_colours_the_glow(robot):
     plain = arc_suite.load(robot, "walk", {"random": 0})

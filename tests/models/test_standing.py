@@ -20,6 +20,7 @@ FIELDS = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos", "b
 FIELDS += ("jnt_type", "jnt_axis", "jnt_pos", "jnt_bodyid", "qpos0")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 def test_what_stands_is_what_is_built(body):
     built = mujoco.MjModel.from_xml_string(models.assemble(body).to_xml_string())

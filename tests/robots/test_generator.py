@@ -19,6 +19,7 @@ def compiled(body):
     return mjcf.Physics.from_mjcf_model(models.assemble(body)).model.ptr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("legs", range(4, 13))
 @pytest.mark.parametrize("links", range(1, 5))
 def test_bodies_made_to_order_stand_on_all_feet(legs, links):

@@ -30,6 +30,7 @@ def test_a_state_looks_like_the_simulation_in_it(arena, share):
         assert drawn.std() > 0.1
 
 
+@pytest.mark.slow
 def test_the_ground_and_the_reward_are_seen():
     qpos = compiled(BODY).qpos0
     views = [picture(BODY, arena(BODY), qpos, 60, 80, "tracking") for arena in ARENAS.values()]

@@ -47,6 +47,7 @@ def measured(robot, cheat=None):
     return measure(record(arc_suite.load(robot, "walk"), policy, seed=0, max_steps=400))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_standing_still_shows(robot):
     honest, cheat = measured(robot), measured(robot, "stand")
@@ -58,6 +59,7 @@ def test_standing_still_shows(robot):
     assert cheat["foot_slip"].value == cheat["cost_of_transport"].value == math.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_hopping_shows(robot):
     honest, cheat = measured(robot), measured(robot, "hop")
@@ -70,6 +72,7 @@ def test_hopping_shows(robot):
     assert hop["gait_compliance"].value == 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_dragging_one_leg_shows(robot):
     honest, cheat = measured(robot), measured(robot, "drag")

@@ -101,6 +101,7 @@ def leaves(value):
     return [np.asarray(item) for item in value]
 
 
+@pytest.mark.slow
 @every_task
 @every_body
 def test_the_number_of_draws_is_fixed(task_name, body):

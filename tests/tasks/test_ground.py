@@ -228,6 +228,7 @@ def test_levels_rise_and_fall_by_what_was_commanded(carry, stays, level):
     assert next_level(carry, stays, other=2) == level
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("name", ["rough", "course"])
 def test_rows_of_a_curriculum_are_single_environments(name, threads):

@@ -37,6 +37,7 @@ def look_into_the_mirror(task):
     vars(task)["clock"] = clock._replace(circle=sign * clock.circle, stance=clock.stance[:, image.legs])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "task"),
     [
