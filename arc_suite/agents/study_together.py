@@ -35,19 +35,10 @@ def run(
     what is learned are others, and depend on the width. What another process goes on with is waited for.
 
     Args:
-        rows: of the study.
-        folder: of the study, in which each run has one of its own.
-        published: folder for what is to be committed.
+        rows, folder, published, shown, progress: as `study_runner.run` takes them.
         width: runs side by side.
-        shown: called with the states of all runs, again and again.
-        progress: makes progress bars as `tqdm` does, of prior data that are collected first.
 
-    Returns:
-        The states of all runs; a failed run has said why in its log, beside its folder.
-
-    Raises:
-        ValueError: a row that does not fit, or the folder of another run; one line.
-        OSError: something cannot be written; one line.
+    Returns, raises: as `study_runner.run` does.
     """
     found = study_runner.prepared(rows, folder, os.cpu_count(), progress)
     words = {row.name: word for row, word in zip(rows, found, strict=True)}

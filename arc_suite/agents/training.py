@@ -99,34 +99,9 @@ class Run(NamedTuple):
         }
 
 
-def train(
-    run: Run,
-    folder: Path,
-    minutes: float | None = None,
-    threads: int = 1,
-    progress: Callable = tqdm,
-    told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
-) -> bool:
-    """Train, or go on.
-
-    Args:
-        run: what the run depends on.
-        folder: of the run.
-        minutes: to stop after, of wall clock; None to train to the end.
-        threads: on which rows are simulated; nothing depends on it but time.
-        progress: makes a progress bar as `tqdm` does.
-        told: called after each line of training.csv, and after each evaluation, with the environment
-            step and figures by name; an evaluation's is `return`.
-
-    Returns:
-        Whether the run is finished.
-
-    Raises:
-        ValueError: something of the run that does not fit, the folder of another run, or a damaged one; one line.
-        Diverged: numbers of the learner are no longer finite; the checkpoint before stays.
-        OSError: the disk is full, or the like; the checkpoint before stays.
-    """
-    return alone(training(run, folder, minutes, threads, progress, told))
+def train(run: Run, folder: Path, **settings) -> bool:
+    """Train, or go on, and return whether the run is finished; arguments and errors are those of `training`."""
+    return alone(training(run, folder, **settings))
 
 
 def training(
@@ -138,11 +113,25 @@ def training(
     told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
     beside: Callable[[], int] = lambda: 1,
 ) -> Generator[Call, Any, bool]:
-    """Do what `train` does, and yield the calls that its learner leaves to whoever drives it.
+    """Train, or go on, and yield the calls that the learner leaves to whoever drives it.
 
     Args:
-        run, folder, minutes, threads, progress, told: as `train` takes them.
+        run: what the run depends on.
+        folder: of the run.
+        minutes: to stop after, of wall clock; None to train to the end.
+        threads: on which rows are simulated; nothing depends on it but time.
+        progress: makes a progress bar as `tqdm` does.
+        told: called after each line of training.csv, and after each evaluation, with the environment
+            step and figures by name; an evaluation's is `return`.
         beside: tells how many runs this process is making; each is counted its share of the processor's seconds.
+
+    Returns:
+        Whether the run is finished.
+
+    Raises:
+        ValueError: something of the run that does not fit, the folder of another run, or a damaged one; one line.
+        Diverged: numbers of the learner are no longer finite; the checkpoint before stays.
+        OSError: the disk is full, or the like; the checkpoint before stays.
     """
     began = time.monotonic()
     config, definition = run.config(), run.definition

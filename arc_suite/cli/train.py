@@ -63,7 +63,7 @@ def main() -> None:
                 listener(step, figures)
 
         try:
-            finished = train(run, folder, FLAGS.minutes, FLAGS.threads, progress, told)
+            finished = train(run, folder, minutes=FLAGS.minutes, threads=FLAGS.threads, progress=progress, told=told)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"interrupted; the same command goes on with {folder}") from None
     if finished and importlib.util.find_spec("onnx"):

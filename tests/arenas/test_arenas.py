@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tiers import tiers
+from tiers import tiers, turn
 
 import arc_suite
 from arc_suite import models
@@ -17,14 +17,12 @@ every_arena = pytest.mark.parametrize("arena", ARENAS)
 every_body = pytest.mark.parametrize("body", BODIES)
 
 
-def turn(arena, body):
-    """Whether it is the turn of a body, which go from arena to arena."""
-    return list(ARENAS).index(arena) % len(BODIES) == list(BODIES).index(body)
-
-
 @pytest.mark.parametrize(
     ("arena", "body"),
-    tiers([(arena, body) for arena in ARENAS for body in BODIES], turn),
+    tiers(
+        [(arena, body) for arena in ARENAS for body in BODIES],
+        lambda arena, body: turn(body, BODIES, list(ARENAS).index(arena)),
+    ),
 )
 def test_height_is_that_of_rays(arena, body):
     body = BODIES[body]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.testing import assert_array_equal
-from tiers import tiers
+from tiers import tiers, turn
 
 import arc_suite
 from arc_suite.envs.scene import prepared
@@ -31,13 +31,13 @@ PLACES = [
 _PAIRS = [(name, settings, body) for name, settings in PLACES for body in BODIES]
 
 
-def turn(name, settings, body, bodies=1):
+def in_turn(name, settings, body, bodies=1):
     """Whether it is the turn of a body, which go from place to place, so many in each."""
-    return (PLACES.index((name, settings)) - list(BODIES).index(body)) % len(BODIES) < bodies
+    return turn(body, BODIES, PLACES.index((name, settings)), bodies)
 
 
 every_place_and_body = pytest.mark.parametrize(
-    ("task_name", "settings", "body"), tiers(_PAIRS, turn, lambda *pair: turn(*pair, bodies=2))
+    ("task_name", "settings", "body"), tiers(_PAIRS, in_turn, lambda *pair: in_turn(*pair, bodies=2))
 )
 
 
@@ -138,8 +138,8 @@ class Counting(np.random.RandomState):
     ("task_name", "settings", "body", "threads"),
     tiers(
         [(*pair, threads) for pair in _PAIRS for threads in (1, 3)],
-        check=lambda *case: case[-1] == 3 and turn(*case[:-1]),
-        test=lambda *case: case[-1] == 3 and turn(*case[:-1], bodies=2),
+        check=lambda *case: case[-1] == 3 and in_turn(*case[:-1]),
+        test=lambda *case: case[-1] == 3 and in_turn(*case[:-1], bodies=2),
     ),
 )
 def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):

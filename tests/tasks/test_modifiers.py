@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.testing import assert_allclose, assert_array_equal
-from tiers import never, tiers
+from tiers import never, tiers, turn
 
 import arc_suite
 from arc_suite.envs.scene import prepared
@@ -39,11 +39,6 @@ EACH = {
 }
 ALL = {name: value for setting in EACH.values() for name, value in setting.items()}
 CASES = EACH | {"all": ALL}
-
-
-def turn(index, body):
-    """Whether it is the turn of a body, which go from case to case."""
-    return index % len(BODIES) == list(BODIES).index(body)
 
 
 _TASKS = [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)]
@@ -72,7 +67,7 @@ def test_every_modifier_is_tried():
     tiers(
         [(*case, body) for case in _TASKS for body in BODIES],
         check=lambda case, task, body: (case, task) in (("all", "walk"), ("all", "steer")),
-        test=lambda case, task, body: turn(_TASKS.index((case, task)), body),
+        test=lambda case, task, body: turn(body, BODIES, _TASKS.index((case, task))),
     ),
 )
 def test_a_modified_task_conforms(case, task_name, body):
@@ -118,7 +113,9 @@ ROWS = [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", ta
 @pytest.mark.parametrize(
     ("case", "task_name", "threads", "body"),
     tiers(
-        [(*case, body) for case in ROWS for body in BODIES], never, lambda *case: turn(ROWS.index(case[:-1]), case[-1])
+        [(*case, body) for case in ROWS for body in BODIES],
+        never,
+        lambda *case: turn(case[-1], BODIES, ROWS.index(case[:-1])),
     ),
 )
 def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
