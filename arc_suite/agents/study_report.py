@@ -132,7 +132,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         raise ValueError(f"{published}: holds no results of the study {name}")
     groups, demonstrators = study_results.grouped(found), study_results.demonstrators(published)
     sections = {
-        f"Study {name}": [study.title[0].upper() + study.title[1:] + ".", _reached(study, found)],
+        f"Study {name}": [_title(study, found), _reached(found)],
         "Curves": [f"![Returns over environment steps]({CURVES})"],
         "Final returns": [_FINALS, _finals(groups, demonstrators)],
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
@@ -190,14 +190,16 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-def _reached(study: Study, found: Sequence[Result]) -> str:
-    by_name = {each.row.name: each for each in found}
+def _title(study: Study, found: Sequence[Result]) -> str:
+    title = study.title[0].upper() + study.title[1:] + "."
+    return title if len(found) == len(study.rows) else f"{title} Of {len(study.rows)} runs {len(found)} have begun."
+
+
+def _reached(found: Sequence[Result]) -> str:
     lines = []
-    for row in study.rows:
-        each = by_name.get(row.name)
-        reached = f"{each.steps[-1]:,} of {row.steps:,}" if each else f"0 of {row.steps:,}"
-        cpu = f"{each.cpu[-1] / 60.0:.1f}" if each else "-"
-        lines.append((row.place, row.kind, str(row.seed), reached, cpu))
+    for each in found:
+        row, reached = each.row, f"{each.steps[-1]:,} of {each.row.steps:,}"
+        lines.append((row.place, row.kind, str(row.seed), reached, f"{each.cpu[-1] / 60.0:.1f}"))
     return _table(("robot, task", "algorithm", "seed", "steps", "CPU min"), lines)
 
 

@@ -72,6 +72,9 @@ def test_report(made):
     ]
     assert cells(page, "bastion, walk", "sac", "0.500")[2:] == ["0.500"] * 6
     assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
+    assert "As in the paper.\n" in page
+    more = study._replace(rows=(*study.rows, Row("tick", "sac", 2000, seed=2)))
+    assert "As in the paper. Of 49 runs 48 have begun.\n" in study_report.write("more", more, folder).read_text()
 
 
 def test_claims(made):
