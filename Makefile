@@ -19,6 +19,8 @@
 # make mutants plants mistakes and tells which test catches each; takes hours
 # make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
 SHELL := /bin/bash
+# Tests start some hundred programs; without bytecode each compiles the package anew.
+unexport PYTHONDONTWRITEBYTECODE
 VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
@@ -47,14 +49,17 @@ check: lint $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) -m pytest $(PARALLEL) -m "not slow and not long"
 
-lint: $(INSTALLED)
-	$(PYTHON) -m pip install -q -e '.[lint]'
+lint: $(VENV)/linter
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 
 $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)
 	$(PYTHON) -m pip install -q -e '.[test]'
+	touch $@
+
+$(VENV)/linter: $(INSTALLED)
+	$(PYTHON) -m pip install -q -e '.[lint]'
 	touch $@
 
 check-lowest: VENV := .venv-lowest
