@@ -192,7 +192,7 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _title(study: Study, found: Sequence[Result]) -> str:
     title = study.title[0].upper() + study.title[1:] + "."
-    return title if len(found) == len(study.rows) else f"{title} Of {len(study.rows)} runs {len(found)} have begun."
+    return title if len(found) == len(study.rows) else f"{title} Begun: {len(found)} of {len(study.rows)} runs."
 
 
 def _reached(found: Sequence[Result]) -> str:

@@ -74,7 +74,7 @@ def test_report(made):
     assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
     assert "As in the paper.\n" in page
     more = study._replace(rows=(*study.rows, Row("tick", "sac", 2000, seed=2)))
-    assert "As in the paper. Of 49 runs 48 have begun.\n" in study_report.write("more", more, folder).read_text()
+    assert "As in the paper. Begun: 48 of 49 runs.\n" in study_report.write("more", more, folder).read_text()
 
 
 def test_claims(made):
