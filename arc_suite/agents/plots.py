@@ -76,9 +76,12 @@ def study(
 
 def _finish(axis, title: str, lines: Mapping[str, float]) -> None:
     """Draw returns to compare with, and label the picture."""
-    for name, value in lines.items():
+    for value in lines.values():
         axis.axhline(value, color=_GREY, linestyle="--", linewidth=1.0)
-        axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=_GREY)
+    room = 0.07 * np.ptp(axis.get_ylim())  # for a name above its line; where another line is nearer, it stands below
+    for name, value in lines.items():
+        side = "top" if any(value < other < value + room for other in lines.values()) else "bottom"
+        axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va=side, color=_GREY)
     axis.set_xlabel("environment steps")
     axis.set_title(title, loc="left", fontweight="bold")
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))
