@@ -143,7 +143,10 @@ def _text(name: str, value: Any) -> str:
 
 _SIX = ("sac", "sacfd", "speq", "speq_o2o", "sope_eo", "sope")
 _PRIOR = ("sacfd", "speq_o2o", "sope")
-_NO_PHASES = ("sac", "sacfd")
+
+
+def _has_phases(algorithm: str) -> bool:
+    return algorithms.ALGORITHMS[algorithm].row.phase_updates > 0
 
 
 def six(
@@ -166,7 +169,7 @@ def six(
             steps,
             seed,
             prior=prior if name in _PRIOR else None,
-            numbers=(numbers or {}) if algorithms.ALGORITHMS[name].row.phase_updates else {},
+            numbers=(numbers or {}) if _has_phases(name) else {},
             **fields,
         )
         for seed, robot, name in itertools.product(range(seeds), robots, _SIX)
@@ -180,14 +183,14 @@ _SHORT = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
 STUDIES = {
     "paper": Study("the paper's six algorithms as published", six(ROBOTS, 1_000_000, 5, Prior())),
     "exact-tick": Study("phases as published, 100,000 steps", six(("tick",), 100_000, 1, Prior())),
-    # SAC and SACfD have no phases: they are as published, and run on all four robots. Second seeds come last.
+    # Those without phases, SAC and SACfD, are as published, and run on all four robots. Second seeds come last.
     "short": Study(
         "short phases: 7,500 updates in place of 75,000",
         tuple(
             sorted(
                 (
                     *six(("tick", "leaper"), 100_000, 2, Prior(), _SHORT),
-                    *(row for row in six(("queen", "bastion"), 100_000, 1, Prior()) if row.algorithm in _NO_PHASES),
+                    *(row for row in six(("queen", "bastion"), 100_000, 1, Prior()) if not _has_phases(row.algorithm)),
                 ),
                 key=lambda row: row.seed,
             )
