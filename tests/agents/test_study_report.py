@@ -149,6 +149,7 @@ def test_nothing_published_is_one_line(tmp_path):
         study_report.write("mine", Study("none", (Row("tick", "sac", 10),)), tmp_path / "none")
 
 
+@pytest.mark.slow
 def test_committed_reports_are_made_of_committed_tables(tmp_path):
     """By the one command, and nobody has changed a number."""
     committed = pathlib.Path(__file__).parents[2] / "studies"

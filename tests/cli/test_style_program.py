@@ -65,7 +65,7 @@ def test_report_of_two_policies(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["gait.png", "path.png", "reward.png", "speed.png"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_saved_body_beside_a_policy(tmp_path):
     saved, figures = tmp_path / "spider.npz", tmp_path / "style.json"
     done = run(f"--spec={SPIDER}", "--episodes=2", "--seed=4", f"--save={saved}", f"--json={figures}")
@@ -162,7 +162,7 @@ def test_other_tasks(tmp_path, task):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr

@@ -81,7 +81,7 @@ def test_bad_input_is_one_line(arguments, message):
     assert done.stdout == ""
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_another_search_in_the_folder_is_refused(tmp_path):
     tune("--generations=1", f"--output={tmp_path}")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from tiers import never, tiers
 
 import arc_suite
 from arc_suite.arenas.pillars import RADIUS
@@ -109,7 +108,8 @@ def test_another_task_is_refused_in_one_line():
         Demonstrator("tick", "planned")(environment.reset())
 
 
-@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "tick"))
+@pytest.mark.long
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_robots_reach_goals_and_hit_nothing(robot):
     """At least four goals in 1000 steps, fewer than one collision in twenty."""
     rows, demonstrator = VectorEnv(robot, "navigate", 8), Demonstrator(robot, "planned")

@@ -24,7 +24,8 @@ def test_medium_earns_the_published_return(robot):
     assert {episode.length for episode in results} == {1000}
 
 
-@pytest.mark.parametrize("robot", tiers(RETURNS, never, lambda robot: robot == "leaper"))
+@pytest.mark.long
+@pytest.mark.parametrize("robot", RETURNS)
 def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
     presets = [TUNINGS[robot][name] for name in ("refined", "tuned", "medium")]
     score = Judge(ROBOTS[robot], presets=3, episodes=10, steps=1000)(presets, range(10))

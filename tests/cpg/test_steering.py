@@ -45,8 +45,7 @@ def obeyed(body, preset="steered", steps=300):
     return np.mean(motions, axis=0), fell
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "leaper"))
 def test_robots_obey(robot):
     motion, fell = obeyed(ROBOTS[robot])
     assert not fell.any()
@@ -102,7 +101,8 @@ def test_a_row_that_begins_again_does_as_the_first_time(robot, task, preset):
     assert_array_equal(walked(), walked())
 
 
-@pytest.mark.parametrize("robot", tiers(["queen", "bastion", "tick"], never, lambda robot: robot == "queen"))
+@pytest.mark.long
+@pytest.mark.parametrize("robot", ["queen", "bastion", "tick"])
 def test_who_sees_crosses_trenches(robot):
     trenches = {"difficulty": 0.8}  # half a standing height wide
     (blind, _), (seeing, fell) = (crossed(robot, preset, "gaps", trenches) for preset in ("surefooted", "sighted"))

@@ -22,6 +22,7 @@ from gymnasium.wrappers import (
     RecordEpisodeStatistics,
     RescaleAction,
 )
+from tiers import never, tiers
 
 import arc_suite
 from arc_suite.tasks import TASKS
@@ -261,8 +262,7 @@ def test_task_settings_reach_the_task():
     assert settings.weights["posture"] == 0.0 and settings.parameters.target_velocity == 1.0
 
 
-@pytest.mark.slow
-@EVERY_ID
+@pytest.mark.parametrize("env_id", tiers(IDS, never, lambda env_id: robot(env_id) == "tick"))
 def test_both_time_limits_agree(env_id):
     def last_step(env, before_last=lambda env: None):
         env.reset(seed=0)

@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as wrappers
 from numpy.testing import assert_array_equal
+from tiers import never, tiers, turn
 
 import arc_suite  # noqa: F401 (registers)
 from arc_suite.envs.vector import VectorEnv
@@ -53,9 +54,14 @@ def arrays(value):
     return [value] if isinstance(value, np.ndarray) else []
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    ("robot", "mode"),
+    tiers(
+        [(robot, mode) for robot in ROBOTS for mode in MODES],
+        never,
+        lambda robot, mode: turn(mode, MODES, ROBOTS.index(robot)),
+    ),
+)
 def test_rows_are_single_environments_whatever_the_threads(robot, mode):
     singles = make_singles(robot, 5, mode, task_kwargs=SHORT[robot])
     batches = [

@@ -79,8 +79,7 @@ def test_the_bytes_hold_the_kinematics(robot, rig):
     assert_kinematics(ROBOTS[robot], read(robot, rig), made(robot).values())
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["crab", "millipede", "starfish"])
+@pytest.mark.parametrize("name", tiers(["crab", "millipede", "starfish"], never, lambda name: name == "crab"))
 def test_of_any_body(name):
     body = spec_files.load_body(f"examples/{name}.json")
     clips = export.clips(body, ["walk", "idle"])
@@ -228,7 +227,7 @@ def test_presets_return(robot, preset):
         assert clip.cycles == 3
 
 
-@pytest.mark.parametrize("seed", tiers(range(20), never, lambda seed: seed < 2))
+@pytest.mark.parametrize("seed", tiers(range(20), never, lambda seed: seed == 0))
 def test_random_bodies_step_once_a_cycle(seed):
     body = random_body(seed)
     (clip,) = export.clips(body, ["walk"])

@@ -11,6 +11,7 @@ import sys
 import gymnasium
 import numpy as np
 import pytest
+from tiers import never, tiers
 
 import arc_suite
 
@@ -85,9 +86,8 @@ REFUSED = {
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 
 
-@pytest.mark.slow
 @forks
-@pytest.mark.parametrize("then", ["use", "collect", "exit"])
+@pytest.mark.parametrize("then", tiers(["use", "collect", "exit"], never, lambda then: then == "use"))
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_was_made_before_a_fork(what, then):
     environ = {"TIMES": os.devnull} | os.environ | {"PYTHONPATH": str(ROOT)}

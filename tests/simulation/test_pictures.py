@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from fixtures.obstacles import Obstacle
 from numpy.testing import assert_array_equal
+from tiers import never, tiers
 
 from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.marks import Mark
@@ -15,8 +16,7 @@ from arc_suite.simulation.pictures import check_camera, picture
 BODY = ROBOTS["queen"]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [None, 0.1])
+@pytest.mark.parametrize("share", tiers([None, 0.1], never, lambda share: share is None))
 @pytest.mark.parametrize("arena", ARENAS)
 def test_a_state_looks_like_the_simulation_in_it(arena, share):
     arena = ARENAS[arena](BODY)

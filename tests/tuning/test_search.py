@@ -10,7 +10,7 @@ from arc_suite.tuning import Judge, Search
 SETTINGS = {"robot": "bastion", "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_search_goes_on_where_it_was_broken_off():
     straight, resumed = Search(**SETTINGS), Search(**SETTINGS)
     generations = [straight.step() for _ in range(4)]
