@@ -98,7 +98,7 @@ def test_killed_twice(name, tmp_path, begun):
     assert [path for path in whole if whole[path] != killed[path]] == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     (tmp_path / "study").mkdir()
     command = ["-m", "arc_suite", "study", "tiny_studies:WITH_NUMPY", "--jobs=2"]

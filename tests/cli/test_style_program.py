@@ -92,7 +92,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
         assert (other.returncode, other.stdout, other.stderr) == (1, "", message)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
 from test_storage import killed_at
+from tiers import never, tiers
 
 from arc_suite import data, style
 from arc_suite.data import collection, episodes
@@ -226,10 +227,9 @@ ALTERED = {
 }
 
 
-FAST = ("group", "complex", "other joints", "seed")  # in `make check`
-
-
-@pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in ALTERED])
+@pytest.mark.parametrize(
+    "name", tiers(ALTERED, lambda name: name in ("group", "complex", "other joints", "seed"), never)
+)
 def test_episodes_that_are_stored_otherwise_are_one_line(root, name):
     change, reason = ALTERED[name]
     collect(ID, SETTINGS, 2)

@@ -313,7 +313,7 @@ def test_the_recording_is_the_episode_to_the_bit():
     np.testing.assert_array_equal(recording.qpos[::SUBSTEPS], poses[9:])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_same_bytes():
     first, second = (export.glb(ROBOTS["tick"], export.clips(ROBOTS["tick"], ["walk", "idle"])) for _ in range(2))
     assert first == second
@@ -357,7 +357,7 @@ def test_every_clip_can_be_made(robot):
         assert twists[name][axis] == pytest.approx(asked, rel=0.25), name
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_clip_goes_as_fast_beside_others():
     """Bastion's fast does not return together with its strides to a side, and still goes as fast as alone."""
     together, alone = (

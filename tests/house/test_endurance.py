@@ -74,7 +74,7 @@ def test_500_divergences_of_a_single_environment_are_all_reported(on_divergence)
     assert reported == 500
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_1000_divergences_of_rows_are_all_reported(mode):
     envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=50, autoreset_mode=mode)
