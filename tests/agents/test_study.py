@@ -104,13 +104,14 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     command = ["-m", "arc_suite", "study", "tiny_studies:WITH_NUMPY", "--jobs=2"]
     places = [f"--runs={tmp_path / 'runs'}", f"--results={tmp_path / 'results'}"]
     rows = [row.name for row in tiny_studies.WITH_NUMPY.rows]
-    done = subprocess.run(
-        [sys.executable, *command, *places, "--shard=0/7"], env=surroundings, capture_output=True, text=True
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.endswith("2 of 2 finished\n")
+    for shard, count in (("0/7", 2), ("1/7", 1)):
+        done = subprocess.run(
+            [sys.executable, *command, *places, f"--shard={shard}"], env=surroundings, capture_output=True, text=True
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.endswith(f"{count} of {count} finished\n")
     made = sorted(path.name for path in (tmp_path / "runs").iterdir() if path.is_dir())
-    assert made == sorted([rows[0], rows[7]])
+    assert made == sorted([rows[0], rows[7], rows[1]])
 
     row, folder = tiny_studies.WITH_NUMPY.rows[0], tmp_path / "runs"
     before = (folder / row.name / "checkpoint.npz").stat().st_mtime_ns
