@@ -11,6 +11,7 @@ from absl import flags
 import arc_suite
 from arc_suite import evaluation, files, policies
 from arc_suite.cli import films, program
+from arc_suite.cpg.demonstrator import suited_preset
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
@@ -21,13 +22,13 @@ flags.DEFINE_string("output", "docs/tasks.png", "File to write.", short_name="o"
 
 WIDTH, HEIGHT = 360, 270  # pixels of a view
 NEAR = ("walk", "steer", "shoved", "limp", "roam")  # seen from before, where arrows of the command show their length
-PRESETS = {"walk": "tuned", "steer": "steered", "gaps": "sighted", "navigate": "planned"}  # else surefooted
 
 
 def view(task: str, robot: str) -> np.ndarray:
     """Picture of a robot that does a task, (HEIGHT, WIDTH, 3), with both names."""
     environment = arc_suite.load(robot, task)
-    policy = policies.policy("cpg", robot, PRESETS.get(task, "surefooted"), task=environment.task.definition)
+    definition = environment.task.definition
+    policy = policies.policy("cpg", robot, suited_preset(definition), task=definition)
     for _ in evaluation.rollout(environment, policy, 0, FLAGS.steps):
         pass
     picture = environment.physics.render(HEIGHT, WIDTH, camera_id="portrait" if task in NEAR else "tracking")

@@ -21,7 +21,7 @@ from arc_suite.agents import networks, normaliser
 from arc_suite.agents.learner import Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
 from arc_suite.agents.rows import Imitation
-from arc_suite.cpg.demonstrator import first_preset
+from arc_suite.cpg.demonstrator import suited_preset
 from arc_suite.policies.network import Layer, forward
 
 ACTIVATION = "elu"
@@ -91,7 +91,7 @@ class Imitator:
         self._environment = stage.environment(row.rows)
         task = self._environment.task
         self._joints = self._environment.single_action_space.shape[0]
-        preset = row.preset or best(stage.body, task)
+        preset = row.preset or suited_preset(task)
         self._teacher = policies.policy("cpg", stage.body, preset, row.rows, task=task)
         layers = networks.mlp(
             generator(stage.seed, "networks", 0),
@@ -195,10 +195,3 @@ class Imitator:
             )
             errors.append(float(error))
         return errors[-1]
-
-
-def best(body, task) -> str:
-    """Return the preset that is imitated if none is given: that which follows commands, or the one that earns most."""
-    if "command" in task.blocks:
-        return "steered"
-    return first_preset(body, "refined", "tuned", "medium")

@@ -72,7 +72,7 @@ class Imitation:
     """The numbers of imitation of a demonstrator.
 
     Attributes:
-        preset: of the demonstrator; "" for one that follows the task's command, or else earns most.
+        preset: of the demonstrator; "" for that which suits the task.
         rows: that act side by side, half of them by the demonstrator.
         noise: standard deviation of what is added to actions.
         left_out: first control steps of an episode that are not learned from, as the demonstrator sets out by a

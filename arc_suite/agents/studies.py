@@ -212,15 +212,22 @@ STUDIES = {
     ),
     # What learners make of tasks in which feedback pays.
     "tasks": Study(
-        "following a command, and rough ground: PPO, and SAC without and with 100 episodes of a demonstrator",
-        tuple(
-            row
-            for task, preset in (("steer", "steered"), ("rough", "surefooted"))
-            for row in (
-                Row("tick", "ppo", 1_000_000, task=task),
-                Row("tick", "sac", 50_000, task=task, evaluate_every=5000),
-                Row("tick", "sacfd", 50_000, task=task, evaluate_every=5000, prior=Prior(preset, 100)),
-            )
+        "what learners make of tasks in which feedback pays; prior data are 100 episodes",
+        (
+            *(
+                row
+                for task, preset in (("steer", "steered"), ("rough", "surefooted"))
+                for row in (
+                    Row("tick", "ppo", 1_000_000, task=task),
+                    Row("tick", "sac", 50_000, task=task, evaluate_every=5000),
+                    Row("tick", "sacfd", 50_000, task=task, evaluate_every=5000, prior=Prior(preset, 100)),
+                )
+            ),
+            *(
+                Row("tick", "imitation", 38_400, task=task, evaluate_every=38_400)
+                for task in ("steer", "rough", "slopes", "stairs", "gaps", "navigate")
+            ),
+            Row("tick", "ppo", 3_000_000, task="rough", label="ppo-3M"),
         ),
     ),
     "beyond": Study(

@@ -23,7 +23,7 @@ import arc_suite
 from arc_suite import policies
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
 from arc_suite.cli.live import Live, play
-from arc_suite.cpg.demonstrator import first_preset
+from arc_suite.cpg.demonstrator import suited_preset
 from arc_suite.models.outline import outline
 from arc_suite.simulation import opengl
 
@@ -36,9 +36,7 @@ define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
-flags.DEFINE_string(
-    "preset", None, f"{policies.PRESET_HELP} [default: steered where the task tells a command, else tuned or medium]"
-)
+flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: that which suits the task]")
 flags.DEFINE_integer("seed", 0, "Seed of the start of the first episode and of the random policy.", 0, 2**32 - 1)
 
 
@@ -47,10 +45,8 @@ def main() -> None:
     body = only_body(_ROBOT)
     name, settings = task()
     environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings | {"random": FLAGS.seed})
-    steered = "command" in environment.task.definition.blocks
-    usual = ("steered",) if steered else ("tuned", "medium")
-    preset = FLAGS.preset or first_preset(body, *usual)
-    policy = policies.policy(FLAGS.policy, body, preset, task=environment.task.definition)
+    definition = environment.task.definition
+    policy = policies.policy(FLAGS.policy, body, FLAGS.preset or suited_preset(definition), task=definition)
     live = Live(environment, policies.alone(policy, FLAGS.seed))
     opengl.require_window("`arc-suite render -o walk.html` writes a page that plays in any browser")
     keys = queue.SimpleQueue()

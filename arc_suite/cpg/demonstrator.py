@@ -19,6 +19,7 @@ from arc_suite.models.sizing import control_timestep
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, gaits
 from arc_suite.robots.spec import Body
+from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import fitted_gait
 
 # Speeds of bodies that have no presets of their own, as shares of sqrt(g h).
@@ -26,6 +27,13 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 
 # Presets that follow the command of a task; what is sighted needs to see the ground, and balanced is Leaper's alone.
 MANNERS = (*STEERING, "sighted", "balanced")
+
+# Who gets on in a task, the best first (docs/ground.md, docs/navigate.md), where that is not who follows commands.
+_SUITED = {
+    **dict.fromkeys(("rough", "slopes", "stairs", "course", "roam"), ("balanced", "surefooted")),
+    "gaps": ("sighted",),
+    "navigate": ("planned",),
+}
 
 # The law of each kind of preset that goes by what a task says; all others go by a clock of their own.
 LAWS = {Manner: Steered, Tread: Sighted, Balance: Balanced, Plan: Planned}
@@ -176,6 +184,16 @@ def first_preset(body: Body, *names: str) -> str:
     """
     presets = presets_of(body)
     return next(name for name in names if name in presets)
+
+
+def suited_preset(task: Task) -> str:
+    """Return the preset that suits a task, and the body that does it, to watch or to imitate.
+
+    Raises:
+        ValueError: as `presets_of`.
+    """
+    usual = ("steered",) if "command" in task.blocks else ("refined", "tuned", "medium")
+    return first_preset(task.scene.body, *_SUITED.get(task.name, usual))
 
 
 class Prescribed(NamedTuple):

@@ -14,7 +14,6 @@ from arc_suite.agents.learner import Stage
 from arc_suite.agents.rows import Imitation
 from arc_suite.agents.training import Run, train
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
 from arc_suite.robots import ROBOTS, generator
 
@@ -85,15 +84,6 @@ def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path)
     for observation, label in zip(learner.arrays()["observations"], labels, strict=True):
         said = demonstrator.act(environment.task.split(observation))
         assert_array_equal(said.astype(np.float32), label)
-
-
-@pytest.mark.parametrize(
-    ("robot", "task", "preset"),
-    [("queen", "walk", "refined"), ("queen", "steer", "steered"), (generator.generate(4, 2), "walk", "medium")],
-)
-def test_whom_it_imitates_unless_told(robot, task, preset):
-    body = ROBOTS[robot] if isinstance(robot, str) else robot
-    assert imitation.best(body, VectorEnv(body, task, 1).task) == preset
 
 
 def test_an_unknown_demonstrator_is_refused(tmp_path):

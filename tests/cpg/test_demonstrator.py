@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import arc_suite
 from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of
+from arc_suite.cpg.demonstrator import Prescribed, pattern, presets_of, suited_preset
 from arc_suite.cpg.planner import PLANS
 from arc_suite.cpg.presets import TUNINGS, Bend, Preset
 from arc_suite.cpg.sighted import TREADS
@@ -52,6 +52,22 @@ OFFSETS = {"l1": 0.5, "r1": 0, "l2": 0, "r2": 0.5, "l3": 0.5, "r3": 0, "fl": 0, 
 UPRIGHT = np.array((1.0, 0.0, 0.0, 0.0))
 RANKS = {"l1": 0, "r1": 0, "l2": 1, "r2": 1, "l3": 2, "r3": 2, "fl": 0, "fr": 0, "rl": 1, "rr": 1}
 LEFT = ("l1", "l2", "l3", "fl", "rl")
+
+
+@pytest.mark.parametrize(
+    ("body", "task", "preset"),
+    [
+        (ROBOTS["queen"], "walk", "refined"),
+        (ROBOTS["queen"], "shoved", "steered"),
+        (ROBOTS["tick"], "rough", "surefooted"),
+        (ROBOTS["leaper"], "rough", "balanced"),
+        (ROBOTS["tick"], "gaps", "sighted"),
+        (ROBOTS["tick"], "navigate", "planned"),
+        (generator.generate(4, 2), "walk", "medium"),
+    ],
+)
+def test_whom_to_watch_and_to_imitate(body, task, preset):
+    assert suited_preset(arc_suite.load(body, task).task.definition) == preset
 
 
 def expected_target(robot, joint, step):
