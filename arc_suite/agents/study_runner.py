@@ -22,7 +22,7 @@ from tqdm import tqdm
 from arc_suite import evaluation, files, policies, style
 from arc_suite.agents import run_folder, study_results
 from arc_suite.agents.studies import Row
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.demonstrator import presets_of, suited_preset
 from arc_suite.data import collect
 from arc_suite.envs.dm import Environment, load
 from arc_suite.envs.vector import VectorEnv
@@ -35,7 +35,8 @@ PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
 # Metrics of `arc_suite.style` by which the final policies are compared.
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 
-# Of demonstrators whose returns are published beside those of runs: in `walk`, and where there is a command.
+# Of demonstrators whose returns are published beside those of runs: in `walk`, and where there is a command; that which
+# suits the task comes beside them.
 PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
 
 _PAUSE = 0.2  # s between two looks at the processes
@@ -252,7 +253,8 @@ def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
     body, found = row.body, {}
     rows = VectorEnv(body, row.task, evaluation.EPISODES, 1, AutoresetMode.DISABLED, task_kwargs=dict(row.task_kwargs))
     with contextlib.closing(rows):
-        for preset in COMMANDED if "command" in rows.task.blocks else PRESETS:
+        usual = COMMANDED if "command" in rows.task.blocks else PRESETS
+        for preset in dict.fromkeys((*usual, suited_preset(rows.task))):
             if preset in presets_of(body):
                 policy = policies.policy("cpg", body, preset, evaluation.EPISODES, task=rows.task)
                 found[preset] = evaluation.episodes_in_rows(rows, policy)

@@ -237,7 +237,14 @@ def test_without_submitit_it_says_what_to_install(tmp_path):
     assert done.stderr.startswith(line) and done.stderr.count("\n") == 1
 
 
-@pytest.mark.parametrize(("task", "presets"), [("walk", ["medium", "refined"]), ("rough", ["steered", "surefooted"])])
+@pytest.mark.parametrize(
+    ("task", "presets"),
+    [
+        ("walk", ["medium", "refined"]),
+        ("rough", ["steered", "surefooted"]),
+        ("navigate", ["steered", "surefooted", "planned"]),
+    ],
+)
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, task, presets):
     row = Row("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
     study_runner.publish_all([row], tmp_path / "runs", tmp_path)
