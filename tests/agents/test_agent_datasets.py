@@ -61,11 +61,15 @@ def test_checkpoints_take_turns(run):
         np.testing.assert_array_equal(actions[row], alone[turn].act(observation, np.zeros(3))[row])
 
 
-@pytest.mark.parametrize(("flag", "label", "steps"), [
-    pytest.param("--checkpoint=200", "200", [200], marks=pytest.mark.slow),
-    pytest.param("--grade=expert", "expert", [300], marks=pytest.mark.slow),
-    ("--grade=replay", "replay", [100, 200, 300]),
-])  # fmt: skip
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("flag", "label", "steps"),
+    [
+        ("--checkpoint=200", "200", [200]),
+        ("--grade=expert", "expert", [300]),
+        ("--grade=replay", "replay", [100, 200, 300]),
+    ],
+)
 def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
     """Its id and metadata say whose it is, and it replays to the bit."""
     done = collected(flag)

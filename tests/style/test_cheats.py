@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from synthetic import DT, synthetic
+from tiers import tiers
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
@@ -39,6 +40,9 @@ class Scripted:
         if self.cheat == "drag":
             action[:, : self.limp] = 0.0
         return action
+
+
+ONE = pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "queen"))
 
 
 @functools.cache
@@ -85,7 +89,7 @@ def test_dragging_one_leg_shows(robot):
     assert drag["asymmetry"].legs["fl"] > 0.05
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@ONE
 def test_walking_backwards_shows(robot):
     honest, cheat = measured(robot), measured(robot, "back")
     assert cheat["speed"].value < -0.1 < 0.3 < honest["speed"].value
@@ -94,7 +98,7 @@ def test_walking_backwards_shows(robot):
     assert turned["heading_error"].value > 3.0 > 0.5 > honest["heading_error"].value
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@ONE
 def test_walking_sideways_shows(robot):
     honest = measured(robot)
     to_the_side = measure(synthetic(course=math.pi / 2))
