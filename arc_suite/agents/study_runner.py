@@ -35,8 +35,8 @@ PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
 # Metrics of `arc_suite.style` by which the final policies are compared.
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 
-# Of demonstrators whose returns are published beside those of runs: in `walk`, and where there is a command; that which
-# suits the task comes beside them.
+# Of demonstrators whose returns are published beside those of runs: in `walk`, and where there is a command. That which
+# suits the task stands with them.
 PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
 
 _PAUSE = 0.2  # s between two looks at the processes

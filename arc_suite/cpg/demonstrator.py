@@ -28,7 +28,7 @@ FROUDES = {"slow": 0.18, "medium": 0.25, "fast": 0.32}
 # Presets that follow the command of a task; what is sighted needs to see the ground, and balanced is Leaper's alone.
 MANNERS = (*STEERING, "sighted", "balanced")
 
-# Who gets on in a task, the best first (docs/ground.md, docs/navigate.md), where that is not who follows commands.
+# Who gets on in a task with a command, the best first (docs/ground.md, docs/navigate.md), where that is not `steered`.
 _SUITED = {
     **dict.fromkeys(("rough", "slopes", "stairs", "course", "roam"), ("balanced", "surefooted")),
     "gaps": ("sighted",),
@@ -192,8 +192,8 @@ def suited_preset(task: Task) -> str:
     Raises:
         ValueError: as `presets_of`.
     """
-    usual = ("steered",) if "command" in task.blocks else ("refined", "tuned", "medium")
-    return first_preset(task.scene.body, *_SUITED.get(task.name, usual))
+    commanded = _SUITED.get(task.name, ("steered",))
+    return first_preset(task.scene.body, *(commanded if "command" in task.blocks else ("refined", "tuned", "medium")))
 
 
 class Prescribed(NamedTuple):

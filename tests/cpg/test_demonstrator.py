@@ -55,19 +55,20 @@ LEFT = ("l1", "l2", "l3", "fl", "rl")
 
 
 @pytest.mark.parametrize(
-    ("body", "task", "preset"),
+    ("body", "task", "settings", "preset"),
     [
-        (ROBOTS["queen"], "walk", "refined"),
-        (ROBOTS["queen"], "shoved", "steered"),
-        (ROBOTS["tick"], "rough", "surefooted"),
-        (ROBOTS["leaper"], "rough", "balanced"),
-        (ROBOTS["tick"], "gaps", "sighted"),
-        (ROBOTS["tick"], "navigate", "planned"),
-        (generator.generate(4, 2), "walk", "medium"),
+        (ROBOTS["queen"], "walk", {}, "refined"),
+        (ROBOTS["queen"], "shoved", {}, "steered"),
+        (ROBOTS["tick"], "rough", {}, "surefooted"),
+        (ROBOTS["tick"], "rough", {"without": "command"}, "refined"),
+        (ROBOTS["leaper"], "rough", {}, "balanced"),
+        (ROBOTS["tick"], "gaps", {}, "sighted"),
+        (ROBOTS["tick"], "navigate", {}, "planned"),
+        (generator.generate(4, 2), "walk", {}, "medium"),
     ],
 )
-def test_whom_to_watch_and_to_imitate(body, task, preset):
-    assert suited_preset(arc_suite.load(body, task).task.definition) == preset
+def test_whom_to_watch_and_to_imitate(body, task, settings, preset):
+    assert suited_preset(arc_suite.load(body, task, settings).task.definition) == preset
 
 
 def expected_target(robot, joint, step):
