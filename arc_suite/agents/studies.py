@@ -229,7 +229,7 @@ STUDIES = {
             ),
             # Whether a foot misses a trench is told by a few steps of an episode: it takes more of them.
             Row("tick", "imitation", 153_600, task="gaps", evaluate_every=76_800),
-            # With a million steps its noise falls before it walks.
+            # Noise falls over the length of a run; on rough ground that of a million steps is gone before it walks.
             *(Row("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
         ),
     ),
