@@ -78,9 +78,9 @@ def _finish(axis, title: str, lines: Mapping[str, float]) -> None:
     """Draw returns to compare with, and label the picture."""
     for value in lines.values():
         axis.axhline(value, color=_GREY, linestyle="--", linewidth=1.0)
-    low, high = min(axis.get_ylim()[0], 0.0), axis.get_ylim()[1]
-    room = 0.07 * (high - low)  # for a name above its line; where another line is nearer, it stands below
-    axis.set_ylim(low, max([high, *(value + room for value in lines.values())]))
+    axis.set_ylim(bottom=min(axis.get_ylim()[0], 0.0))
+    room = 0.07 * np.ptp(axis.get_ylim())  # for a name above its line; where another line is nearer, it stands below
+    axis.set_ylim(top=max([axis.get_ylim()[1], *(value + room for value in lines.values())]))
     for name, value in lines.items():
         side = "top" if any(value < other < value + room for other in lines.values()) else "bottom"
         axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va=side, color=_GREY)
