@@ -1,11 +1,12 @@
 """How fast soft actor-critic learns on one core, and what the processor could do at most; needs JAX."""
 
 import functools
-import os
 import time
 from collections.abc import Iterator
 
-os.environ |= {"NPROC": "1", "OMP_NUM_THREADS": "1", "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false"}
+from arc_suite.cli.program import use_one_thread
+
+use_one_thread()
 
 import jax
 import jax.numpy as jnp
