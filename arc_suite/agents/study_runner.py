@@ -13,15 +13,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import IO
 
-import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import evaluation, files, policies, style
 from arc_suite.agents import run_folder, study_results
 from arc_suite.agents.studies import Row
+from arc_suite.agents.study_states import State, state, table
 from arc_suite.cpg.demonstrator import presets_of, suited_preset
 from arc_suite.data import collect
 from arc_suite.envs.dm import Environment, load
@@ -40,26 +40,6 @@ METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "
 PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
 
 _PAUSE = 0.2  # s between two looks at the processes
-
-
-class State(NamedTuple):
-    """How a run stands.
-
-    Attributes:
-        row: that makes it.
-        word: finished, running, elsewhere, failed or waiting.
-        step: environment steps of its latest line of times.
-        result: mean return of the latest evaluation; None before the first.
-        wall: s so far, of wall clock.
-        cpu: s so far, of the processor.
-    """
-
-    row: Row
-    word: str
-    step: int
-    result: float | None
-    wall: float
-    cpu: float
 
 
 def is_finished(row: Row, folder: Path) -> bool:
@@ -154,36 +134,6 @@ def claimed(log: Path) -> IO | None:
     return None
 
 
-def state(row: Row, folder: Path, word: str) -> State:
-    """Return how a run stands, from its tables."""
-    times, evaluations = _table(folder, "times"), _table(folder, "evaluations")
-    step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
-    result = None
-    if evaluations:
-        result = float(evaluations["return"][evaluations["step"] == evaluations["step"][-1]].mean())
-    return State(row, word, int(step), result, float(wall), float(cpu))
-
-
-def remaining(states: Sequence[State], jobs: float) -> float | None:
-    """Return about how many seconds a study still takes; None where nothing tells yet.
-
-    A run goes on as fast as it has gone so far, or as the others of its kind, or as all others.
-    """
-    paces: dict[str, list[float]] = {}
-    for each in states:
-        if each.step:
-            for name in (each.row.kind, ""):
-                paces.setdefault(name, []).append(each.wall / each.step)
-    if not paces:
-        return None
-    total = 0.0
-    for each in states:
-        if each.word not in ("finished", "failed"):
-            pace = each.wall / each.step if each.step else np.mean(paces.get(each.row.kind, paces[""]))
-            total += pace * max(each.row.steps - each.step, 0)
-    return total / jobs
-
-
 def publish(row: Row, folder: Path, published: Path) -> None:
     """Copy the tables of a run that has been evaluated, and measure and draw the style of its latest policy.
 
@@ -198,7 +148,7 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         OSError: something cannot be written; one line.
     """
     source, target = folder / row.name, published / row.name
-    evaluations = _table(source, "evaluations")
+    evaluations = table(source, "evaluations")
     if not evaluations:
         return
     files.folder(target)
@@ -209,7 +159,7 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         with files.writing(target / name) as temporary:
             temporary.write_text((source / name).read_text())
     step = int(evaluations["step"][-1])
-    measured, drawn = _table(target, "style"), target / study_results.STRIP
+    measured, drawn = table(target, "style"), target / study_results.STRIP
     up_to_date = bool(measured) and measured["step"][-1] == step
     if not up_to_date:
         drawn.unlink(missing_ok=True)  # before the style is new: where it is, the strip is of the same policy
@@ -282,7 +232,3 @@ def _style(row: Row, folder: Path, step: int) -> str:
 def _started(row: Row, folder: Path, log: IO) -> subprocess.Popen:
     command = [sys.executable, "-m", "arc_suite", *row.arguments(folder)]
     return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
-
-
-def _table(folder: Path, name: str) -> dict[str, np.ndarray]:
-    return run_folder.table(folder, name) if (folder / f"{name}.csv").exists() else {}

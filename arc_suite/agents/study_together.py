@@ -14,7 +14,7 @@ from tqdm import tqdm
 from arc_suite.agents import study_runner, training
 from arc_suite.agents.calls import Call
 from arc_suite.agents.studies import Row
-from arc_suite.agents.study_runner import State
+from arc_suite.agents.study_states import State, state
 from arc_suite.agents.together import together
 
 _EVERY = 2.0  # s between two looks at all runs
@@ -48,7 +48,7 @@ def run(
         nonlocal latest
         if at_once or time.monotonic() - latest >= _EVERY:
             latest = time.monotonic()
-            shown([study_runner.state(row, folder / row.name, words[row.name]) for row in rows])
+            shown([state(row, folder / row.name, words[row.name]) for row in rows])
 
     def beside() -> int:
         return list(words.values()).count("running")
@@ -81,7 +81,7 @@ def run(
         if "elsewhere" in words.values():
             time.sleep(_EVERY)
     study_runner.publish_all(rows, folder, published)
-    return [study_runner.state(row, folder / row.name, words[row.name]) for row in rows]
+    return [state(row, folder / row.name, words[row.name]) for row in rows]
 
 
 def groups(rows: Sequence[Row], width: int) -> Iterator[tuple[Row, ...]]:

@@ -20,9 +20,9 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite.agents import studies, study_report, study_runner
+from arc_suite.agents import studies, study_report, study_runner, study_states
 from arc_suite.agents.studies import Row
-from arc_suite.agents.study_runner import State
+from arc_suite.agents.study_states import State
 from arc_suite.cli.program import progress, use_one_thread
 
 FLAGS = flags.FLAGS
@@ -128,7 +128,7 @@ def table(states: list[State], jobs: float) -> str:
         result = "-" if each.result is None else f"{each.result:.1f}"
         lines.append(f"{each.row.name:<{width}}  {each.word:<9} {steps:>19} {result:>8} {each.cpu / 60.0:>8.1f}")
     finished = sum(each.word == "finished" for each in states)
-    seconds = study_runner.remaining(states, jobs)
+    seconds = study_states.remaining(states, jobs)
     left = "" if finished == len(states) else f", {'?' if seconds is None else duration(seconds)} to go"
     return "\n".join([*lines, f"{finished} of {len(states)} finished{left}"])
 

@@ -14,9 +14,10 @@ import pytest
 import tiny_studies
 
 from arc_suite import policies, style
-from arc_suite.agents import run_folder, studies, study_results, study_runner
+from arc_suite.agents import run_folder, studies, study_results, study_runner, study_states
 from arc_suite.agents.studies import Row
-from arc_suite.agents.study_runner import METRICS, State
+from arc_suite.agents.study_runner import METRICS
+from arc_suite.agents.study_states import State
 from arc_suite.envs.dm import load
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -175,10 +176,10 @@ def test_remaining_time():
     def state(row, word, step, wall):
         return State(row, word, step, None, wall, wall)
 
-    assert study_runner.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
+    assert study_states.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
     begun = [state(sac, "finished", 1000, 100.0), state(sac, "running", 500, 100.0), state(sac, "waiting", 0, 0.0)]
-    assert study_runner.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
-    assert study_runner.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
+    assert study_states.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
+    assert study_states.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
 
 
 @pytest.mark.parametrize(

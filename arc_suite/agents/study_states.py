@@ -1,0 +1,69 @@
+"""How the runs of a study stand, from their tables: what is shown while they are made."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.agents import run_folder
+from arc_suite.agents.studies import Row
+
+
+class State(NamedTuple):
+    """How a run stands.
+
+    Attributes:
+        row: that makes it.
+        word: finished, running, elsewhere, failed or waiting.
+        step: environment steps of its latest line of times.
+        result: mean return of the latest evaluation; None before the first.
+        wall: s so far, of wall clock.
+        cpu: s so far, of the processor.
+    """
+
+    row: Row
+    word: str
+    step: int
+    result: float | None
+    wall: float
+    cpu: float
+
+
+def state(row: Row, folder: Path, word: str) -> State:
+    """Return how a run stands, from its tables."""
+    times, evaluations = (table(folder, name) for name in ("times", "evaluations"))
+    step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
+    result = None
+    if evaluations:
+        result = float(evaluations["return"][evaluations["step"] == evaluations["step"][-1]].mean())
+    return State(row, word, int(step), result, float(wall), float(cpu))
+
+
+def remaining(states: Sequence[State], jobs: float) -> float | None:
+    """Return about how many seconds a study still takes; None where nothing tells yet.
+
+    A run goes on as fast as it has gone so far, or as the others of its kind, or as all others.
+    """
+    paces: dict[str, list[float]] = {}
+    for each in states:
+        if each.step:
+            for name in (each.row.kind, ""):
+                paces.setdefault(name, []).append(each.wall / each.step)
+    if not paces:
+        return None
+    total = 0.0
+    for each in states:
+        if each.word not in ("finished", "failed"):
+            pace = each.wall / each.step if each.step else np.mean(paces.get(each.row.kind, paces[""]))
+            total += pace * max(each.row.steps - each.step, 0)
+    return total / jobs
+
+
+def table(folder: Path, name: str) -> dict[str, np.ndarray]:
+    """Return a table of a run, as `run_folder.table` does, without columns where there is none yet.
+
+    Raises:
+        ValueError: a damaged table; one line.
+    """
+    return run_folder.table(folder, name) if (folder / f"{name}.csv").exists() else {}
