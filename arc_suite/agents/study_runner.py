@@ -21,7 +21,7 @@ from tqdm import tqdm
 from arc_suite import evaluation, files, policies, style
 from arc_suite.agents import run_folder, study_results
 from arc_suite.agents.studies import Row
-from arc_suite.agents.study_states import State, state, table
+from arc_suite.agents.study_states import State, states, table, watched
 from arc_suite.cpg.demonstrator import presets_of, suited_preset
 from arc_suite.data import collect
 from arc_suite.envs.dm import Environment, load
@@ -80,46 +80,43 @@ def run(
         OSError: something cannot be written; one line.
     """
     words = prepared(rows, folder, jobs, progress)
-    running: dict[int, tuple[subprocess.Popen, IO]] = {}
-
-    def states():
-        return [state(row, folder / row.name, word) for row, word in zip(rows, words, strict=True)]
-
+    look = watched(rows, folder, words, shown)
+    running: dict[str, tuple[Row, subprocess.Popen, IO]] = {}
     try:
-        while not {"waiting", "elsewhere", "running"}.isdisjoint(words):
-            for place, row in enumerate(rows):
-                if words[place] in ("waiting", "elsewhere") and len(running) < jobs:
+        while not {"waiting", "elsewhere", "running"}.isdisjoint(words.values()):
+            for row in rows:
+                if words[row.name] in ("waiting", "elsewhere") and len(running) < jobs:
                     log = claimed(folder / f"{row.name}.log")
-                    words[place] = "running" if log else "elsewhere"
+                    words[row.name] = "running" if log else "elsewhere"
                     if log:
-                        running[place] = _started(row, folder / row.name, log), log
-            for place, (process, log) in list(running.items()):
+                        running[row.name] = row, _started(row, folder / row.name, log), log
+            for row, process, log in list(running.values()):
                 if process.poll() is not None:
                     log.close()
-                    del running[place]
-                    words[place] = "failed" if process.returncode else "finished"
-                    publish(rows[place], folder, published)
-            shown(states())
+                    del running[row.name]
+                    words[row.name] = "failed" if process.returncode else "finished"
+                    publish(row, folder, published)
+            look()
             time.sleep(_PAUSE)
     finally:
-        for process, _ in running.values():
+        for _, process, _ in running.values():
             process.terminate()
-        for process, _ in running.values():
+        for _, process, _ in running.values():
             process.wait()
     publish_all(rows, folder, published)  # those too that were finished before, or made elsewhere
-    return states()
+    return states(rows, folder, words)
 
 
-def prepared(rows: Sequence[Row], folder: Path, threads: int, progress: Callable = tqdm) -> list[str]:
-    """Collect the prior data of the runs that are not finished, and return the word for each run, as in `State`.
+def prepared(rows: Sequence[Row], folder: Path, threads: int, progress: Callable = tqdm) -> dict[str, str]:
+    """Collect the prior data of the runs that are not finished, and return words of all by name, as in `State`.
 
     Raises:
         ValueError: a row that does not fit, or the folder of another run; one line.
         OSError: something cannot be written; one line.
     """
     files.folder(folder)
-    words = ["finished" if is_finished(row, folder / row.name) else "waiting" for row in rows]
-    waiting = [row for row, word in zip(rows, words, strict=True) if word == "waiting"]
+    words = {row.name: "finished" if is_finished(row, folder / row.name) else "waiting" for row in rows}
+    waiting = [row for row in rows if words[row.name] == "waiting"]
     for row in {row.prior_id: row for row in waiting if row.prior is not None}.values():
         collect(row.prior_id, row.prior_settings, row.prior.episodes, threads=threads, progress=progress)
     return words

@@ -1,6 +1,8 @@
 """How the runs of a study stand, from their tables: what is shown while they are made."""
 
-from collections.abc import Sequence
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -8,6 +10,8 @@ import numpy as np
 
 from arc_suite.agents import run_folder
 from arc_suite.agents.studies import Row
+
+_EVERY = 2.0  # s between two looks, where no word changes
 
 
 class State(NamedTuple):
@@ -30,6 +34,17 @@ class State(NamedTuple):
     cpu: float
 
 
+def states(rows: Sequence[Row], folder: Path, words: Mapping[str, str]) -> list[State]:
+    """Return how the runs of a study stand.
+
+    Args:
+        rows: of the study.
+        folder: of the study.
+        words: of the runs, by name, as in `State`.
+    """
+    return [state(row, folder / row.name, words[row.name]) for row in rows]
+
+
 def state(row: Row, folder: Path, word: str) -> State:
     """Return how a run stands, from its tables."""
     times, evaluations = (table(folder, name) for name in ("times", "evaluations"))
@@ -38,6 +53,33 @@ def state(row: Row, folder: Path, word: str) -> State:
     if evaluations:
         result = float(evaluations["return"][evaluations["step"] == evaluations["step"][-1]].mean())
     return State(row, word, int(step), result, float(wall), float(cpu))
+
+
+def watched(
+    rows: Sequence[Row], folder: Path, words: Mapping[str, str], shown: Callable[[list[State]], None]
+) -> Callable[[], None]:
+    """Return a function that shows how runs stand, when a word has changed and every two seconds.
+
+    It reads those tables alone that may have grown: all 120 of `paper`, at their end, take half a second of a core.
+
+    Args:
+        rows, folder, words: as `states` takes them; words change.
+        shown: called with the states.
+    """
+    seen: dict[str, State] = {}
+    latest = -math.inf
+
+    def look() -> None:
+        nonlocal latest
+        changed = [row for row in rows if row.name not in seen or seen[row.name].word != words[row.name]]
+        if not changed and time.monotonic() < latest + _EVERY:
+            return
+        growing = [row for row in rows if words[row.name] in ("running", "elsewhere")]
+        seen.update((each.row.name, each) for each in states([*changed, *growing], folder, words))
+        shown([seen[row.name] for row in rows])
+        latest = time.monotonic()
+
+    return look
 
 
 def remaining(states: Sequence[State], jobs: float) -> float | None:

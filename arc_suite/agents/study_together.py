@@ -1,7 +1,6 @@
 """Runs studies in this process: runs of equal shape advance side by side, in one program, as a GPU wants them."""
 
 import functools
-import math
 import os
 import time
 import traceback
@@ -14,10 +13,10 @@ from tqdm import tqdm
 from arc_suite.agents import study_runner, training
 from arc_suite.agents.calls import Call
 from arc_suite.agents.studies import Row
-from arc_suite.agents.study_states import State, state
+from arc_suite.agents.study_states import State, states, watched
 from arc_suite.agents.together import together
 
-_EVERY = 2.0  # s between two looks at all runs
+_PAUSE = 2.0  # s between two looks at what other processes make
 _no_bar = functools.partial(tqdm, disable=True)
 
 
@@ -40,15 +39,8 @@ def run(
 
     Returns, raises: as `study_runner.run` does.
     """
-    found = study_runner.prepared(rows, folder, os.cpu_count(), progress)
-    words = {row.name: word for row, word in zip(rows, found, strict=True)}
-    latest = -math.inf
-
-    def look(at_once: bool = False) -> None:
-        nonlocal latest
-        if at_once or time.monotonic() - latest >= _EVERY:
-            latest = time.monotonic()
-            shown([state(row, folder / row.name, words[row.name]) for row in rows])
+    words = study_runner.prepared(rows, folder, os.cpu_count(), progress)
+    look = watched(rows, folder, words, shown)
 
     def beside() -> int:
         return list(words.values()).count("running")
@@ -60,7 +52,7 @@ def run(
             return
         with log:
             words[row.name] = "running"
-            look(at_once=True)
+            look()
             try:
                 yield from training.training(
                     row.run(), folder / row.name, progress=_no_bar, told=lambda *_: look(), beside=beside
@@ -73,15 +65,15 @@ def run(
                 log.write(traceback.format_exc().encode())
                 words[row.name] = "failed"
         study_runner.publish(row, folder, published)
-        look(at_once=True)
+        look()
 
     while waiting := [row for row in rows if words[row.name] in ("waiting", "elsewhere")]:
         for group in groups(waiting, width):
             together([work(row) for row in group], width)
         if "elsewhere" in words.values():
-            time.sleep(_EVERY)
+            time.sleep(_PAUSE)
     study_runner.publish_all(rows, folder, published)
-    return [state(row, folder / row.name, words[row.name]) for row in rows]
+    return states(rows, folder, words)
 
 
 def groups(rows: Sequence[Row], width: int) -> Iterator[tuple[Row, ...]]:

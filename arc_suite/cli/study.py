@@ -13,8 +13,8 @@ enough to be committed, and the report is made of that folder alone.
 """
 
 import os
+import shutil
 import sys
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -41,7 +41,8 @@ flags.DEFINE_bool("report", False, "Write the report in place of making runs.")
 flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
 flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
 
-_EVERY = 2.0  # s between two tables on a terminal
+# Of runs, those first whose lines change.
+_WORDS = ("running", "elsewhere", "failed", "waiting", "finished")
 
 
 def main(name: str | None = None) -> int:
@@ -63,20 +64,19 @@ def main(name: str | None = None) -> int:
         raise ValueError("--together, --jobs, --submit: one process, several, or a cluster; give one of them")
     if FLAGS.submit is not None:
         return submit(name, min(FLAGS.submit, len(rows)), folder, results)
-    if FLAGS.together is not None:
-        jobs, states = 1, together(rows, folder, results, FLAGS.together)
-    else:
-        jobs = FLAGS.jobs or os.cpu_count()
-        states = study_runner.run(rows, folder, results, jobs, shown(jobs), progress)
-    print(table(states, jobs))
+    width = FLAGS.together or FLAGS.jobs or os.cpu_count()
+    run, jobs = (study_runner.run, width) if FLAGS.together is None else together(rows, width)
+    show = shown(jobs)
+    states = run(rows, folder, results, width, show, progress)
+    show(states, whole=True)
     failed = [each.row.name for each in states if each.word == "failed"]
     for run in failed:
         print(f"{folder / run}.log: {last_line(folder / f'{run}.log')}", file=sys.stderr)
     return 1 if failed else 0
 
 
-def together(rows: Sequence[Row], folder: Path, results: Path, width: int) -> list[State]:
-    """Make runs side by side in this process.
+def together(rows: Sequence[Row], width: int) -> tuple[Callable, float]:
+    """Return what makes runs side by side in this process, and how many it makes at a time.
 
     Raises:
         ValueError: JAX is not installed; one line.
@@ -86,8 +86,7 @@ def together(rows: Sequence[Row], folder: Path, results: Path, width: int) -> li
         from arc_suite.agents import study_together
     except ImportError as error:
         raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
-    at_a_time = len(rows) / len(list(study_together.groups(rows, width)))
-    return study_together.run(rows, folder, results, width, shown(at_a_time), progress)
+    return study_together.run, len(rows) / len(list(study_together.groups(rows, width)))
 
 
 def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
@@ -119,17 +118,26 @@ def shard(text: str) -> tuple[int, int]:
     return int(part), int(parts)
 
 
-def table(states: list[State], jobs: float) -> str:
-    """Return as text how the runs stand, and how long they still take."""
+def table(states: list[State], jobs: float, most: int | None = None) -> str:
+    """Return as text how the runs stand, and how long they still take.
+
+    Args:
+        states: of the runs.
+        jobs: runs at a time.
+        most: lines of runs, of those first that change; None for all.
+    """
     width = max(len(each.row.name) for each in states)
     lines = [f"{'run':<{width}}  {'state':<9} {'steps':>19} {'return':>8} {'CPU min':>8}"]
-    for each in states:
+    chosen = sorted(states, key=lambda each: _WORDS.index(each.word))[:most]
+    for each in sorted(chosen, key=states.index):
         steps = f"{each.step:,} / {each.row.steps:,}"
         result = "-" if each.result is None else f"{each.result:.1f}"
         lines.append(f"{each.row.name:<{width}}  {each.word:<9} {steps:>19} {result:>8} {each.cpu / 60.0:>8.1f}")
-    finished = sum(each.word == "finished" for each in states)
+    finished, failed = (sum(each.word == word for each in states) for word in ("finished", "failed"))
     seconds = study_states.remaining(states, jobs)
-    left = "" if finished == len(states) else f", {'?' if seconds is None else duration(seconds)} to go"
+    left = f", {failed} failed" if failed else ""
+    if finished + failed < len(states):
+        left += f", {'?' if seconds is None else duration(seconds)} to go"
     return "\n".join([*lines, f"{finished} of {len(states)} finished{left}"])
 
 
@@ -139,21 +147,27 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min"
 
 
-def shown(jobs: float) -> Callable[[list[State]], None]:
-    """Return what shows states: on a terminal a table in its place, elsewhere a line for each change."""
-    words, latest = {}, [0.0]
+def shown(jobs: float) -> Callable[..., None]:
+    """Return what shows states: on a terminal a table in its place, elsewhere a line for each change.
 
-    def on_terminal(states):
-        if time.monotonic() - latest[0] >= _EVERY:
-            up = f"\x1b[{len(states) + 2}A" if latest[0] else ""
-            print(up + table(states, jobs).replace("\n", "\x1b[K\n") + "\x1b[K", flush=True)
-            latest[0] = time.monotonic()
+    With `whole`, at the end, it shows the table of all runs; before that, as many as the terminal has lines for.
+    """
+    words, height = {}, 0
 
-    def as_lines(states):
+    def on_terminal(states, whole=False):
+        nonlocal height
+        over = f"\x1b[{height}A\x1b[J" if height else ""
+        text = table(states, jobs, None if whole else max(shutil.get_terminal_size().lines - 3, 1))
+        print(over + text, flush=True)
+        height = text.count("\n") + 1
+
+    def as_lines(states, whole=False):
         for each in states:
             if words.get(each.row.name, "waiting") != each.word:
                 print(f"{each.row.name}: {each.word}", flush=True)
             words[each.row.name] = each.word
+        if whole:
+            print(table(states, jobs))
 
     return on_terminal if sys.stdout.isatty() else as_lines
 

@@ -17,7 +17,7 @@ from arc_suite import policies, style
 from arc_suite.agents import run_folder, studies, study_results, study_runner, study_states
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_runner import METRICS
-from arc_suite.agents.study_states import State
+from arc_suite.agents.study_states import State, watched
 from arc_suite.envs.dm import load
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -147,7 +147,7 @@ def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
     command = ["-m", "arc_suite", "study", "tiny_studies:BROKEN", "--jobs=1"]
     done = subprocess.run([sys.executable, *command], env=surroundings, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 1
-    assert "1 of 2 finished" in done.stdout
+    assert done.stdout.endswith("1 of 2 finished, 1 failed\n")
     (line,) = done.stderr.splitlines()
     reason = (
         "training needs JAX: "
@@ -180,6 +180,49 @@ def test_remaining_time():
     begun = [state(sac, "finished", 1000, 100.0), state(sac, "running", 500, 100.0), state(sac, "waiting", 0, 0.0)]
     assert study_states.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
     assert study_states.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
+
+
+def test_how_runs_stand_is_shown_when_a_word_changes_and_now_and_then(tmp_path, monkeypatch):
+    """And of a long study the tables of those runs alone are read that may have grown."""
+    rows = [studies.Row("tick", "sac", 1000, seed) for seed in range(3)]
+    words = dict(zip((row.name for row in rows), ("finished", "running", "waiting"), strict=True))
+    times = tmp_path / rows[1].name / "times.csv"
+    times.parent.mkdir()
+    read, shown, now = [], [], [0.0]
+    table = study_states.table
+    monkeypatch.setattr(study_states, "table", lambda *place: read.append(place[0].name) or table(*place))
+    monkeypatch.setattr(study_states.time, "monotonic", lambda: now[0])
+    look = watched(rows, tmp_path, words, lambda states: shown.append([(each.word, each.step) for each in states]))
+
+    look()
+    assert shown == [[("finished", 0), ("running", 0), ("waiting", 0)]] and set(read) == {row.name for row in rows}
+    read.clear()
+    times.write_text("step,wall_seconds,cpu_seconds\n500,1.0,1.0\n")
+    now[0] = 1.9
+    look()
+    assert len(shown) == 1 and not read
+    now[0] = 2.0
+    look()
+    assert shown[1:] == [[("finished", 0), ("running", 500), ("waiting", 0)]] and set(read) == {rows[1].name}
+    words[rows[2].name] = "running"
+    look()
+    assert shown[2:] == [[("finished", 0), ("running", 500), ("running", 0)]]
+
+
+@pytest.mark.slow
+def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
+    """Which is no higher than the terminal; at its end stand all runs, once."""
+    outer, inner = os.openpty()
+    os.set_blocking(outer, False)
+    command = [sys.executable, "-m", "arc_suite", "study", "tiny_studies:BROKEN", "--jobs=1"]
+    screen = surroundings | {"LINES": "4", "COLUMNS": "100"}
+    done = subprocess.run(command, env=screen, stdin=inner, stdout=inner, stderr=subprocess.PIPE, cwd=tmp_path)
+    os.close(inner)
+    tables = os.read(outer, 100_000).decode().replace("\r\n", "\n").split("\x1b[3A\x1b[J")
+    os.close(outer)
+    assert done.returncode == 1 and len(tables) > 2
+    assert all(text.startswith("run ") and text.count("\n") == 3 for text in tables[:-1])
+    assert tables[-1].count("\n") == 4 and tables[-1].endswith("\n1 of 2 finished, 1 failed\n")
 
 
 @pytest.mark.parametrize(

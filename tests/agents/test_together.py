@@ -12,7 +12,7 @@ import tiny_studies
 from conftest import small
 from test_study import FIXTURES, contents
 
-from arc_suite.agents import networks, study_runner, study_together, together
+from arc_suite.agents import networks, study_runner, study_states, study_together, together
 from arc_suite.agents.learner import Diverged
 from arc_suite.agents.off_policy import OffPolicy
 from arc_suite.agents.studies import Row
@@ -81,7 +81,7 @@ def made(several, folder, shown=lambda states: None):
 
 
 def test_a_study_that_is_broken_off_goes_on_to_the_bit(tmp_path, monkeypatch):
-    monkeypatch.setattr(study_together, "_EVERY", 0.0)
+    monkeypatch.setattr(study_states, "_EVERY", 0.0)
     several = rows(("sac", 0), ("sope_eo", 0), ("sac", 1), ("sope_eo", 1))
     assert {each.word for each in made(several, tmp_path / "whole")} == {"finished"}
 
@@ -128,7 +128,7 @@ def test_a_run_that_fails_leaves_the_others(error, tmp_path, monkeypatch):
 
 def test_what_another_process_makes_is_waited_for(tmp_path, monkeypatch):
     """And taken over where that process ends without finishing it."""
-    monkeypatch.setattr(study_together, "_EVERY", 0.0)
+    monkeypatch.setattr(study_together, "_PAUSE", 0.0)
     several, words = rows(("sac", 0), ("sac", 1)), []
     (tmp_path / "runs").mkdir()
     held = study_runner.claimed(tmp_path / "runs" / f"{several[0].name}.log")
