@@ -94,12 +94,15 @@ def lock(file: IO | int) -> bool:
 
 
 @contextlib.contextmanager
-def locked(folder: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
+def locked(folder: str | os.PathLike, refusal: str | None = None) -> Iterator[bool]:
     """Keep a folder locked against other processes.
 
     Args:
         folder: that is there.
         refusal: the error where another process has locked it; with None, wait until it lets go.
+
+    Yields:
+        Whether the folder is still where it was; the other process may have moved or deleted it.
 
     Raises:
         ValueError: another process has locked it; the refusal.
@@ -110,7 +113,7 @@ def locked(folder: str | os.PathLike, refusal: str | None = None) -> Iterator[No
             fcntl.flock(descriptor, fcntl.LOCK_EX)
         elif not lock(descriptor):
             raise ValueError(refusal)
-        yield
+        yield os.path.isdir(folder) and os.path.samestat(os.stat(folder), os.fstat(descriptor))
     finally:
         os.close(descriptor)
 

@@ -35,6 +35,7 @@ def collect(
     progress: Callable = tqdm,
     author: str | None = None,
     code_permalink: str | None = None,
+    wait: bool = False,
 ) -> int:
     """Collect the episodes that a dataset does not have yet.
 
@@ -48,6 +49,7 @@ def collect(
         progress: makes progress bars as `tqdm` does.
         author: for Minari's metadata; None for none, or for the one that the dataset has already.
         code_permalink: where the code lies that made the dataset, likewise.
+        wait: until no other process collects the dataset, in place of an error.
 
     Returns:
         The number of episodes that were missing.
@@ -62,7 +64,7 @@ def collect(
     said = {} if author is None else {"author": [author]}  # Minari makes a set of it
     said |= {} if code_permalink is None else {"code_permalink": code_permalink}
     provenance, specification = settings.provenance(), settings.environment_spec().to_json()
-    with Storage.opened(dataset_id, overwrite) as storage:
+    with Storage.opened(dataset_id, overwrite, wait) as storage:
         if storage.metadata is not None:
             difference = _difference(storage.metadata, provenance, specification)
             if difference and storage.kept and not overwrite:

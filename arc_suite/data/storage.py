@@ -64,25 +64,25 @@ class Storage:
 
     @classmethod
     @contextlib.contextmanager
-    def opened(cls, dataset_id: str, overwrite: bool) -> Iterator[Self]:
+    def opened(cls, dataset_id: str, overwrite: bool, wait: bool = False) -> Iterator[Self]:
         """Open a dataset to collect into; no other process can meanwhile.
 
         Args:
             dataset_id: of a dataset that is there or of a new one.
             overwrite: start anew even if it is there; the old one stays until `finish`.
+            wait: until no other process collects it.
 
         Raises:
-            ValueError: the dataset is damaged, or being collected by another process; one line.
+            ValueError: the dataset is damaged, or, unless we wait, being collected by another process; one line.
             OSError: its files cannot be made; one line.
         """
         place = ids.folder(dataset_id)
         new, old = (place.with_name(f".{place.name}.{suffix}") for suffix in ("new", "old"))
         if old.exists():  # killed while a dataset was replaced
             shutil.rmtree(old) if place.exists() else old.rename(place)
-        folder = new if overwrite or not place.exists() else place
         _make_namespace(dataset_id)
-        files.folder(folder / "data")
-        with files.locked(folder, f"dataset {dataset_id!r} is being collected by another process"):
+        refusal = None if wait else f"dataset {dataset_id!r} is being collected by another process"
+        with _locked(new, place, overwrite, refusal) as folder:
             try:
                 storage = cls(dataset_id, folder, place, early=not overwrite)
             except ValueError:
@@ -238,6 +238,20 @@ class Storage:
             self._folder.rename(self._place)
         self._folder = self._place
         shutil.rmtree(old, ignore_errors=True)
+
+
+@contextlib.contextmanager
+def _locked(new: Path, place: Path, overwrite: bool, refusal: str | None) -> Iterator[Path]:
+    """Lock the folder to collect into, the new one or the place, against other processes."""
+    while True:
+        folder = new if overwrite or not place.exists() else place
+        files.folder(folder / "data")
+        with files.locked(folder, refusal) as is_there:
+            if is_there and (overwrite or folder == place or not place.exists()):
+                yield folder
+                return
+            if is_there:  # another process has moved its own to the place since we looked
+                shutil.rmtree(new)
 
 
 def _make_namespace(dataset_id: str) -> None:

@@ -9,13 +9,15 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 
 import minari
 import pytest
 from tiers import never, tiers
 from tqdm import tqdm
 
-from arc_suite import data
+from arc_suite import data, files
+from arc_suite.data.storage import Storage
 from arc_suite.robots import ROBOTS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
@@ -200,12 +202,40 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
 
 
 def test_two_processes_do_not_collect_into_one_dataset():
-    from arc_suite.data.storage import Storage
-
     collect(ID, SETTINGS, 2)
     with Storage.opened(ID, overwrite=False), pytest.raises(ValueError) as error:
         collect(ID, SETTINGS, 3)
     assert str(error.value) == f"dataset {ID!r} is being collected by another process"
+
+
+def test_a_process_that_waits_finds_what_the_other_has_collected():
+    collecting = threading.Thread(target=lambda: counts.append(collect(ID, SETTINGS, 2, wait=True)))
+    counts = []
+    with Storage.opened(ID, overwrite=False):
+        collecting.start()
+        collecting.join(0.5)
+        assert collecting.is_alive()
+    collecting.join()
+    assert counts == [2]
+    assert collect(ID, SETTINGS, 2, wait=True) == 0
+
+
+def test_a_dataset_that_is_moved_to_its_place_meanwhile_is_gone_on_with(root, monkeypatch):
+    """Between the look at whether it is there and the lock."""
+    place, new = root / ID, root / "arc_suite/test/.some-v0.new"
+    collect(ID, SETTINGS, 2)
+    away = place.with_name("away")
+    place.rename(away)
+    locked = files.locked
+
+    def moved_before(folder, refusal):
+        if folder == new and not place.exists():
+            away.rename(place)
+        return locked(folder, refusal)
+
+    monkeypatch.setattr(files, "locked", moved_before)
+    assert collect(ID, SETTINGS, 3) == 1
+    assert not new.exists()
 
 
 def test_a_damaged_part_is_named_and_overwrite_mends_it(root):
