@@ -189,9 +189,8 @@ class Imitator:
         wanted[: len(labels)] = labels
         inputs, wanted, errors = jnp.asarray(inputs), jnp.asarray(wanted), []
         for first in range(0, updates, CHUNK):
-            batches = random.integers(len(labels), size=(CHUNK, row.batch))
-            self._state, error = fit(
-                self._state, inputs, wanted, batches, rates[first : first + CHUNK].astype(np.float32)
-            )
+            part = rates[first : first + CHUNK].astype(np.float32)
+            batches = random.integers(len(labels), size=(len(part), row.batch))
+            self._state, error = fit(self._state, inputs, wanted, batches, part)
             errors.append(float(error))
         return errors[-1]

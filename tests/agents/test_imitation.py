@@ -71,6 +71,16 @@ def test_what_it_says_comes_near_to_what_the_demonstrator_does(tmp_path):
     assert errors[-1] < 0.3 * errors[0] < 0.03
 
 
+def test_any_number_of_updates_is_made(tmp_path):
+    """Compiled for a number of updates at a time, into which not all fit."""
+    row = dataclasses.replace(SMALL, updates=imitation.CHUNK + 3, last_updates=7, round=15)
+    learner = imitation.begin(row, stage(tmp_path))
+    learned(learner, 120)
+    assert int(learner.arrays()["state/moments/count"]) == imitation.CHUNK + 3
+    learned(learner, 240)
+    assert int(learner.arrays()["state/moments/count"]) == imitation.CHUNK + 3 + 7
+
+
 def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path):
     learner = imitation.begin(dataclasses.replace(SMALL, noise=0.0), stage(tmp_path))
     environment, acted = learner._environment, []
