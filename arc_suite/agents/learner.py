@@ -33,6 +33,7 @@ class Stage(NamedTuple):
         folder: of the run.
         prior: id of a dataset of prior data; None for none.
         threads: on which rows are simulated; nothing depends on it but time.
+        resumed: whether `Learner.restore` follows, so that nothing need be read of where learning starts.
     """
 
     body: Body
@@ -43,6 +44,7 @@ class Stage(NamedTuple):
     folder: Path
     prior: str | None = None
     threads: int = 1
+    resumed: bool = False
 
     def environment(self, rows: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv:
         """Return rows to learn in, seeded apart from those of evaluations and of other runs.

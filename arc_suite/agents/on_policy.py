@@ -7,10 +7,12 @@ limit are learned as if it went on. Time limits of the rows fall on different st
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 
 import jax.numpy as jnp
 import numpy as np
 
+from arc_suite import policies
 from arc_suite.agents import networks, normaliser
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
@@ -48,7 +50,7 @@ class OnPolicy:
         self._symmetry = _symmetry(task) if row.mirrored else None
         self._moments, policy = Moments.none(task.size), None
         self._normaliser = self._moments.layer()
-        if row.start:
+        if row.start and not stage.resumed:
             self._normaliser, policy = _read(row, stage, task)
         self._state = ppo.begin(row, generator(stage.seed, "networks", 0), task.size, joints, policy)
         self._iterations = 0
@@ -178,12 +180,15 @@ def _symmetry(task):
 
 def _read(row: ProximalPolicy, stage: Stage, task) -> tuple[Layer, tuple]:
     """The normaliser and the network of the policy that learning starts from."""
-    found = network.load(row.start)
-    kinds = [layer.kind for layer in found.layers]
+    found = policies.policy(Path(row.start), stage.body, task=task)
+    kinds = [layer.kind for layer in getattr(found, "layers", ())]
     if kinds != ["normalise", "linear", "elu", "linear", "elu", "linear", "clip"]:
         raise ValueError(f"{row.start}: expected a policy of imitation or ppo, with two hidden layers")
-    if dict(found.blocks) != dict(task.blocks):
-        raise ValueError(f"{row.start}: a policy of {found.task} for other observations than those of {task.name}")
+    for name in {**found.blocks, **task.blocks}:
+        there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.blocks))
+        if there != here:
+            other = f"a policy of {found.task} for other observations than those of {task.name}"
+            raise ValueError(f"{row.start}: {other}: {name} has {there} numbers, and not {here}")
     linear = [layer.arrays for layer in found.layers if layer.kind == "linear"]
     if linear[0][0].shape[1] != row.hidden or linear[1][0].shape[1] != row.hidden:
         raise ValueError(f"{row.start}: expected {row.hidden} hidden units, got {linear[0][0].shape[1]}")

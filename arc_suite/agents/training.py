@@ -137,7 +137,8 @@ def training(
     config, definition = run.config(), run.definition
     module = definition.module
     with run_folder.opened(folder, config) as run_files:
-        stage = Stage(run.body, run.task, run.task_kwargs, run.seed, run.steps, Path(folder), run.prior, threads)
+        places = run.seed, run.steps, Path(folder), run.prior, threads, run_files.arrays is not None
+        stage = Stage(run.body, run.task, run.task_kwargs, *places)
         learner = module.begin(definition.row, stage)
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
         if run_files.arrays is not None:

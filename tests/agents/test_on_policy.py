@@ -1,6 +1,7 @@
 """Proximal policy optimisation."""
 
 import dataclasses
+import shutil
 
 import numpy as np
 import pytest
@@ -201,14 +202,33 @@ def test_it_starts_from_a_policy_and_lets_values_learn_first(tmp_path, imitated)
     assert_array_equal(learner.policy()[0].arrays[0], start.layers[0].arrays[0])
 
 
+def test_where_it_started_from_is_no_longer_needed(tmp_path, imitated):
+    definition = ALGORITHMS["finetune"]._replace(row=dataclasses.replace(SMALL, start=str(imitated), warm_up=8))
+    run = Run(ROBOTS["leaper"], "finetune", definition, "walk", {"time_limit": 0.5}, steps=96, evaluate_every=32)
+    assert not train(run, tmp_path / "run", minutes=0.0)
+    told = []
+
+    def interrupting(step, figures):
+        if step == 64:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(run, tmp_path / "run", told=interrupting)
+    shutil.rmtree(imitated)
+    assert train(run, tmp_path / "run", told=lambda step, figures: told.append(step))
+    assert told == [64, 64, 96, 96]
+
+
 def test_a_start_that_does_not_fit_is_refused_in_one_line(tmp_path, imitated):
-    for task, row, message in (
-        ("steer", SMALL, "a policy of walk for other observations than those of steer"),
-        ("walk", dataclasses.replace(SMALL, hidden=32), "expected 32 hidden units, got 16"),
+    observations = "a policy of walk for other observations than those of steer: command has 0 numbers, and not 6"
+    for robot, task, row, message in (
+        ("leaper", "steer", SMALL, f"{imitated}: {observations}"),
+        ("leaper", "walk", dataclasses.replace(SMALL, hidden=32), f"{imitated}: expected 32 hidden units, got 16"),
+        ("tick", "walk", SMALL, f"policy {imitated}: made for leaper, and not for tick"),
     ):
         with pytest.raises(ValueError) as error:
-            on_policy.begin(dataclasses.replace(row, start=str(imitated)), stage(tmp_path, task=task))
-        assert str(error.value) == f"{imitated}: {message}"
+            on_policy.begin(dataclasses.replace(row, start=str(imitated)), stage(tmp_path, robot, task))
+        assert str(error.value) == message
     with pytest.raises(ValueError, match=r"^start: expected the folder of a run whose policy is where learning "):
         on_policy.begin(ALGORITHMS["finetune"].row, stage(tmp_path))
     with pytest.raises(OSError, match="no such file"):
