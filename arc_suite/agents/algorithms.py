@@ -36,6 +36,8 @@ class Algorithm(NamedTuple):
         try:
             return importlib.import_module(self.learner)
         except ImportError as error:
+            if not self.learner.startswith("arc_suite."):
+                raise ValueError(f"learner {self.learner}: {error}") from None
             raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
 
     def with_row(self, changes: dict[str, Any]) -> "Algorithm":

@@ -22,7 +22,7 @@ from arc_suite.agents.replay import Fenced, Replay, Transitions
 from arc_suite.agents.rows import SoftActorCritic
 from arc_suite.agents.stopping import Patience
 
-SLICE = 1000  # environment steps, or updates of a phase
+SLICE = 1000  # environment steps
 
 _ROWS = 4096  # observations that the policy sees at a time
 
@@ -112,7 +112,7 @@ class OffPolicy:
         return self._count["steps"] - (self._phase is not None)
 
     def advance(self, limit: int) -> Mapping[str, float] | None:
-        """Learn for up to `SLICE` environment steps, or updates of a phase; see `Learner`."""
+        """Learn for up to `SLICE` environment steps, or up to the next look in a phase; see `Learner`."""
         return alone(self.calls(limit))
 
     def calls(self, limit: int) -> Generator[Call, Any, Mapping[str, float] | None]:

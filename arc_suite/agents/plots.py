@@ -1,6 +1,6 @@
 """Pictures of training: returns of evaluations over environment steps."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import cycle
 
 import numpy as np
@@ -14,31 +14,23 @@ _COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#
 _GREY = "#8C8C8C"
 
 
-def returns(runs: Mapping[str, Sequence[Mapping[str, np.ndarray]]], title: str, lines: Mapping[str, float]) -> Figure:
-    """Draw learning curves: the interquartile mean over runs of the mean return of an evaluation.
-
-    The band is its 95 % bootstrap interval; of a single run, the lowest to the highest return of
-    its episodes.
+def returns(evaluations: Mapping[str, np.ndarray], title: str, lines: Mapping[str, float]) -> Figure:
+    """Draw the learning curve of a run: the mean return of each evaluation, from the lowest to the highest episode.
 
     Args:
-        runs: tables of evaluations (`run_folder.table`) by what they have in common, such as the algorithm.
+        evaluations: table of a run (`run_folder.table`).
         title: of the picture.
         lines: returns to compare with, by name.
     """
     figure = Figure(figsize=(8.0, 4.5), dpi=120, layout="constrained")
     axis = figure.subplots()
-    for colour, (name, tables) in zip(_COLOURS, runs.items(), strict=False):
-        by_run = [_by_step(table) for table in tables]
-        count = min(len(steps) for steps, _ in by_run)
-        steps, means = by_run[0][0][:count], np.array([episodes.mean(axis=1)[:count] for _, episodes in by_run])
-        drawn = curve([means])
-        low, high = (drawn.low, drawn.high) if len(by_run) > 1 else (f(by_run[0][1], axis=1) for f in (np.min, np.max))
-        axis.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0)
-        axis.plot(steps, drawn.iqm, color=colour, label=name, marker="." if count < 15 else None)
+    steps = np.unique(evaluations["step"])
+    episodes = [evaluations["return"][evaluations["step"] == step] for step in steps]
+    low, mean, high = np.array([(each.min(), each.mean(), each.max()) for each in episodes]).T
+    axis.fill_between(steps, low, high, color=_COLOURS[0], alpha=0.15, linewidth=0)
+    axis.plot(steps, mean, color=_COLOURS[0], marker="." if len(steps) < 15 else None)
     _finish(axis, title, lines)
     axis.set_ylabel("return of an evaluation")
-    if len(runs) > 1:
-        axis.legend(frameon=False, fontsize=8)
     return figure
 
 
@@ -89,9 +81,3 @@ def _finish(axis, title: str, lines: Mapping[str, float]) -> None:
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))
     axis.set_xlim(left=0.0)
     axis.spines[["top", "right"]].set_visible(False)
-
-
-def _by_step(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The steps of the evaluations, and the returns of their episodes (evaluations, episodes)."""
-    steps = np.unique(table["step"])
-    return steps, np.array([table["return"][table["step"] == step] for step in steps])

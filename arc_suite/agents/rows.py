@@ -65,6 +65,11 @@ class SoftActorCritic:
         checks.number("dropout", self.dropout, 0.0, 0.9)
         checks.name(self.prior, ("none", "fenced", "beside"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
+        if self.capacity <= self.random_steps and self.prior != "fenced":  # prior data in the same buffer count too
+            raise ValueError(
+                f"capacity: expected more than random_steps, {self.random_steps}, after which the policy acts, "
+                f"got {self.capacity}"
+            )
 
 
 @dataclasses.dataclass(frozen=True)

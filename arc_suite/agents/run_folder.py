@@ -108,6 +108,8 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
     with contextlib.ExitStack() as stack:
         stack.enter_context(files.locked(path, f"{path}: another process goes on with this run"))
         _check(path, json.loads(json.dumps(config)))
+        for leftover in path.glob(f".{Path(CHECKPOINT).stem}.*"):  # of a kill in mid-writing, megabytes
+            leftover.unlink()
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
         yield folder
@@ -134,7 +136,7 @@ def progress_of(path: str | os.PathLike) -> dict[str, Any]:
     Raises:
         ValueError: the checkpoint is damaged; one line.
     """
-    return _checkpoint(Path(path) / CHECKPOINT)[1]
+    return _checkpoint(Path(path) / CHECKPOINT, with_arrays=False)[1]
 
 
 def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
@@ -196,12 +198,12 @@ def _differences(was: Mapping, wanted: Mapping, above: str = "") -> Iterator[tup
             yield f"{above}{name}", there, here
 
 
-def _checkpoint(path: Path) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:
+def _checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:
     if not path.exists():
         return None, {}
     try:
         with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
+            arrays = {name: stored[name] for name in stored.files if with_arrays or name == _PROGRESS}
         progress = json.loads(str(arrays.pop(_PROGRESS)))
         if not isinstance(progress, dict):
             raise ValueError("expected an object")

@@ -82,7 +82,7 @@ def picture(run: Run, folder: Path) -> Callable:
 
     def draw(step, figures):
         if "return" in figures:
-            figure = plots.returns({run.algorithm: [run_folder.table(folder, "evaluations")]}, folder.name, lines)
+            figure = plots.returns(run_folder.table(folder, "evaluations"), folder.name, lines)
             with files.writing(folder / "curve.png") as temporary:
                 figure.savefig(temporary)
 

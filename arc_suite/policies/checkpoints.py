@@ -75,16 +75,18 @@ def graded(run: Path, grade: str) -> str:
     replay all of them in turn.
 
     Raises:
-        ValueError: an unknown grade, or a run without checkpoints; one line.
+        ValueError: an unknown grade, a run without checkpoints, or a medium one of a run that never earned more than
+            nothing; one line.
     """
     checks.name(grade, GRADES, "grade")
-    if grade == "random":
-        return "random"
     there = agents(run / FOLDER)
     if not there:
         raise ValueError(f"{run}: keeps no checkpoints")
-    if grade == "replay":
-        return str(run / FOLDER)
-    enough = MEDIUM * max(agent.mean_return for agent in there)
-    medium = next(agent for agent in there if agent.mean_return >= enough)
-    return str(at(run, (medium if grade == "medium" else there[-1]).steps))
+    if grade in ("random", "replay"):
+        return "random" if grade == "random" else str(run / FOLDER)
+    if grade == "expert":
+        return str(at(run, there[-1].steps))
+    best = max(agent.mean_return for agent in there)
+    if best <= 0.0:
+        raise ValueError(f"{run}: none is medium, as the best earns {best:.1f}; there are random, expert and replay")
+    return str(at(run, next(agent.steps for agent in there if agent.mean_return >= MEDIUM * best)))

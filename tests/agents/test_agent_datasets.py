@@ -106,12 +106,24 @@ def test_medium_is_the_first_that_earns_a_third_of_the_best(tmp_path):
     assert found == {"random": "random", "medium": at[30], "expert": at[50], "replay": str(tmp_path / "checkpoints")}
 
 
+def test_of_a_run_that_earned_nothing_none_is_medium(tmp_path):
+    for step, mean in ((10, -50.0), (20, -30.0)):
+        folder = tmp_path / "checkpoints" / str(step)
+        folder.mkdir(parents=True)
+        checkpoints.save(folder, checkpoints.Agent("sac", step, 3, mean))
+    with pytest.raises(ValueError) as error:
+        checkpoints.graded(tmp_path, "medium")
+    line = "none is medium, as the best earns -30.0; there are random, expert and replay"
+    assert str(error.value) == f"{tmp_path}: {line}"
+
+
 @pytest.mark.parametrize(
     ("flags", "line"),
     [
         (["--checkpoint=150"], "keeps no checkpoint at 150 (there are: 100, 200, 300)"),
         (["--checkpoint=100", "--grade=medium"], "expected one of --checkpoint and --grade, got both"),
         (["--policy=runs/none", "--grade=medium"], "runs/none: keeps no checkpoints"),
+        (["--policy=cpg", "--grade=random"], "cpg: keeps no checkpoints"),
     ],
 )
 def test_errors_are_one_line(flags, line, collected):

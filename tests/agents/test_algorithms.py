@@ -80,6 +80,17 @@ def test_without_jax_is_one_line():
         _ = Algorithm("arc_suite.agents.nowhere", row, "").module
 
 
+def test_what_a_learner_of_others_needs_is_named():
+    with pytest.raises(ValueError, match=r"^learner others: No module named 'others'$"):
+        _ = Algorithm("others", SoftActorCritic(), "").module
+
+
+def test_the_policy_acts_before_the_buffer_is_full():
+    with pytest.raises(ValueError, match=r"^capacity: expected more than random_steps, 5000, after which the policy "):
+        SoftActorCritic(capacity=5000)
+    assert SoftActorCritic(capacity=5000, prior="fenced").capacity == 5000, "prior data count too"
+
+
 def test_the_table_needs_no_jax():
     code = "import sys; from arc_suite.agents import algorithms, training; print('jax' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -47,6 +47,16 @@ def test_without_a_checkpoint_it_starts_over(path):
         assert (path / "training.csv").read_text() == ""
 
 
+def test_what_a_kill_has_left_half_written_is_deleted(path):
+    (path / ".checkpoint.1234.npz").write_bytes(b"half")
+    with opened(path, CONFIG):
+        assert not list(path.glob(".*"))
+
+
+def test_progress_is_read_alone(path):
+    assert run_folder.progress_of(path)["evaluated"] == 2
+
+
 def test_tables_are_read_also_while_a_line_is_written(path):
     with (path / "training.csv").open("a") as file:
         file.write("4,0.06")
