@@ -5,14 +5,24 @@ The files lie beside the folder of the run, as runs with the same prior data sha
 
 import hashlib
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from arc_suite import files
+from arc_suite import checks, files
 from arc_suite.agents.learner import Stage
 from arc_suite.agents.replay import Replay
 from arc_suite.tasks import Task
 
 _COUNT = "count.json"  # written last: files without it are not whole
+
+
+def digest(prior: str) -> str:
+    """Return the sha256 of all that a dataset holds.
+
+    Raises:
+        ValueError: no such dataset, or one that is damaged; one line.
+    """
+    return _digest(_opened(prior).summaries())
 
 
 def mapped(stage: Stage, task: Task) -> Replay:
@@ -22,24 +32,19 @@ def mapped(stage: Stage, task: Task) -> Replay:
         ValueError: no such dataset, one that is damaged, or of another body or task; one line.
         OSError: the disk is full, or the like; one line.
     """
-    try:
-        from arc_suite import data
-    except ImportError as error:
-        raise ValueError(f"prior: {error}") from None
-    dataset = data.open(stage.prior)
+    dataset = _opened(stage.prior)
     settings = dataset.settings
     if settings.body != stage.body:
         raise ValueError(f"prior {stage.prior!r}: of {settings.body.name}, and not of {stage.body.name}")
-    asked, found = ({"task": name, **dict(kwargs)} for name, kwargs in _tasks(stage, settings))
-    if asked != found:
-        raise ValueError(f"prior {stage.prior!r}: of the task {json.dumps(found)}, and not of {json.dumps(asked)}")
+    asked, found = (checks.json_text("task", {"task": name, **kwargs}) for name, kwargs in _tasks(stage, settings))
+    if json.loads(asked) != json.loads(found):
+        raise ValueError(f"prior {stage.prior!r}: of the task {found}, and not of {asked}")
     summaries = dataset.summaries()
     size, joints = task.size, len(stage.body.joint_names)
     count = sum(summary["length"] for summary in summaries)
     if not count:
         raise ValueError(f"prior {stage.prior!r}: holds no episode")
-    digest = hashlib.sha256("".join(summary["sha256"] for summary in summaries).encode()).hexdigest()
-    folder = files.folder(Path(stage.folder).parent / f"prior-{digest[:16]}")
+    folder = files.folder(Path(stage.folder).parent / f"prior-{_digest(summaries)[:16]}")
     with files.locked(folder):
         if not (folder / _COUNT).exists():
             replay = Replay(folder, count, size, joints)
@@ -55,6 +60,18 @@ def mapped(stage: Stage, task: Task) -> Replay:
     known = json.loads((folder / _COUNT).read_text())
     replay.restore(known["total"], known["ends"])
     return replay
+
+
+def _opened(prior: str):
+    try:
+        from arc_suite import data
+    except ImportError as error:
+        raise ValueError(f"prior: {error}") from None
+    return data.open(prior)
+
+
+def _digest(summaries: Sequence[Mapping]) -> str:
+    return hashlib.sha256("".join(summary["sha256"] for summary in summaries).encode()).hexdigest()
 
 
 def _tasks(stage: Stage, settings):

@@ -10,7 +10,7 @@ import numpy as np
 
 from arc_suite import evaluation, files
 from arc_suite.agents import studies, study_results, study_strips
-from arc_suite.agents.studies import Study
+from arc_suite.agents.studies import Row, Study
 from arc_suite.agents.study_results import Result
 
 REPORT, CURVES = "README.md", "curves.png"
@@ -137,6 +137,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Final returns": [_FINALS, _finals(groups, demonstrators)],
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
         "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
+        **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
         "Style": [_STYLE, _style(groups), *study_strips.paragraphs(name, groups, published)],
         "What the paper says": [_CLAIMS, _claims(found)],
     }
@@ -163,6 +164,10 @@ _IMPROVEMENT = (
     "That a run of the row earns more than one of the column, with 95 % bootstrap interval, over all robots and tasks, "
     "at the latest step that both have reached. With one seed, episodes stand for runs: the interval then tells "
     "nothing of other seeds."
+)
+_PHASES = (
+    "Updates of critics alone in a stabilisation phase, of runs whose phases have been published: those of `speq` and "
+    "`speq_o2o` are as long as they may be, the others stop early."
 )
 _STYLE = (
     "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each. "
@@ -229,7 +234,12 @@ def _iqm(values: np.ndarray) -> str:
 def _is_papers(result: Result) -> bool:
     """Return whether a run is one that the paper's table of final returns has."""
     row = result.row
-    return row.task == "walk" and not row.task_kwargs and row.algorithm in PAPER.get(row.robot, {})
+    return row.task == "walk" and not row.task_kwargs and not row.label and row.algorithm in PAPER.get(row.robot, {})
+
+
+def _expert(row: Row) -> float | None:
+    """Return what the paper's demonstrator earns where a run learns; None where the paper does not tell."""
+    return None if row.task_kwargs else evaluation.expert_return(row.task, row.robot)
 
 
 def _finals(groups: Groups, demonstrators) -> str:
@@ -240,9 +250,9 @@ def _finals(groups: Groups, demonstrators) -> str:
             paper = str(PAPER[row.robot][row.algorithm]) if _is_papers(seeds[0]) else "-"
             reached = f"{min(each.steps[-1] for each in seeds):,}"
             lines.append((place, kind, reached, str(len(seeds)), _mean(values), _iqm(values), paper))
-        expert = evaluation.expert_return(row.task, row.robot)
+        expert = _expert(row)
         for preset, totals in demonstrators.get(place, {}).items():
-            paper = f"{expert:.0f}" if preset == "medium" and expert and not row.task_kwargs else "-"
+            paper = f"{expert:.0f}" if preset == "medium" and expert else "-"
             lines.append((place, f"demonstrator {preset}", "-", "-", _mean(totals), _iqm(totals), paper))
     return _table(("robot, task", "algorithm", "steps", "seeds", "return", "IQM [95 %]", "paper, 1M steps"), lines)
 
@@ -251,7 +261,7 @@ def _efficiency(groups: Groups) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            expert = evaluation.expert_return(seeds[0].row.task, seeds[0].row.robot)
+            expert = _expert(seeds[0].row)
             cells = []
             for threshold in (expert, 3500.0):
                 steps, seconds = (np.inf, np.inf) if threshold is None else study_results.until(seeds, threshold)
@@ -272,6 +282,17 @@ def _improvements(groups: Groups) -> str:
             cells.append("-" if found is None else "{:.2f} [{:.2f}, {:.2f}]".format(found[0], *found[1]))
         lines.append((x, *cells))
     return _table(("more than", *names), lines)
+
+
+def _phases(groups: Groups) -> str:
+    lines = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            updates = np.concatenate([each.phases for each in seeds])
+            if len(updates):
+                figures = (updates.mean(), updates.min(), updates.max())
+                lines.append((place, kind, str(len(updates)), *(f"{figure:,.0f}" for figure in figures)))
+    return _table(("robot, task", "algorithm", "phases", "mean", "least", "most"), lines)
 
 
 def _style(groups: Groups) -> str:

@@ -1,14 +1,14 @@
 """Results of studies: what the published tables of their runs say, and figures over them."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import evaluation
-from arc_suite.agents import run_folder
+from arc_suite.agents import run_folder, study_states
 from arc_suite.agents.studies import Row
 
 DEMONSTRATORS = "demonstrators.csv"
@@ -25,6 +25,7 @@ class Result(NamedTuple):
         progress: the task's figures in the latest evaluation by name, each (episodes,).
         cpu: (evaluations,) s of the processor until then.
         style: metrics of style of the latest policy by name, each (episodes,).
+        phases: (phases,) updates of each stabilisation phase; none where they are not published.
     """
 
     row: Row
@@ -33,6 +34,7 @@ class Result(NamedTuple):
     progress: dict[str, np.ndarray]
     cpu: np.ndarray
     style: dict[str, np.ndarray]
+    phases: np.ndarray
 
     @property
     def final(self) -> float:
@@ -49,16 +51,22 @@ def results(rows: Sequence[Row], published: Path) -> list[Result]:
     return [_result(row, published / row.name) for row in rows if (published / row.name / "style.csv").exists()]
 
 
+def evaluated(table: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the steps (evaluations,) of those evaluations in a table, maybe an empty one, that are whole."""
+    marks, counts = np.unique(table.get("step", ()), return_counts=True)
+    return marks[counts == evaluation.EPISODES]
+
+
 def _result(row: Row, folder: Path) -> Result:
     table, times, style = (run_folder.table(folder, name) for name in ("evaluations", "times", "style"))
-    marks, counts = np.unique(table["step"], return_counts=True)
-    whole = marks[counts == evaluation.EPISODES]
+    whole = evaluated(table)
     returns = np.array([table["return"][table["step"] == step] for step in whole])
     last = table["step"] == whole[-1]
     progress = {name: table[name][last] for name in table if name not in ("step", "seed", "return", "length")}
     cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
     metrics = {name: style[name] for name in style if name not in ("step", "seed")}
-    return Result(row, whole.astype(int), returns, progress, cpu, metrics)
+    phases = study_states.table(folder, "phases").get("updates", np.empty(0))
+    return Result(row, whole.astype(int), returns, progress, cpu, metrics, phases)
 
 
 def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:

@@ -11,22 +11,23 @@ import json
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO
 
+import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import evaluation, files, policies, style
+from arc_suite import data, evaluation, files, policies, style
 from arc_suite.agents import run_folder, study_results
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_states import State, states, table, watched
+from arc_suite.agents.training import PRIOR_SHA256
 from arc_suite.cpg.demonstrator import presets_of, suited_preset
-from arc_suite.data import collect
 from arc_suite.envs.dm import Environment, load
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import Policy, network
+from arc_suite.policies import Policy, checkpoints, network
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.style import strips
 
@@ -50,7 +51,7 @@ def is_finished(row: Row, folder: Path) -> bool:
     """
     if run_folder.progress_of(folder).get("evaluated", 0) < row.steps:
         return False
-    run_folder.check(folder, json.loads(json.dumps(row.run().config())), left_out=("versions",))
+    run_folder.check(folder, json.loads(json.dumps(row.run().config())), left_out=("versions", PRIOR_SHA256))
     return True
 
 
@@ -118,7 +119,13 @@ def prepared(rows: Sequence[Row], folder: Path, threads: int, progress: Callable
     words = {row.name: "finished" if is_finished(row, folder / row.name) else "waiting" for row in rows}
     waiting = [row for row in rows if words[row.name] == "waiting"]
     for row in {row.prior_id: row for row in waiting if row.prior is not None}.values():
-        collect(row.prior_id, row.prior_settings, row.prior.episodes, threads=threads, progress=progress)
+        # Other shares of the study begin at the same time, and want the same data.
+        wanted = row.prior_id, row.prior_settings, row.prior.episodes
+        data.collect(*wanted, threads=threads, progress=progress, wait=True)
+        found = len(data.open(row.prior_id))
+        if found != row.prior.episodes:
+            what = f"dataset {row.prior_id!r} has {found} episodes, and the study takes {row.prior.episodes}"
+            raise ValueError(f"{row.name}: {what}; delete it, to have it collected anew")
     return words
 
 
@@ -145,8 +152,8 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         OSError: something cannot be written; one line.
     """
     source, target = folder / row.name, published / row.name
-    evaluations = table(source, "evaluations")
-    if not evaluations:
+    steps = study_results.evaluated(table(source, "evaluations"))
+    if not len(steps):
         return
     files.folder(target)
     config = target / run_folder.CONFIG
@@ -155,13 +162,17 @@ def publish(row: Row, folder: Path, published: Path) -> None:
     for name in PUBLISHED:
         with files.writing(target / name) as temporary:
             temporary.write_text((source / name).read_text())
-    step = int(evaluations["step"][-1])
+    training = table(source, "training")
+    if training and np.any(training.get("phase_updates", 0)):
+        with files.writing(target / "phases.csv") as temporary:
+            temporary.write_text(_phases(training))
+    step = int(steps[-1])
     measured, drawn = table(target, "style"), target / study_results.STRIP
     up_to_date = bool(measured) and measured["step"][-1] == step
     if not up_to_date:
         drawn.unlink(missing_ok=True)  # before the style is new: where it is, the strip is of the same policy
     if not drawn.exists():
-        with contextlib.suppress(RenderingUnavailable), _played(row, source) as (environment, policy):
+        with contextlib.suppress(RenderingUnavailable), _played(row, source, step) as (environment, policy):
             if (picture := strips.strip(environment, policy)) is not None:
                 with files.writing(drawn) as temporary:
                     strips.write(temporary, picture)
@@ -169,6 +180,12 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         text = _style(row, source, step)  # long work, in which a kill is to leave no temporary file
         with files.writing(target / "style.csv") as temporary:
             temporary.write_text(text)
+
+
+def _phases(training: Mapping[str, np.ndarray]) -> str:
+    """Return a table of the updates of stabilisation phases, by the environment step that they follow."""
+    pairs = zip(training["step"].astype(int), training["phase_updates"].astype(int), strict=True)
+    return "\n".join(["step,updates", *(f"{step},{updates}" for step, updates in pairs if updates)]) + "\n"
 
 
 def publish_all(rows: Sequence[Row], folder: Path, published: Path) -> None:
@@ -209,16 +226,17 @@ def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
 
 
 @contextlib.contextmanager
-def _played(row: Row, folder: Path) -> Iterator[tuple[Environment, Policy]]:
-    """Open the environment of a run, and its latest policy."""
+def _played(row: Row, folder: Path, step: int) -> Iterator[tuple[Environment, Policy]]:
+    """Open the environment of a run, and its policy at a step; a later one may be there already."""
+    path = folder / checkpoints.FOLDER / str(step) / network.FILE
     with contextlib.closing(load(row.body, row.task, row.task_kwargs)) as environment:
-        yield environment, policies.policy(folder / network.FILE, row.body, task=environment.task.definition)
+        yield environment, policies.policy(path, row.body, task=environment.task.definition)
 
 
 def _style(row: Row, folder: Path, step: int) -> str:
     """Return a table of the metrics of the episodes of the evaluation protocol."""
     lines = []
-    with _played(row, folder) as (environment, policy):
+    with _played(row, folder, step) as (environment, policy):
         for seed in range(evaluation.EPISODES):
             measured = style.measure(style.record(environment, policy, seed))
             figures = {name: measured[name].value for name in METRICS if name in measured}

@@ -1,7 +1,6 @@
 """Runs studies in this process: runs of equal shape advance side by side, in one program, as a GPU wants them."""
 
 import functools
-import os
 import time
 import traceback
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -15,6 +14,7 @@ from arc_suite.agents.calls import Call
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_states import State, states, watched
 from arc_suite.agents.together import together
+from arc_suite.envs.vector import usable_cores
 
 _PAUSE = 2.0  # s between two looks at what other processes make
 _no_bar = functools.partial(tqdm, disable=True)
@@ -39,7 +39,7 @@ def run(
 
     Returns, raises: as `study_runner.run` does.
     """
-    words = study_runner.prepared(rows, folder, os.cpu_count(), progress)
+    words = study_runner.prepared(rows, folder, usable_cores(), progress)
     look = watched(rows, folder, words, shown)
 
     def beside() -> int:

@@ -15,7 +15,7 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import checks, evaluation, files, registry, versions
-from arc_suite.agents import run_folder
+from arc_suite.agents import priors, run_folder
 from arc_suite.agents.algorithms import Algorithm
 from arc_suite.agents.calls import Call, advancing, alone
 from arc_suite.agents.learner import ENVIRONMENT, MOST_SEEDS, Diverged, Learner, Stage
@@ -28,6 +28,8 @@ from arc_suite.policies.network import Network
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
+
+PRIOR_SHA256 = "prior_sha256"  # name in a configuration; `Run.config` does not ask for the data
 
 
 class Run(NamedTuple):
@@ -135,6 +137,8 @@ def training(
     """
     began = time.monotonic()
     config, definition = run.config(), run.definition
+    if run.prior is not None:  # by its id alone nobody would know whether it is still what it was
+        config[PRIOR_SHA256] = priors.digest(run.prior)
     module = definition.module
     with run_folder.opened(folder, config) as run_files:
         places = run.seed, run.steps, Path(folder), run.prior, threads, run_files.arrays is not None

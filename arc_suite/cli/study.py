@@ -12,7 +12,6 @@ enough to be committed, and the report is made of that folder alone.
   arc-suite study my_studies:MINE
 """
 
-import os
 import shutil
 import sys
 from collections.abc import Callable, Sequence
@@ -24,6 +23,7 @@ from arc_suite.agents import studies, study_report, study_runner, study_states
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_states import State
 from arc_suite.cli.program import progress, use_one_thread
+from arc_suite.envs.vector import usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
@@ -60,11 +60,13 @@ def main(name: str | None = None) -> int:
         study_runner.publish_all(rows, folder, results)
         print(study_report.write(name, study, results))
         return 0
-    if FLAGS.together is not None and (FLAGS.jobs, FLAGS.submit) != (None, None):
+    if (FLAGS.together, FLAGS.jobs, FLAGS.submit).count(None) < 2:
         raise ValueError("--together, --jobs, --submit: one process, several, or a cluster; give one of them")
     if FLAGS.submit is not None:
+        if parts > 1:
+            raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(name, min(FLAGS.submit, len(rows)), folder, results)
-    width = FLAGS.together or FLAGS.jobs or os.cpu_count()
+    width = FLAGS.together or FLAGS.jobs or usable_cores()
     run, jobs = (study_runner.run, width) if FLAGS.together is None else together(rows, width)
     show = shown(jobs)
     states = run(rows, folder, results, width, show, progress)

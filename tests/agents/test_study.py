@@ -13,7 +13,7 @@ import programs
 import pytest
 import tiny_studies
 
-from arc_suite import policies, style
+from arc_suite import data, policies, style
 from arc_suite.agents import run_folder, studies, study_results, study_runner, study_states
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_runner import METRICS
@@ -157,6 +157,26 @@ def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
     assert line.startswith(f"runs/tiny_studies.BROKEN/tick-walk-sac-0.log: arc-suite train: {reason}")
 
 
+@pytest.mark.slow
+def test_prior_data_are_those_that_the_row_names(tmp_path, monkeypatch):
+    """A dataset that somebody has collected more of is another."""
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+    row = Row("tick", "sacfd", 100, task_kwargs=tiny_studies.SHORT, prior=studies.Prior(episodes=2))
+    assert study_runner.prepared([row], tmp_path / "runs", 1) == {row.name: "waiting"}
+    data.collect(row.prior_id, row.prior_settings, 3)
+    with pytest.raises(ValueError) as error:
+        study_runner.prepared([row], tmp_path / "runs", 1)
+    what = f"dataset {row.prior_id!r} has 3 episodes, and the study takes 2; delete it, to have it collected anew"
+    assert str(error.value) == f"{row.name}: {what}"
+
+
+def test_phases_are_published(tmp_path):
+    lines = ["step,phase_updates", "1000,0", "2000,300", "3000,0", "4000,75000"]
+    (tmp_path / "training.csv").write_text("\n".join(lines) + "\n")
+    text = study_runner._phases(run_folder.table(tmp_path, "training"))
+    assert text == "step,updates\n2000,300\n4000,75000\n"
+
+
 def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
     """It is not started twice, whoever makes it."""
     log = tmp_path / "a.log"
@@ -231,6 +251,14 @@ def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
         ([], "arc-suite study: expected a study: paper, exact-tick, short, "),
         (["papr"], "arc-suite study: unknown study 'papr'; did you mean 'paper'? (there are: "),
         (["paper", "--shard=4/4"], "arc-suite study: --shard=4/4: expected i/n with i from 0 to n - 1, such as 0/4"),
+        (
+            ["first-steps", "--shard=0/2", "--submit=3"],
+            "arc-suite study: --shard=0/2: --submit makes shares of its own; leave one of them out",
+        ),
+        (
+            ["first-steps", "--jobs=2", "--submit=3"],
+            "arc-suite study: --together, --jobs, --submit: one process, several, or a cluster; give one of them",
+        ),
         (["first-steps", "--shard=6/7"], "arc-suite study: --shard=6/7: no run, as the study has 6"),
         (["arc_suite:load"], "arc-suite study: study 'arc_suite:load': expected a Study, got function"),
         (["tiny_studies:TWICE"], "arc-suite study: study 'tiny_studies:TWICE': 2 rows are named tick-walk-sac-0; a "),

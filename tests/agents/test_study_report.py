@@ -99,6 +99,18 @@ def test_claims(made):
 
 
 @pytest.mark.slow
+def test_phases_are_told_where_they_are_published(made):
+    study, folder = made
+    assert "## Phases" not in study_report.write("mine", study, folder).read_text()
+    for row, lengths in zip(study.rows, ((300, 700), (1100,)), strict=False):
+        lines = ["step,updates", *(f"{10_000 * place},{updates}" for place, updates in enumerate(lengths, 1))]
+        (folder / row.name / "phases.csv").write_text("\n".join(lines) + "\n")
+    page = study_report.write("mine", study, folder).read_text()
+    first = study.rows[0]
+    assert cells(page, first.place, first.algorithm, "3") == [first.place, first.algorithm, "3", "700", "300", "1,100"]
+
+
+@pytest.mark.slow
 def test_claims_need_what_they_compare(made):
     """Short phases are told by the study's title; other tasks and missing algorithms are not compared."""
     study, folder = made
@@ -107,7 +119,7 @@ def test_claims_need_what_they_compare(made):
     assert cells(page, study_report.CLAIMS[0].text)[3:] == ["-", "not measured"]
     found = study_results.results(few.rows, folder)
     assert study_report._is_papers(found[0])
-    for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"task_kwargs": {"target_velocity": 0.4}}):
+    for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
         assert not study_report._is_papers(found[0]._replace(row=found[0].row._replace(**other)))
 
 

@@ -63,6 +63,22 @@ def test_a_strip_is_published_with_the_style(finished, monkeypatch):
     assert style.read_text() == measured
 
 
+def test_the_policy_is_that_of_the_latest_whole_evaluation(finished, monkeypatch):
+    """A later one is there already while its episodes are still played."""
+    row, runs, results = finished
+    monkeypatch.setattr(strips, "strip", lambda environment, policy: None)
+    study_runner.publish(row, runs, results)
+    measured = (results / row.name / "style.csv").read_text()
+    (runs / row.name / "policy.npz").write_bytes(b"another")
+    with (runs / row.name / "evaluations.csv").open("a") as file:
+        file.write((runs / row.name / "evaluations.csv").read_text().splitlines()[1].replace("100,", "200,", 1) + "\n")
+    (results / row.name / "style.csv").unlink()
+    study_runner.publish(row, runs, results)
+    assert (results / row.name / "style.csv").read_text() == measured
+    (found,) = study_results.results([row], results)
+    assert found.steps.tolist() == [100]
+
+
 def test_without_a_gait_no_strip_is_published(finished, monkeypatch):
     row, runs, results = finished
     monkeypatch.setattr(strips, "strip", lambda environment, policy: None)
@@ -76,7 +92,7 @@ def test_reports_show_the_strips_that_are_there(tmp_path):
     """Of each kind one, of the first seed that has one; with the command of a page."""
     rows = [Row("tick", name, 1000, seed, task_kwargs={"gait": "ripple"}) for name in ("sac", "ppo") for seed in (0, 1)]
     empty = np.empty(0)
-    groups = study_results.grouped([Result(row, empty, empty, {}, empty, {}) for row in rows])
+    groups = study_results.grouped([Result(row, empty, empty, {}, empty, {}, empty) for row in rows])
     assert study_strips.paragraphs("mine", groups, tmp_path) == []
     for row in rows[1:2]:
         (tmp_path / row.name).mkdir()

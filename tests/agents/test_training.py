@@ -16,7 +16,7 @@ from conftest import SHORT, small
 
 import arc_suite
 from arc_suite import evaluation, policies
-from arc_suite.agents import algorithms, off_policy, run_folder
+from arc_suite.agents import algorithms, off_policy, priors, run_folder
 from arc_suite.agents.learner import Diverged
 from arc_suite.agents.run_folder import RunFolder
 from arc_suite.agents.training import Run, train
@@ -170,6 +170,16 @@ def test_config_tells_all_that_a_run_depends_on(tiny, tmp_path):
     assert config["row"]["batch"] == 8 and config["task_kwargs"] == {"time_limit": 2.0}
     assert {"arc_suite", "mujoco", "numpy", "jax", "jaxlib", "optax"} <= config["versions"].keys()
     assert len(config["model_sha256"]) == len(config["body_sha256"]) == 64
+
+
+def test_other_prior_data_under_the_same_id_are_another_run(tiny, tmp_path, prior, monkeypatch):
+    run = tiny("sacfd")
+    assert not train(run, tmp_path / "run", minutes=0.0, progress=silent)
+    held = run_folder.config_of(tmp_path / "run")["prior_sha256"]
+    assert held == priors.digest(prior)
+    monkeypatch.setattr(priors, "digest", lambda prior: "0" * 64)
+    with pytest.raises(ValueError, match=f"of another run, whose prior_sha256 is '{held}', and not '0000"):
+        train(run, tmp_path / "run", progress=silent)
 
 
 def test_stops_after_minutes_and_goes_on(tiny, tmp_path):

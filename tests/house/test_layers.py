@@ -79,7 +79,7 @@ THIRD_PARTY = {
     "agents.studies": set(),
     "agents.cluster": {"submitit"},
     "agents.study_states": {"numpy"},
-    "agents.study_runner": {"gymnasium", "tqdm"},
+    "agents.study_runner": {"numpy", "gymnasium", "tqdm"},
     "agents.study_results": {"numpy"},
     "agents.study_report": {"numpy"},
     "agents.study_strips": set(),
