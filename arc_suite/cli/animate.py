@@ -48,6 +48,8 @@ def main() -> None:
         raise ValueError("no file to write; say --output=FILE.glb")
     checks.name(Path(FLAGS.output).suffix.lower(), [".glb"], "extension")
     beside = Path(FLAGS.output).with_suffix(".json")
+    if FLAGS.spec is not None and beside.resolve() == Path(FLAGS.spec).resolve():
+        raise ValueError(f"--output={FLAGS.output}: {beside}, which is written too, is the spec; take another name")
     with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as figures:
         clips = export.clips(
             body,

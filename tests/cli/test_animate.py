@@ -1,10 +1,13 @@
 """The program that writes animation clips."""
 
 import json
+import pathlib
 
 import gltf_reader
 import programs
 import pytest
+
+ROOT = pathlib.Path(__file__).parents[2]
 
 
 def animate(*arguments, cwd=None):
@@ -64,3 +67,13 @@ def test_errors_are_one_line_and_leave_no_file(tmp_path, arguments, message):
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith(f"arc-suite animate: {message}") and done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_spec_is_not_written_over(tmp_path):
+    spec = tmp_path / "spider.json"
+    spec.write_text((ROOT / "examples" / "spider.json").read_text())
+    before = spec.read_text()
+    done = animate("--spec=spider.json", "--clips=idle", "--output=spider.glb", cwd=tmp_path)
+    line = "--output=spider.glb: spider.json, which is written too, is the spec; take another name"
+    assert (done.returncode, done.stderr) == (1, f"arc-suite animate: {line}\n")
+    assert spec.read_text() == before and not (tmp_path / "spider.glb").exists()
