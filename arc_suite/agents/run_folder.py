@@ -178,15 +178,16 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
 
 
 def _check(path: Path, config: dict[str, Any]) -> None:
-    """Compare the configuration with the folder's, or write it into a new one."""
-    if not (path / CONFIG).exists():
-        others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
-        if others:
-            raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
-        with files.writing_json(path / CONFIG) as file:
-            file.update(config)
+    """Compare the configuration with the folder's, or write it where no run has begun."""
+    others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
+    if others and CONFIG not in others:
+        raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
+    tables = [path / f"{name}.csv" for name in TABLES]
+    if others and ((path / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)):
+        check(path, config)
         return
-    check(path, config)
+    with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused
+        file.update(config)
 
 
 def _differences(was: Mapping, wanted: Mapping, above: str = "") -> Iterator[tuple[str, Any, Any]]:

@@ -47,6 +47,15 @@ def test_without_a_checkpoint_it_starts_over(path):
         assert (path / "training.csv").read_text() == ""
 
 
+def test_what_never_began_leaves_the_folder_to_others(tmp_path):
+    """Such as a run of which something does not fit, whose command is then mended."""
+    with opened(tmp_path / "run", CONFIG):
+        pass
+    with opened(tmp_path / "run", CONFIG | {"seed": 1}) as folder:
+        folder.append("training", {"step": 1, "loss": 0.5})
+    one_line(tmp_path / "run", "of another run, whose seed is 1, and not 0")
+
+
 def test_what_a_kill_has_left_half_written_is_deleted(path):
     (path / ".checkpoint.1234.npz").write_bytes(b"half")
     with opened(path, CONFIG):
