@@ -4,12 +4,14 @@ Example:
   python tools/strip.py --output docs/tasks.png
 """
 
+from pathlib import Path
+
 import imageio.v3 as imageio
 import numpy as np
 from absl import flags
 
 import arc_suite
-from arc_suite import evaluation, files, policies
+from arc_suite import checks, evaluation, files, policies
 from arc_suite.cli import films, program
 from arc_suite.cpg.demonstrator import suited_preset
 from arc_suite.robots import ROBOTS
@@ -37,6 +39,7 @@ def view(task: str, robot: str) -> np.ndarray:
 
 def main() -> None:
     """Draw the views and write them."""
+    checks.name(Path(FLAGS.output).suffix.lower(), [".png"], "extension")
     robots = list(ROBOTS)
     pairs = [(task, robots[index % 3]) for index, task in enumerate(TASKS)]  # Leaper falls on ground
     views = [view(*pair) for pair in program.progress(pairs, desc="tasks", leave=False)]

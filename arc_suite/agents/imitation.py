@@ -85,7 +85,7 @@ class Imitator:
         """Draw the network and begin the first episodes.
 
         Raises:
-            ValueError: the body has no such preset; one line.
+            ValueError: the body has no such preset, or nothing would be learned from; one line.
         """
         self._row, self._stage = row, stage
         self._environment = stage.environment(row.rows)
@@ -102,6 +102,9 @@ class Imitator:
         self._state = jax.tree.map(jnp.asarray, State(layers, optax.scale_by_adam().init(layers)))
         self._normaliser = Moments.none(task.size).layer()
         length = -(-stage.steps // row.rows)  # control steps of each row
+        if length <= row.left_out:
+            first = f"as the first {row.left_out} control steps of an episode are not learned from"
+            raise ValueError(f"steps: expected more than {row.left_out * row.rows}, {first}, got {stage.steps}")
         self._observations = np.zeros((length, row.rows, task.size), np.float32)
         self._labels = np.zeros((length, row.rows, self._joints), np.float32)
         self._ages = np.zeros((length, row.rows), int)  # control steps since the episode's start

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from arc_suite import checks, files
+from arc_suite import files
 from arc_suite.agents.learner import Stage
 from arc_suite.agents.replay import Replay
 from arc_suite.tasks import Task
@@ -36,7 +36,7 @@ def mapped(stage: Stage, task: Task) -> Replay:
     settings = dataset.settings
     if settings.body != stage.body:
         raise ValueError(f"prior {stage.prior!r}: of {settings.body.name}, and not of {stage.body.name}")
-    asked, found = (checks.json_text("task", {"task": name, **kwargs}) for name, kwargs in _tasks(stage, settings))
+    asked, found = (json.dumps({"task": name, **kwargs}) for name, kwargs in _tasks(stage, settings))
     if json.loads(asked) != json.loads(found):
         raise ValueError(f"prior {stage.prior!r}: of the task {found}, and not of {asked}")
     summaries = dataset.summaries()

@@ -32,7 +32,7 @@ class Row(NamedTuple):
     """A run of a study; what it makes depends on nothing else.
 
     Attributes:
-        robot: name of a robot.
+        robot: name of a robot, or `module:name`.
         algorithm: name, or `module:attribute`; see `algorithms.algorithm`.
         steps: environment steps.
         seed: of everything random.
@@ -67,7 +67,13 @@ class Row(NamedTuple):
 
     @property
     def body(self) -> Body:
-        """The robot's."""
+        """The robot's, which may be `module:name` of one that another package has.
+
+        Raises:
+            ValueError: there is none; one line.
+        """
+        if ":" in self.robot:
+            return registry.body_of(self.robot)
         return ROBOTS[checks.name(self.robot, ROBOTS, "robot")]
 
     @property

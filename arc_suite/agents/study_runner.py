@@ -115,6 +115,8 @@ def prepared(rows: Sequence[Row], folder: Path, threads: int, progress: Callable
         ValueError: a row that does not fit, or the folder of another run; one line.
         OSError: something cannot be written; one line.
     """
+    for row in rows:
+        _ = row.body  # before any run is made: it names files
     files.folder(folder)
     words = {row.name: "finished" if is_finished(row, folder / row.name) else "waiting" for row in rows}
     waiting = [row for row in rows if words[row.name] == "waiting"]

@@ -30,7 +30,7 @@ def paragraphs(name: str, groups: Mapping[str, Mapping[str, Sequence[Result]]], 
         for kind, seeds in kinds.items():
             rows = [each.row for each in seeds if (published / each.row.name / STRIP).exists()]
             for row in rows[:1]:
-                command = shlex.join(["arc-suite", *row.page_arguments(Path("runs", name, row.name))])
+                command = shlex.join(["arc-suite", *row.page_arguments(Path("runs", name.replace(":", "."), row.name))])
                 found.append(f"**{place}: {kind}**, seed {row.seed}: `{command}`")
                 found.append(f"![{place}: {kind}]({row.name}/{STRIP})")
     return [_STRIPS, *found] if found else []

@@ -11,11 +11,12 @@ The body is a robot of the suite, a spec file, or one made to order:
 """
 
 import contextlib
+from pathlib import Path
 
 import imageio.v3 as imageio
 from absl import flags
 
-from arc_suite import files, models
+from arc_suite import checks, files, models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
@@ -50,6 +51,8 @@ flags.DEFINE_string("render", None, "File to write a picture of the standing bod
 
 def main() -> None:
     """Build the body and write what is asked for."""
+    if FLAGS.render is not None:
+        checks.name(Path(FLAGS.render).suffix.lower(), [".png"], "extension")
     body = _body()
     arena = _arena(body)
     with contextlib.ExitStack() as stack:

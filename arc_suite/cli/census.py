@@ -9,12 +9,13 @@ length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
 """
 
 import contextlib
+from pathlib import Path
 
 import imageio.v3 as imageio
 import numpy as np
 from absl import flags
 
-from arc_suite import files
+from arc_suite import checks, files
 from arc_suite.cli import films
 from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import progress
@@ -58,6 +59,8 @@ def main() -> None:
         for seed in range(FLAGS.first, FLAGS.first + FLAGS.count)
     ]
     with contextlib.ExitStack() as stack:
+        if FLAGS.picture:
+            checks.name(Path(FLAGS.picture).suffix.lower(), [".png"], "extension")
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
         outcomes = list(census.census(trials, FLAGS.processes, progress))
         print(census.table(outcomes))

@@ -48,7 +48,7 @@ flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TAS
 
 
 def main() -> None:
-    """Train, and print what the policy earns."""
+    """Train, and print what the policy earns at the end."""
     use_one_thread()
     definition = algorithms.algorithm(FLAGS.algorithm).with_row(named_values("row", FLAGS.row))
     body = only_body(_ROBOT)
@@ -68,7 +68,14 @@ def main() -> None:
             raise KeyboardInterrupt(f"interrupted; the same command goes on with {folder}") from None
     if finished and importlib.util.find_spec("onnx"):
         onnx_file.save(folder / "policy.onnx", network.load(folder))
-    print(f"{folder}: {'finished' if finished else 'stopped; the same command goes on'}")
+    print(f"{folder}: {earned(folder) if finished else 'stopped; the same command goes on'}")
+
+
+def earned(folder: Path) -> str:
+    """Return what the policy of a finished run earns, in words."""
+    table = run_folder.table(folder, "evaluations")
+    returns = table["return"][table["step"] == table["step"][-1]]
+    return f"finished, return {returns.mean():.1f} +- {returns.std():.1f}"
 
 
 def picture(run: Run, folder: Path) -> Callable:

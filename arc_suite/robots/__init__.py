@@ -33,6 +33,6 @@ def row(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
     if body.name in ROBOTS and body.joint_names != ROBOTS[body.name].joint_names:
         raise ValueError(
             f"{what}: expected a body named {body.name!r} to have the {len(ROBOTS[body.name].joint_names)} joints of "
-            f"{body.name}, got {len(body.joint_names)} or others; give it another name"
+            f"{body.name}, by their names, got {len(body.joint_names)}; give it another name"
         )
     return table[body.name]

@@ -71,6 +71,11 @@ def test_what_it_says_comes_near_to_what_the_demonstrator_does(tmp_path):
     assert errors[-1] < 0.3 * errors[0] < 0.03
 
 
+def test_a_run_too_short_to_learn_from_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"^steps: expected more than 16, as the first 2 control steps of an episode "):
+        imitation.begin(SMALL, stage(tmp_path, steps=16))
+
+
 def test_any_number_of_updates_is_made(tmp_path):
     """Compiled for a number of updates at a time, into which not all fit."""
     row = dataclasses.replace(SMALL, updates=imitation.CHUNK + 3, last_updates=7, round=15)

@@ -7,18 +7,20 @@ import signal
 import subprocess
 import sys
 import time
+import types
 
 import numpy as np
 import programs
 import pytest
 import tiny_studies
 
-from arc_suite import data, policies, style
+from arc_suite import data, policies, registry, style
 from arc_suite.agents import run_folder, studies, study_results, study_runner, study_states
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_runner import METRICS
 from arc_suite.agents.study_states import State, watched
 from arc_suite.envs.dm import load
+from arc_suite.robots import generator
 
 ROOT = pathlib.Path(__file__).parents[2]
 FIXTURES = ROOT / "tests" / "fixtures"
@@ -168,6 +170,20 @@ def test_prior_data_are_those_that_the_row_names(tmp_path, monkeypatch):
         study_runner.prepared([row], tmp_path / "runs", 1)
     what = f"dataset {row.prior_id!r} has 3 episodes, and the study takes 2; delete it, to have it collected anew"
     assert str(error.value) == f"{row.name}: {what}"
+
+
+def test_robots_of_others_and_unknown_ones(tmp_path, monkeypatch):
+    """Are told of before any run is made."""
+    body = generator.generate(4, 2)
+    monkeypatch.setitem(sys.modules, "others", types.ModuleType("others"))
+    monkeypatch.setitem(registry.ROBOTS, "creature", body)
+    monkeypatch.setitem(registry.MODULES, ("domain", "creature"), "others")
+    row = Row("others:creature", "sac", 100)
+    assert row.body is body and row.name == "others.creature-walk-sac-0"
+    for name in ("tik", "examples/spider.json"):
+        with pytest.raises(ValueError, match=f"^unknown robot '{name}'"):
+            study_runner.run([row, Row(name, "sac", 100)], tmp_path / "runs", tmp_path, 1, print)
+    assert not (tmp_path / "runs").exists()
 
 
 def test_phases_are_published(tmp_path):

@@ -99,6 +99,15 @@ def test_claims(made):
 
 
 @pytest.mark.slow
+def test_commands_name_the_folder_of_the_runs(made):
+    """In which no colon stands."""
+    study, folder = made
+    (folder / study.rows[0].name / "strip.png").write_bytes(b"")
+    page = study_report.write("my_studies:MINE", study, folder).read_text()
+    assert f"--policy=runs/my_studies.MINE/{study.rows[0].name} " in page
+
+
+@pytest.mark.slow
 def test_phases_are_told_where_they_are_published(made):
     study, folder = made
     assert "## Phases" not in study_report.write("mine", study, folder).read_text()

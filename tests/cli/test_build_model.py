@@ -125,6 +125,7 @@ def test_three_links_are_the_default():
         (["--seed=-1"], "flag --seed=-1: -1 is not a non-negative integer"),
         (["--legs=5", "--layout=pairs"], "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
         (["--legs=5", "--layout=row"], "flag --layout=row: value should be one of <pairs|radial>"),
+        (["--legs=4", "--render=x.txt"], "unknown extension '.txt' (there are: .png)"),
         (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),
     ],
 )

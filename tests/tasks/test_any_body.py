@@ -196,7 +196,8 @@ def test_numbers_go_by_the_name_of_a_body_that_has_the_joints():
     with pytest.raises(ValueError) as error:
         settings(BODY.replace(name="bastion"), {})
     assert str(error.value) == (
-        "walk: expected a body named 'bastion' to have the 12 joints of bastion, got 18 or others; give it another name"
+        "walk: expected a body named 'bastion' to have the 12 joints of bastion, by their names, got 18; "
+        "give it another name"
     )
 
 
