@@ -31,8 +31,9 @@ def row(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
     if body.name not in table:
         return None
     if body.name in ROBOTS and body.joint_names != ROBOTS[body.name].joint_names:
+        wanted, got = len(ROBOTS[body.name].joint_names), len(body.joint_names)
         raise ValueError(
-            f"{what}: expected a body named {body.name!r} to have the {len(ROBOTS[body.name].joint_names)} joints of "
-            f"{body.name}, by their names, got {len(body.joint_names)}; give it another name"
+            f"{what}: expected a body named {body.name!r} to have the {wanted} joints of {body.name}, "
+            f"got {got}{' with other names' if got == wanted else ''}; give it another name"
         )
     return table[body.name]
