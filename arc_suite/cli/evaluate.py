@@ -56,14 +56,15 @@ def main() -> None:
     experts = {name: None if task_kwargs else evaluation.expert_return(task_name, name) for name in walkers}
     with files.writing_json(FLAGS.json) as file:
         reports = {}
+        width = max(12, *map(len, players))
         for robot, (environment, policy) in players.items():
             episodes = evaluate(robot, environment, policy)
             if not reports:
                 names = {name: name for name in episodes[0].progress}
-                header = line("robot", names, "return", "IQM [95 % interval]", "steps", "paper's cpg")
+                header = line("robot".ljust(width), names, "return", "IQM [95 % interval]", "steps", "paper's cpg")
                 print(header, "-" * len(header), sep="\n")
             reports[robot] = report(episodes, experts[robot])
-            print(row(robot, reports[robot]), flush=True)
+            print(row(robot.ljust(width), reports[robot]), flush=True)
         file.update(
             task=task_name,
             task_kwargs=task_kwargs,

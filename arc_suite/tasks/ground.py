@@ -123,7 +123,8 @@ class Lanes(steer.Steer):
     def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return steer's settings, with those of `Ground`."""
         for name in overrides:
-            checks.name(name, (*Ground._fields, *walk.NAMES), f"setting of {cls.name}", near=modifiers.NAMES)
+            known, elsewhere = (*Ground._fields, *walk.NAMES), ("time_limit", *modifiers.NAMES)
+            checks.name(name, known, f"setting of {cls.name}", near=elsewhere)
         own = Ground()._asdict() | {name: value for name, value in overrides.items() if name in Ground._fields}
         ground = Ground(
             checks.number("difficulty", own["difficulty"], 0.0, 1.0),

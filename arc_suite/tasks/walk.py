@@ -147,7 +147,7 @@ def settings(body: Body, overrides: Mapping[str, Any], bonuses: Mapping[str, flo
     row = robots.row(SETTINGS, body, "walk")
     table = COMMON | {"weights": {}} | (fitted_settings(body) if row is None else row)
     for name in overrides:
-        checks.name(name, NAMES, "setting of walk", near=modifiers.NAMES)
+        checks.name(name, NAMES, "setting of walk", near=("time_limit", "arena", *modifiers.NAMES))
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)

@@ -292,6 +292,7 @@ def test_ground_has_no_scale():
     [
         ({"difficulty": 1.5}, "difficulty: expected a number from 0 to 1, got 1.5"),
         ({"dificulty": 0.5}, "unknown setting of rough 'dificulty'; did you mean 'difficulty'?"),
+        ({"timelimit": 3}, "unknown setting of rough 'timelimit'; did you mean 'time_limit'?"),
         ({"curriculum": 1}, "curriculum: expected true or false, got 1"),
         ({"level": 10}, "level: expected an integer from 0 to 9, got 10"),
         ({"terrain_seed": -1}, "terrain_seed: expected an integer from 0"),

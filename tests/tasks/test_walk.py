@@ -211,6 +211,7 @@ def test_overriding_one_weight_keeps_the_others():
             ("queen", "walk", {"target_velocty": 1}),
             "unknown setting of walk 'target_velocty'; did you mean 'target_velocity'?",
         ),
+        (("queen", "walk", {"timelimit": 3}), "unknown setting of walk 'timelimit'; did you mean 'time_limit'?"),
         (("queen", "walk", {"weights": {"foward": 1}}), "unknown weight 'foward'; did you mean 'forward'?"),
         (
             ("queen", "walk", {"weights": {"forward": math.nan}}),
