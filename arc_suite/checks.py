@@ -4,8 +4,10 @@ import difflib
 import json
 import math
 import operator
+import os
 import pkgutil
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -33,6 +35,19 @@ def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> st
     close = difflib.get_close_matches(str(value), valid, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
     raise ValueError(f"unknown {kind} {value!r}{hint} (there are: {', '.join(valid)})")
+
+
+def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
+    """Return the extension of a file to write, in lower case.
+
+    Args:
+        path: of the file.
+        valid: extensions there are, with their dots.
+
+    Raises:
+        ValueError: it is none of them; one line.
+    """
+    return name(Path(path).suffix.lower(), valid, "extension")
 
 
 def seed(value) -> int:

@@ -64,6 +64,13 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def delete_unfinished(path: str | os.PathLike) -> None:
+    """Delete what killed processes have left beside a file in `writing` it; none may be writing it now."""
+    target = Path(path)
+    for temporary in target.parent.glob(f".{target.stem[:32]}.*{target.suffix}"):
+        temporary.unlink()
+
+
 @contextlib.contextmanager
 def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
     """Write a file of JSON as `writing` does: `with writing_json("a.json") as report: report["a"] = 1`.

@@ -4,8 +4,6 @@ Example:
   python tools/strip.py --output docs/tasks.png
 """
 
-from pathlib import Path
-
 import imageio.v3 as imageio
 import numpy as np
 from absl import flags
@@ -39,7 +37,7 @@ def view(task: str, robot: str) -> np.ndarray:
 
 def main() -> None:
     """Draw the views and write them."""
-    checks.name(Path(FLAGS.output).suffix.lower(), [".png"], "extension")
+    checks.extension(FLAGS.output, [".png"])
     robots = list(ROBOTS)
     pairs = [(task, robots[index % 3]) for index, task in enumerate(TASKS)]  # Leaper falls on ground
     views = [view(*pair) for pair in program.progress(pairs, desc="tasks", leave=False)]

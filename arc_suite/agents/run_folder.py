@@ -108,8 +108,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
     with contextlib.ExitStack() as stack:
         stack.enter_context(files.locked(path, f"{path}: another process goes on with this run"))
         _check(path, json.loads(json.dumps(config)))
-        for leftover in path.glob(f".{Path(CHECKPOINT).stem}.*"):  # of a kill in mid-writing, megabytes
-            leftover.unlink()
+        files.delete_unfinished(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
         yield folder
@@ -137,6 +136,11 @@ def progress_of(path: str | os.PathLike) -> dict[str, Any]:
         ValueError: the checkpoint is damaged; one line.
     """
     return _checkpoint(Path(path) / CHECKPOINT, with_arrays=False)[1]
+
+
+def latest_returns(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the returns (episodes,) of the latest evaluation in a table of evaluations."""
+    return evaluations["return"][evaluations["step"] == evaluations["step"][-1]]
 
 
 def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:

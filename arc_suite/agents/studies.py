@@ -254,6 +254,11 @@ STUDIES = {
 }
 
 
+def folder_name(name: str) -> str:
+    """Return what the folders of a study are called: its name, without the colon of `module:attribute`."""
+    return name.replace(":", ".")
+
+
 def study(name: str) -> Study:
     """Return the study of a name, or of `module:attribute`, a `Study` on Python's path.
 

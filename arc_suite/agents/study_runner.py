@@ -165,7 +165,7 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         with files.writing(target / name) as temporary:
             temporary.write_text((source / name).read_text())
     training = table(source, "training")
-    if training and np.any(training.get("phase_updates", 0)):
+    if np.any(training.get("phase_updates", 0)):
         with files.writing(target / "phases.csv") as temporary:
             temporary.write_text(_phases(training))
     step = int(steps[-1])

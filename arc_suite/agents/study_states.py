@@ -51,7 +51,7 @@ def state(row: Row, folder: Path, word: str) -> State:
     step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
     result = None
     if evaluations:
-        result = float(evaluations["return"][evaluations["step"] == evaluations["step"][-1]].mean())
+        result = float(run_folder.latest_returns(evaluations).mean())
     return State(row, word, int(step), result, float(wall), float(cpu))
 
 

@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from arc_suite.agents import studies
 from arc_suite.agents.study_results import STRIP, Result
 
 _STRIPS = (
@@ -30,7 +31,9 @@ def paragraphs(name: str, groups: Mapping[str, Mapping[str, Sequence[Result]]], 
         for kind, seeds in kinds.items():
             rows = [each.row for each in seeds if (published / each.row.name / STRIP).exists()]
             for row in rows[:1]:
-                command = shlex.join(["arc-suite", *row.page_arguments(Path("runs", name.replace(":", "."), row.name))])
+                command = shlex.join(
+                    ["arc-suite", *row.page_arguments(Path("runs", studies.folder_name(name), row.name))]
+                )
                 found.append(f"**{place}: {kind}**, seed {row.seed}: `{command}`")
                 found.append(f"![{place}: {kind}]({row.name}/{STRIP})")
     return [_STRIPS, *found] if found else []

@@ -46,7 +46,7 @@ def main() -> None:
     task_name, task_kwargs = task()
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
-    checks.name(Path(FLAGS.output).suffix.lower(), [".glb"], "extension")
+    checks.extension(FLAGS.output, [".glb"])
     beside = Path(FLAGS.output).with_suffix(".json")
     if FLAGS.spec is not None and beside.resolve() == Path(FLAGS.spec).resolve():
         raise ValueError(f"--output={FLAGS.output}: {beside}, which is written too, is the spec; take another name")

@@ -11,7 +11,6 @@ The body is a robot of the suite, a spec file, or one made to order:
 """
 
 import contextlib
-from pathlib import Path
 
 import imageio.v3 as imageio
 from absl import flags
@@ -52,7 +51,7 @@ flags.DEFINE_string("render", None, "File to write a picture of the standing bod
 def main() -> None:
     """Build the body and write what is asked for."""
     if FLAGS.render is not None:
-        checks.name(Path(FLAGS.render).suffix.lower(), [".png"], "extension")
+        checks.extension(FLAGS.render, [".png"])
     body = _body()
     arena = _arena(body)
     with contextlib.ExitStack() as stack:

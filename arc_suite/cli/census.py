@@ -9,7 +9,6 @@ length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
 """
 
 import contextlib
-from pathlib import Path
 
 import imageio.v3 as imageio
 import numpy as np
@@ -60,7 +59,7 @@ def main() -> None:
     ]
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
-            checks.name(Path(FLAGS.picture).suffix.lower(), [".png"], "extension")
+            checks.extension(FLAGS.picture, [".png"])
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
         outcomes = list(census.census(trials, FLAGS.processes, progress))
         print(census.table(outcomes))

@@ -35,12 +35,12 @@ def line(first: str, figures: Mapping[str, str], *cells: str) -> str:
     """Return a line of the table.
 
     Args:
-        first: what is in its first column.
+        first: what is in its first column, as wide as that is.
         figures: the task's own by name, which matter first.
         *cells: of the columns that every task has.
     """
     own = [f"{cell:>{max(len(name), 6)}}" for name, cell in figures.items()]
-    return " ".join([f"{first:<12}", *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))])
+    return " ".join([first, *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))])
 
 
 def main() -> None:

@@ -67,7 +67,7 @@ def main() -> None:
     }
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif or .html")
-    extension = checks.name(Path(FLAGS.output).suffix.lower(), _STEPS, "extension")
+    extension = checks.extension(FLAGS.output, _STEPS)
     steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
 
     with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:

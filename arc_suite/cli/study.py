@@ -54,8 +54,8 @@ def main(name: str | None = None) -> int:
     rows = study.rows[part::parts]
     if not rows:
         raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.rows)}")
-    folder = Path(FLAGS.runs or Path("runs", name.replace(":", ".")))
-    results = Path(FLAGS.results or Path("studies", name.replace(":", ".")))
+    folder = Path(FLAGS.runs or Path("runs", studies.folder_name(name)))
+    results = Path(FLAGS.results or Path("studies", studies.folder_name(name)))
     if FLAGS.report:
         study_runner.publish_all(rows, folder, results)
         print(study_report.write(name, study, results))
@@ -72,8 +72,8 @@ def main(name: str | None = None) -> int:
     states = run(rows, folder, results, width, show, progress)
     show(states, whole=True)
     failed = [each.row.name for each in states if each.word == "failed"]
-    for run in failed:
-        print(f"{folder / run}.log: {last_line(folder / f'{run}.log')}", file=sys.stderr)
+    for each in failed:
+        print(f"{folder / each}.log: {last_line(folder / f'{each}.log')}", file=sys.stderr)
     return 1 if failed else 0
 
 

@@ -73,8 +73,7 @@ def main() -> None:
 
 def earned(folder: Path) -> str:
     """Return what the policy of a finished run earns, in words."""
-    table = run_folder.table(folder, "evaluations")
-    returns = table["return"][table["step"] == table["step"][-1]]
+    returns = run_folder.latest_returns(run_folder.table(folder, "evaluations"))
     return f"finished, return {returns.mean():.1f} +- {returns.std():.1f}"
 
 
