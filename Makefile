@@ -17,7 +17,7 @@
 # make soak    two million steps: memory, threads and files stay what they are
 # make fuzz    damages specs, tracks and datasets at random and reads them; minutes
 # make mutants plants mistakes and tells which test catches each; takes hours
-# make golden  shows how golden numbers differ; tests/golden.py --accept takes new ones
+# make golden  shows how golden numbers and digests differ; tests/golden.py --accept and tests/digests.py --accept store new ones
 SHELL := /bin/bash
 # Tests start some hundred programs; without bytecode each compiles the package anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -160,6 +160,7 @@ mutants: $(INSTALLED)
 
 golden: $(INSTALLED)
 	$(PYTHON) tests/golden.py
+	$(PYTHON) tests/digests.py
 
 clean:
 	rm -rf .venv .venv-* .node-* out build *.egg-info

@@ -1,0 +1,39 @@
+"""Digests of every task and demonstrator are the accepted ones; see tests/digests.py."""
+
+import functools
+
+import digests
+import numpy as np
+import pytest
+
+QUICK = ("queen walk", "tick steer", "leaper roam", "queen steer, kicks")
+
+
+@functools.cache
+def accepted():
+    return digests.stored()
+
+
+@functools.cache
+def same_arithmetic():
+    return accepted()["arithmetic"] == digests.arithmetic()
+
+
+def marked(name, case):
+    plain = not case.task_kwargs and case.command is None and case.preset is None
+    mark = [] if name in QUICK else [pytest.mark.slow] if plain else [pytest.mark.long]
+    return pytest.param(name, case, marks=mark, id=name)
+
+
+def test_every_case_is_stored():
+    assert accepted()["cases"].keys() == digests.cases().keys()
+
+
+@pytest.mark.parametrize(("name", "case"), [marked(*item) for item in digests.cases().items()])
+def test_digests_are_the_accepted_ones(name, case):
+    now, before = digests.digested(case), dict(accepted()["cases"][name])
+    if same_arithmetic():
+        assert now == before
+    else:  # bits differ from processor to processor, and soon so do walks
+        first = [[np.nan if reward is None else reward for reward in run["first"]] for run in (now, before)]
+        np.testing.assert_allclose(*first, rtol=1e-6, atol=1e-6)
