@@ -18,7 +18,7 @@ from arc_suite import checks, versions
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.style.tracks import Track
-from arc_suite.tasks import terms
+from arc_suite.tasks.parameters import Parameters
 
 FORMAT = "arc_suite tracks 2"  # another number for every change of what a file holds
 
@@ -39,7 +39,7 @@ _FIELDS = {
     **dict.fromkeys(("legs", "mirrors", "foot_radii"), ("feet",)),
     "joint_legs": ("joints",),
 }
-_PARAMETERS = dict.fromkeys(terms.Parameters._fields, float) | {"phase_offsets": ("feet",), "healthy_range": (2,)}
+_PARAMETERS = dict.fromkeys(Parameters._fields, float) | {"phase_offsets": ("feet",)}
 _KINDS = {"contacts": "b", "legs": "U", "mirrors": "i", "joint_legs": "i"}  # of dtype; others are numbers
 
 
@@ -128,8 +128,7 @@ def _track(body: Body, arrays: Mapping[str, np.ndarray], index: int) -> Track:
             mapping[path[-1]] = array if array.ndim else array.item()
     _check(fields, body)
     if "parameters" in fields:
-        low, high = fields["parameters"]["healthy_range"].tolist()
-        fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
+        fields["parameters"] = Parameters(**fields["parameters"])
     absent = {"phases": None, "parameters": None, "progress": {}}
     task_kwargs = checks.mapping("task_kwargs", json.loads(fields["task_kwargs"]))
     values = {"legs": tuple(fields["legs"].tolist()), "task_kwargs": task_kwargs}

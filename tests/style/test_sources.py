@@ -85,8 +85,10 @@ def test_what_is_no_source_is_refused_before_any_work(saved):
 
 def test_stored_tracks_tell_their_stage(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    stage = Stage(ROBOTS["tick"], "steer", {"healthy_range": [0.05, 0.5], "arena": "bumps"})
-    environment = arc_suite.load(stage.body, stage.task, {"healthy_range": (0.05, 0.5), "arena": "bumps"})
+    stage = Stage(ROBOTS["tick"], "steer", {"phase_offsets": [0.0, 3.0, 0.0, 3.0, 0.0, 3.0], "arena": "bumps"})
+    environment = arc_suite.load(
+        stage.body, stage.task, {"phase_offsets": (0.0, 3.0, 0.0, 3.0, 0.0, 3.0), "arena": "bumps"}
+    )
     style.save(tmp_path / "tick.npz", [record(environment, policy("cpg", stage.body), 0, 5)])
     settings = data.Settings(stage.body, steps=5, task=stage.task, task_kwargs=environment.task_kwargs)
     data.collect("arc_suite/tick/steers-v0", settings, episodes=1)
@@ -110,7 +112,7 @@ def test_datasets_are_replayed(dataset):
 
 
 def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
-    monkeypatch.setitem(walk.BONUSES, "healthy", 0.5)
+    monkeypatch.setitem(walk.WEIGHTS, "healthy", 0.5)
     with pytest.raises(ValueError) as error:
         take(source(dataset.id), LEAPER, range(1))
     assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")
