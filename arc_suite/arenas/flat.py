@@ -20,7 +20,7 @@ class Flat(Arena):
         return 0.0 * x
 
     def clearance(self, points):
-        """Return z, whose bits no subtraction could change."""
+        """Return z; no subtraction, so results stay bit-identical."""
         return points[..., 2]
 
     @property
