@@ -15,7 +15,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, policies, registry, versions
 from arc_suite.cpg.demonstrator import presets_of
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
 from arc_suite.registration import importable
