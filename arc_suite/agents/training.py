@@ -20,7 +20,6 @@ from arc_suite.agents.algorithms import Algorithm
 from arc_suite.agents.calls import Call, advancing, alone
 from arc_suite.agents.learner import ENVIRONMENT, MOST_SEEDS, Diverged, Learner, Stage
 from arc_suite.agents.run_folder import RunFolder
-from arc_suite.data.settings import model_sha256
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
@@ -97,7 +96,7 @@ class Run(NamedTuple):
             "episodes": evaluation.EPISODES,
             "prior": self.prior,
             "body_sha256": hashlib.sha256(body_to_json(self.body).encode()).hexdigest(),
-            "model_sha256": model_sha256(self.body, self.task, self.task_kwargs),
+            "model_sha256": Setup.of(self.body, self.task, self.task_kwargs).provenance()["model_sha256"],
             "versions": versions.recorded() | {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")},
         }
 

@@ -21,6 +21,7 @@ from absl import flags
 from arc_suite import checks, policies
 from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
 from arc_suite.cli.program import progress
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
@@ -73,7 +74,8 @@ def main() -> None:
     presets = presets if FLAGS.policy == "cpg" else ()
     policy, label = chosen()
     for body in walkers.values():
-        settings = data.Settings(body, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
+        setup = Setup.of(body, asked, task_kwargs)
+        settings = data.Settings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = FLAGS.id or settings.dataset_id(label)
         missing = data.collect(
             dataset_id,

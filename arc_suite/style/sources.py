@@ -113,7 +113,8 @@ def _replayed(dataset_id: str) -> Source:
     except ImportError as error:
         raise ValueError(str(error)) from None
     dataset = data.open(dataset_id)
-    stage = Stage(dataset.settings.body, dataset.settings.task, dataset.settings.task_kwargs)
+    setup = dataset.settings.setup
+    stage = Stage(setup.body, setup.task, setup.task_kwargs)
 
     def replay(environment, index):
         episode = dataset[index]

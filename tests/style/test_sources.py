@@ -5,13 +5,14 @@ from synthetic import assert_same
 
 import arc_suite
 from arc_suite import data, style
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.style import Stage, record, source
 from arc_suite.tasks import walk
 
 BODY = generator.generate(5, 2)
-SETTINGS = data.Settings(ROBOTS["leaper"], "cpg", ("medium",), noise=0.1, seed=7, steps=30)
+SETTINGS = data.Settings(Setup.of("leaper"), "cpg", ("medium",), noise=0.1, seed=7, steps=30)
 
 
 @pytest.fixture(scope="module")
