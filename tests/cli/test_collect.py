@@ -39,7 +39,7 @@ def test_collect_continue_verify_and_minaris_own_command(root):
     again = run("--steps=20", "--episodes=3")
     assert (again.returncode, again.stdout, again.stderr) == (0, f"{ID}: has its 3 episodes already\n", "")
     verified = run(f"--verify={ID}")
-    assert (verified.returncode, verified.stdout) == (0, f"{ID}: 3 episodes replayed, equal to the bit\n")
+    assert (verified.returncode, verified.stdout) == (0, f"{ID}: 3 episodes replayed, all bit-equal\n")
     minari = pathlib.Path(sys.executable).with_name("minari")
     listed = subprocess.run([minari, "list", "local"], capture_output=True, text=True, check=True).stdout
     assert ID in listed

@@ -79,7 +79,7 @@ def test_what_the_caller_names_is_imported(module):
         f"collect.py: dataset {ID!r}: metadata.json: task 'strolling:stroll': files import nothing; "
         "import 'strolling' first\n"
     )
-    assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, equal to the bit\n"
+    assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, all bit-equal\n"
     assert run(f"--verify={ID}", "--set=arena=strolling:lawn", "--task=walk").stderr == (
         f"collect.py: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
     )
