@@ -11,7 +11,7 @@ import test_layers
 import arc_suite
 from arc_suite import data
 from arc_suite.cli import main
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 from arc_suite.tasks import TASKS, walk
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -47,7 +47,7 @@ def _rows(page, first):
 def dataset(tmp_path, monkeypatch):
     """A little of what the page of datasets collects."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    settings = data.Settings(ROBOTS["queen"], "cpg", ("tuned",))
+    settings = data.Settings(Setup.of("queen"), "cpg", ("tuned",))
     assert f"--verify {settings.dataset_id()}\n" in _page("datasets")
     data.collect(settings.dataset_id(), settings._replace(steps=5), episodes=1)
 

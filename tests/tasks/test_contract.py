@@ -11,7 +11,7 @@ from tiers import tiers, turn
 
 import arc_suite
 from arc_suite.envs import trees
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch
