@@ -12,8 +12,8 @@ from dm_control.rl import control
 from dm_env import specs
 
 from arc_suite import checks
-from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.prepare import checked_action, checked_command, prepared
+from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.prepare import prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms

@@ -11,8 +11,8 @@ from shimmy.dm_control_compatibility import DmControlCompatibilityV0
 from shimmy.utils.dm_env import dm_env_step2gym_step
 
 from arc_suite import checks
+from arc_suite.envs.calls import one_thread_at_a_time
 from arc_suite.envs.dm import load
-from arc_suite.envs.lock import one_thread_at_a_time
 from arc_suite.simulation import opengl, pictures
 from arc_suite.tasks import Task
 

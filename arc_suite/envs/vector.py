@@ -12,8 +12,8 @@ from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
 from arc_suite.envs import snapshots, trees
-from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.prepare import checked_action, checked_command, prepared
+from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.prepare import prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
