@@ -7,6 +7,7 @@ import programs
 import pytest
 
 from arc_suite.robots import generator, spec_files
+from arc_suite.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]
 TOOL = ROOT / "tools" / "check.py"
@@ -53,7 +54,8 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "expected a spec file; see --help"),
+        ((), "expected a spec file or --task; see --help"),
+        (("--task=wlak",), "unknown task 'wlak'; did you mean 'walk'? (there are: " + ", ".join(TASKS) + ")"),
         (("missing.json",), "cannot read missing.json: no such file or directory"),
         (("a.json", "b.json"), "unexpected argument 'b.json'; see --help"),
     ],
@@ -68,3 +70,17 @@ def test_a_file_that_holds_no_body_is_one_line(path):
     done = check(path)
     line = f"check.py: {path}: torso.standing_height: expected a number from 1e-06 to 100, got -1\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
+
+
+@pytest.mark.slow
+def test_a_task_that_rounds_otherwise_alone_is_told_by_its_term(tmp_path):
+    (tmp_path / "squaring.py").write_text(
+        "import arc_suite\nfrom arc_suite.tasks.walk import Walk\n\n"
+        "class Squaring(Walk):\n    name = 'squaring'\n\n"
+        "    def terms(self, memory, readings):\n"
+        "        return super().terms(memory, readings) | {'forward': memory.forward_velocity**2}\n\n"
+        "arc_suite.register(module=__name__, tasks=(Squaring,))\n"
+    )
+    done = programs.run(TOOL, "--task=squaring:squaring", "--robot=tick", cwd=tmp_path, PYTHONPATH=str(tmp_path))
+    assert done.returncode == 1 and done.stdout.startswith("tick, squaring: a batch of environments differs from one")
+    assert done.stdout.endswith(": term forward\n")
