@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, policies, registry, versions
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.scene import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network

@@ -118,6 +118,7 @@ class Lanes(steer.Steer):
     yaw, own_arena, thresholds = 0.3, True, (DOWN, UP)
     kinds: tuple[str, ...]
     copies = (8, 2)
+    demonstrators = ("balanced", "surefooted")
 
     @classmethod
     def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
@@ -265,6 +266,7 @@ class Gaps(Lanes):
     """Walking over trenches."""
 
     name, kinds = "gaps", ("gaps",)
+    demonstrators = ("sighted",)
     copies = (4, 1)
 
 

@@ -128,6 +128,7 @@ class Modified(Task):
     version = property(lambda self: self.task.version)
     reads = property(lambda self: self.task.reads)
     commands = property(lambda self: self.task.commands)
+    demonstrators = property(lambda self: self.task.demonstrators)
     actions = property(lambda self: self.changes.actions)
     clock = property(lambda self: self.task.clock)
     parameters = property(lambda self: self.task.parameters)

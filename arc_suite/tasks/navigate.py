@@ -76,6 +76,7 @@ class Navigate(steer.Steer):
     """Reaching goals among pillars."""
 
     name, own_arena, commands = "navigate", True, {}
+    demonstrators = ("planned",)
     bonuses = {"progress": 2.5, "healthy": 1.0, "obedient_gait": 1.5, "goal": 10.0}
 
     @classmethod

@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite.cpg.presets import TUNINGS, Preset
+from arc_suite.cpg.prescribed import Preset
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
 from arc_suite.tuning.judge import STYLE, Judge, Score
 from arc_suite.tuning.space import SPACES
@@ -83,8 +84,8 @@ class Search:
         """
         import cma  # of the extra "tune"
 
-        body, self._medium, kind = ROBOTS[robot], TUNINGS[robot]["medium"], SPACES[numbers]
-        self._space, self._episodes = kind.space(body, TUNINGS[robot][kind.preset]), episodes
+        body, self._medium, kind = ROBOTS[robot], PRESETS[robot]["medium"], SPACES[numbers]
+        self._space, self._episodes = kind.space(body, PRESETS[robot][kind.preset]), episodes
         self._first = _SEEDS * (1 + seed)
         self._starts = range(self._first, self._first + starts)
         origins = self._space.origins()

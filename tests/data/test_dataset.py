@@ -9,7 +9,7 @@ import pytest
 from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
 
 from arc_suite import data, style, versions
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 
 
 def test_metadata():
@@ -31,7 +31,7 @@ def test_metadata():
         "task_kwargs": {},
         "task_version": 0,
         "presets_sha256": [
-            hashlib.sha256(repr(TUNINGS["queen"][name]).encode()).hexdigest() for name in ("slow", "fast")
+            hashlib.sha256(repr(PRESETS["queen"][name]).encode()).hexdigest() for name in ("slow", "fast")
         ],
     }
     summaries = dataset.summaries()
