@@ -17,7 +17,7 @@ from absl import flags
 
 from arc_suite import checks, policies, rotations
 from arc_suite.cli import program
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 

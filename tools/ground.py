@@ -15,7 +15,7 @@ from absl import flags
 from arc_suite import checks, evaluation, policies
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 

@@ -24,7 +24,7 @@ from arc_suite.agents import run_folder, study_results
 from arc_suite.agents.studies import Row
 from arc_suite.agents.study_states import State, states, table, watched
 from arc_suite.agents.training import PRIOR_SHA256
-from arc_suite.cpg.demonstrator import presets_of, suited_preset
+from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.envs.dm import Environment, load
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import Policy, checkpoints, network

@@ -23,7 +23,7 @@ import arc_suite
 from arc_suite import policies
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
 from arc_suite.cli.live import Live, play
-from arc_suite.cpg.demonstrator import suited_preset
+from arc_suite.cpg import suited_preset
 from arc_suite.models.outline import outline
 from arc_suite.simulation import opengl
 

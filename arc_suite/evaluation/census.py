@@ -15,7 +15,7 @@ from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.dm import load
 from arc_suite.models.sizing import GRAVITY
-from arc_suite.robots import gaits, generator
+from arc_suite.robots import generator
 from arc_suite.robots.spec import Body
 
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
@@ -96,9 +96,9 @@ def follow(trial: Trial) -> tuple[control.Environment, Course]:
     """
     body = trial.body
     settings = {"time_limit": trial.seconds, "random": trial.seed} | dict(trial.task_kwargs)
+    settings |= {"duty_factor": 0.6, "phase_offsets": 0.0} if trial.in_phase else {}
     environment = load(body, trial.task, settings)
-    gait = gaits.Gait(0.6, (0.0,) * len(body.legs)) if trial.in_phase else None
-    demonstrator = Demonstrator(body, froude=trial.froude, gait=gait)
+    demonstrator = Demonstrator(environment, "medium" if trial.froude is None else trial.froude)
     data = environment.physics.data.ptr
     shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in body.torso.solids]
     step, ending = environment.reset(), "time"

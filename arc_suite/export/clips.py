@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.demonstrator import Demonstrator, first_preset
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import first_preset
 from arc_suite.envs.setup import Setup
 from arc_suite.export import motions
 from arc_suite.export.footfalls import TOUCH_DOWN, Footfall, footfalls, sole_heights
@@ -180,7 +181,8 @@ def _taken(setup: Setup, shot: Shot, policy, preset) -> _Take:
             seconds = len(recording.qpos) * recording.step / 2.0
             raise ValueError(f"the pose does not return within {seconds:.3g} s")
         return _Take(recording, cycle)
-    environment, actor = Setup.of(setup.body, "steer").load(seed=0), Demonstrator(setup.body, "steered")
+    environment = Setup.of(setup.body, "steer").load(seed=0)
+    actor = Demonstrator(environment, "steered")
     # It walks by the task's clock; some bodies take every other stride differently.
     cycle = 1.0 / environment.task.definition.parameters.gait_frequency
     if not shot.stops:

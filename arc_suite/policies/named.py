@@ -1,6 +1,5 @@
 """Policies by name: some need no training; any other is found on Python's path."""
 
-import itertools
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg import PRESETS, Demonstrator
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import preset_names
 from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import ROBOTS, is_robot
@@ -20,18 +19,19 @@ _ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
 
 
-def _cpg(body: Body, presets: Sequence[str], rows: int) -> Policy:
+def _cpg(body: Body, presets: Sequence[str], rows: int, task: Task | None) -> Policy:
     if not presets:
-        raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
-    demonstrators = [Demonstrator(body, preset) for preset in presets]
-    return demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, rows)
+        raise ValueError(f"preset: expected one or more of {', '.join(preset_names())}, got none")
+    demonstrators = [Demonstrator(task or body, preset) for preset in presets]
+    made = demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, rows)
+    return Positioned(made, task) if task and task.actions == "position" else made
 
 
-def _zero(body: Body, presets: Sequence[str], rows: int) -> Policy:
+def _zero(body: Body, presets: Sequence[str], rows: int, task: Task | None) -> Policy:
     return Script(lambda seed: (), rows, len(body.joint_names))
 
 
-def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
+def _random(body: Body, presets: Sequence[str], rows: int, task: Task | None) -> Policy:
     joints = len(body.joint_names)
 
     def draw(seed):
@@ -42,7 +42,7 @@ def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
     return Script(draw, rows, joints)
 
 
-# Name -> what makes the policy of a body, presets and a number of rows.
+# By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
 POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
@@ -50,12 +50,7 @@ HELP = (
     "saved, whose pickles are run; or module:attribute, which makes a policy from a robot's name, or from the Body of "
     "what is no robot of the suite."
 )
-PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
-
-
-def preset_names() -> tuple[str, ...]:
-    """Return the names of the presets that there are for any robot, those of other packages included."""
-    return tuple(dict.fromkeys(itertools.chain(PRESETS, *TUNINGS.values())))
+PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the robot has."
 
 
 def policy(
@@ -75,12 +70,11 @@ def policy(
             stable-baselines3, see `sb3_file`; or `module:attribute`, a function on Python's path that makes
             a function from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
-            that take turns from seed to seed.
+        presets: of the demonstrator, a name or several that take turns from seed to seed; see `cpg.Demonstrator`.
         rows: of the batch.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
-        task: that it is to act in: the demonstrator, whose actions are torques, then gives positions where
-            the task asks for them, as `protocol.Positioned`. None for torques. Other policies give what they give.
+        task: that it is to act in. The demonstrator is fitted to it, and gives positions in place of torques
+            where the task takes them, as `protocol.Positioned`. None for walk with default settings.
 
     Raises:
         ValueError: an unknown name, or a value out of range; one line that names it and the nearest
@@ -99,9 +93,7 @@ def policy(
     elif isinstance(name, str) and ":" in name:
         made = _from_path(name, body, rows)
     else:
-        made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, rows)
-        if name == "cpg" and task is not None and task.actions == "position":
-            made = Positioned(made, task)
+        made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, rows, task)
     return Sum(made, _noise(body, noise, rows)) if noise else made
 
 

@@ -7,7 +7,7 @@ import dm_env
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.law import felt
+from arc_suite.cpg.law import Clocked, checked, proprioception
 from arc_suite.envs.calls import checked_action
 from arc_suite.tasks.modified import Modified
 
@@ -90,7 +90,7 @@ class Positioned:
             ValueError: an observation without the blocks that tell how the joints are; one line.
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
-        _, angles, speeds = felt(observation, torques.shape[-1])
+        _, angles, speeds = proprioception(checked(observation, Clocked.reads, torques.shape[-1]))
         return self._task.positions(torques, angles, speeds)
 
 

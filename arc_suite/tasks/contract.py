@@ -121,6 +121,7 @@ class Task(ABC):
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
+        demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
     """
 
     scene: Scene
@@ -134,6 +135,7 @@ class Task(ABC):
     own_arena: ClassVar[bool] = False
     modifiers: ClassVar[Mapping[str, Any]] = {}
     actions: ClassVar[str] = "torque"
+    demonstrators: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     @abstractmethod

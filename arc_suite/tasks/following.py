@@ -29,6 +29,7 @@ class Rough(CommandTask):
 
     name, yaw = "rough", 0.3
     command, ground = AlongLane(), Lanes(("rough",))
+    demonstrators = ("balanced", "surefooted")
 
 
 class Slopes(CommandTask):
@@ -36,6 +37,7 @@ class Slopes(CommandTask):
 
     name, yaw = "slopes", 0.3
     command, ground = AlongLane(), Lanes(("slopes",))
+    demonstrators = ("balanced", "surefooted")
 
 
 class Stairs(CommandTask):
@@ -43,6 +45,7 @@ class Stairs(CommandTask):
 
     name, yaw = "stairs", 0.3
     command, ground = AlongLane(), Lanes(("stairs",), copies=(4, 1))
+    demonstrators = ("balanced", "surefooted")
 
 
 class Gaps(CommandTask):
@@ -50,6 +53,7 @@ class Gaps(CommandTask):
 
     name, yaw = "gaps", 0.3
     command, ground = AlongLane(), Lanes(("gaps",), copies=(4, 1))
+    demonstrators = ("sighted",)
 
 
 class Course(CommandTask):
@@ -57,6 +61,7 @@ class Course(CommandTask):
 
     name, yaw = "course", 0.3
     command, ground = AlongLane(), Lanes(terrain.KINDS, copies=(2, 1))
+    demonstrators = ("balanced", "surefooted")
 
 
 class Roam(CommandTask):
@@ -64,6 +69,7 @@ class Roam(CommandTask):
 
     name, modifiers = "roam", {"kicks": 1.5}
     command, ground = Schedule(), Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5))
+    demonstrators = ("balanced", "surefooted")
 
 
 class Navigate(CommandTask):
@@ -71,4 +77,5 @@ class Navigate(CommandTask):
 
     name = "navigate"
     command, ground = ToGoal(), PillarField()
+    demonstrators = ("planned",)
     bonuses = {"progress": 2.5, "healthy": 1.0, "obedient_gait": 1.5, "goal": 10.0}

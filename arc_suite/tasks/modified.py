@@ -139,6 +139,7 @@ class Modified(Task):
     version = property(lambda self: self.task.version)
     reads = property(lambda self: self.task.reads)
     commands = property(lambda self: self.task.commands)
+    demonstrators = property(lambda self: self.task.demonstrators)
     actions = property(lambda self: self.changes.actions)
     parameters = property(lambda self: self.task.parameters)
     target_velocity = property(lambda self: self.task.target_velocity)

@@ -24,8 +24,8 @@ _LARGEST = 1e6  # bound of a setting, in its unit: far beyond sense, and finite 
 
 _TRIPOD, _TROT = (tuple(TWO_PI * offset for offset in offsets) for offsets in (gaits.TRIPOD, gaits.TROT))
 
-# By robot: units as in `Parameters`, `Noise` and `walk.Settings`.
-PARAMETERS = {
+# Of walk by robot; units as in `Parameters`, `Noise` and `walk.Settings`.
+_WALK = {
     "queen": {
         "target_velocity": 0.5,
         "velocity_band": 0.3,
@@ -71,6 +71,9 @@ PARAMETERS = {
         "weights": {"control": -0.1},
     },
 }
+
+# By task, then by robot; what a task has no row of is walk's.
+PARAMETERS = {"walk": _WALK}
 
 
 class Parameters(NamedTuple):
@@ -140,8 +143,9 @@ def values(body: Body, overrides: Mapping[str, Any], task: str, names: Iterable[
     """
     for name in overrides:
         checks.name(name, names, f"setting of {task}", near=("time_limit", *elsewhere, *modifiers.NAMES))
-    row = robots.row(PARAMETERS, body, "walk")
+    row = robots.row(PARAMETERS["walk"], body, "walk")
     table = COMMON | (fitted_parameters(body) if row is None else row)
+    table |= robots.row(PARAMETERS.get(task, {}), body, task) or {}
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)

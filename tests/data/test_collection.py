@@ -11,7 +11,7 @@ import pytest
 from datasets import ID, QUEEN, SHORT, SPIDER, TICK, collect, digests, quiet, verify
 
 from arc_suite import data, evaluation, policies
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 
 OWN = """
@@ -232,17 +232,17 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
 def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch):
     settings = data.Settings(QUEEN, presets=("slow", "medium"), **SHORT)
     collect(ID, settings, 2)
-    before, medium = digests(), TUNINGS["queen"]["medium"]
+    before, medium = digests(), PRESETS["queen"]["medium"]
     for changed in (medium._replace(stiffness=0.81), medium._replace(centre=medium.centre | {"ankle": (15, 30, -14)})):
-        monkeypatch.setitem(TUNINGS["queen"], "medium", changed)
+        monkeypatch.setitem(PRESETS["queen"], "medium", changed)
         with pytest.raises(ValueError) as error:
             collect(ID, settings, 3)
         message = f"dataset {ID!r} is another: its presets slow and medium had other numbers; --overwrite replaces it"
         assert str(error.value) == message
         assert digests() == before
         assert verify(ID) == 2  # what was done can still be done
-    monkeypatch.setitem(TUNINGS["queen"], "medium", medium)
-    monkeypatch.setitem(TUNINGS["queen"], "fast", changed)  # which is none of the dataset's
+    monkeypatch.setitem(PRESETS["queen"], "medium", medium)
+    monkeypatch.setitem(PRESETS["queen"], "fast", changed)  # which is none of the dataset's
     assert collect(ID, settings, 3) == 1
 
 

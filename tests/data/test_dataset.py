@@ -9,7 +9,7 @@ import pytest
 from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
 
 from arc_suite import data, style, versions
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 
 
 def test_metadata():
@@ -31,7 +31,7 @@ def test_metadata():
         "task_kwargs": {},
         "task_version": 0,
     }
-    numbers = [repr(TUNINGS["queen"][name]) for name in ("slow", "fast")]
+    numbers = [repr(PRESETS["queen"][name]) for name in ("slow", "fast")]
     assert about["presets_sha256"] == [hashlib.sha256(text.encode()).hexdigest() for text in numbers]
     summaries = dataset.summaries()
     assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 7, 8, 9

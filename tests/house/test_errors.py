@@ -182,8 +182,6 @@ CASES = [
         f"unknown preset 'meduim'; did you mean 'medium'? (there are: {PRESETS})",
     ),
     (lambda w: Demonstrator("bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
-    (lambda w: Demonstrator("bastion", froude=0.2), f"froude: bastion has presets alone: {PRESETS}"),
-    (lambda w: Demonstrator("bastion", gait="trott"), f"unknown gait 'trott'; did you mean 'trot'? {GAITS}"),
     (lambda w: w.walker(dm_env.restart(np.zeros(151))), f"{BLOCKS}, got ndarray"),
     (lambda w: w.walker.act({"posture": np.zeros(17)}), f"{BLOCKS}, got dict"),
     (

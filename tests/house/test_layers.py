@@ -57,7 +57,6 @@ THIRD_PARTY = {
     "envs": {"numpy", "mujoco", "dm_control", "dm_env", "gymnasium", "shimmy", "glfw"},
     "envs.sb3": {"numpy", "gymnasium", "stable_baselines3"},
     "cpg": {"numpy"},
-    "cpg.presets": set(),
     "registration": {"gymnasium"},
     "policies": {"numpy", "dm_env"},
     "policies.network": {"numpy"},
@@ -115,7 +114,11 @@ INSIDE = {
     "tasks.modifiers": {"checks", "robots.spec"},
     "tasks.noise": {"models.sizing", "robots.spec"},
     "cpg.law": set(),
-    "cpg.presets": {"robots.gaits"},
+    "cpg.kinematics": {"robots.spec"},
+    "cpg.presets": {
+        *("cpg.balancing", "cpg.planner", "cpg.prescribed", "cpg.sighted", "cpg.steering"),
+        "robots.gaits",
+    },
     "evaluation.statistics": set(),
     "style.metrics": {"rotations", "style.tracks"},
     "style.colours": set(),
@@ -203,9 +206,9 @@ def test_tables_name_what_is_there():
 
 
 def test_only_tasks_and_registration_know_one_task_from_another():
-    """Whoever drives tasks gets them from the registry; registration and demonstrators know walk's rows of numbers.
+    """Whoever drives tasks gets them from the registry; registration knows walk's tables of parameters.
 
-    Those that see know where the ground is scanned.
+    Demonstrators that see know where ground is scanned and in which directions ranges are.
     """
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
@@ -214,7 +217,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     particular = texts - contract
     assert {"tasks.walk", "tasks.commanded", "tasks.following"} <= particular
     for name in modules():
-        know = ("registration", "cpg.steering", "cpg.balancing", "cpg.sighted", "cpg.footholds", "cpg.planner")
+        know = ("registration", "cpg.sighted", "cpg.footholds", "cpg.planner")
         if room(name) != "tasks" and name not in know:
             assert not particular & set(inside(trees()[name])), name
 

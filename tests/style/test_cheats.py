@@ -10,9 +10,9 @@ from tiers import tiers
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.demonstrator import pattern
-from arc_suite.cpg.law import felt, joint_targets, torques
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.law import joint_targets, proprioception, torques
+from arc_suite.cpg.prescribed import pattern
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
 
@@ -21,7 +21,7 @@ class Scripted:
     """A demonstrator that cheats: `stand`, `hop` with all feet at once, `drag` the first leg, or walk `back`."""
 
     def __init__(self, robot, cheat):
-        body, self.preset, self.cheat = ROBOTS[robot], TUNINGS[robot]["medium"], cheat
+        body, self.preset, self.cheat = ROBOTS[robot], PRESETS[robot]["medium"], cheat
         honest = pattern(body, self.preset)
         changes = {"hop": {"offset": 0.0 * honest.offset}, "back": {"sweep": -honest.sweep}}
         self.pattern = honest._replace(**changes.get(cheat, {}))
@@ -31,7 +31,7 @@ class Scripted:
         self.clock = 0
 
     def act(self, observation, rewards):
-        _, angles, velocities = felt(observation, len(self.pattern.offset))
+        _, angles, velocities = proprioception(observation)
         targets = joint_targets(self.pattern, np.full(1, DT * self.clock))
         self.clock += 1
         if self.cheat == "stand":

@@ -67,13 +67,13 @@ def test_random_bodies_walk(seed):
 
 
 def test_the_gait_makes_the_walk():
-    in_phase = Demonstrator(BODY, gait=gaits.Gait(0.6, (0.0,) * 6))
+    in_phase = Demonstrator(arc_suite.load(BODY, "walk", {"duty_factor": 0.6, "phase_offsets": 0.0}))
     assert speed(BODY, demonstrator=in_phase) < 0.05
     assert speed(BODY) > 0.17
 
 
 def test_speed_has_one_knob_that_goes_both_ways():
-    speeds = [speed(BODY, demonstrator=Demonstrator(BODY, froude=froude)) for froude in (-0.25, 0.1, 0.2, 0.3)]
+    speeds = [speed(BODY, demonstrator=Demonstrator(BODY, froude)) for froude in (-0.25, 0.1, 0.2, 0.3)]
     assert speeds[0] < -0.15
     assert 0.05 < speeds[1] < speeds[2] - 0.05 < speeds[3] - 0.1
     presets = [speed(BODY, demonstrator=Demonstrator(BODY, preset)) for preset in ("slow", "medium", "fast")]
@@ -82,9 +82,10 @@ def test_speed_has_one_knob_that_goes_both_ways():
 
 def test_mirrored_bodies_walk_mirrored_tracks():
     body = generator.random_body(6)  # unequal, and drifting to a side
-    gait = fitted_gait(body)
-    positions = track(body, 6.0, Demonstrator(body, gait=gait))
-    mirrored = track(body.mirrored(), 6.0, Demonstrator(body.mirrored(), gait=gait))
+    gait = arc_suite.load(body, "walk").task.settings.parameters
+    gait = {"duty_factor": gait.duty_factor, "phase_offsets": gait.phase_offsets}
+    positions = track(body, 6.0)
+    mirrored = track(body.mirrored(), 6.0, Demonstrator(arc_suite.load(body.mirrored(), "walk", gait)))
     assert np.ptp(positions[:, 1]) > 1e-3 * body.torso.standing_height
     np.testing.assert_allclose(mirrored * (1.0, -1.0), positions, atol=1e-6)
 
@@ -238,16 +239,11 @@ def test_a_demonstrator_serves_batches():
 
 def test_what_a_demonstrator_cannot_do_is_one_line():
     for arguments, message in (
-        (
-            {"robot": "queen", "froude": 0.2},
-            "froude: queen has presets alone: slow, medium, fast, tuned, refined, steered, surefooted, sighted, "
-            "planned",
-        ),
-        ({"robot": BODY, "froude": 0.0}, "froude: expected 0.001 or more, forwards or backwards, got 0.0"),
-        ({"robot": BODY, "froude": math.nan}, "froude: expected a number from -1 to 1, got nan"),
+        ((BODY, 0.0), "froude: expected 0.001 or more, forwards or backwards, got 0.0"),
+        ((BODY, math.nan), "froude: expected a number from -1 to 1, got nan"),
     ):
         with pytest.raises(ValueError) as error:
-            Demonstrator(**arguments)
+            Demonstrator(*arguments)
         assert str(error.value) == message
     with pytest.raises(ValueError, match="^unknown preset 'quick'"):
         Demonstrator(BODY, "quick")

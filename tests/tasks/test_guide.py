@@ -14,6 +14,7 @@ GUIDE = (ROOT / "docs" / "adding_a_task.md").read_text()
 CROUCHING, USING_A_TASK, RAMPS, USING_AN_ARENA = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 COMMANDS = [line for line in re.search(r"```sh\n(.*?)```", GUIDE, re.DOTALL)[1].splitlines() if line]
 
+
 @pytest.fixture
 def package(tmp_path):
     """Writes the guide's modules and returns a function that runs Python beside them."""
