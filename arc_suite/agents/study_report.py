@@ -12,6 +12,7 @@ from arc_suite import evaluation, files
 from arc_suite.agents import studies, study_results, study_strips
 from arc_suite.agents.studies import Row, Study
 from arc_suite.agents.study_results import Result
+from arc_suite.envs.setup import Setup
 
 REPORT, CURVES = "README.md", "curves.png"
 
@@ -71,7 +72,9 @@ def _final(result: Result) -> float:
 
 def _of_all(names: Sequence[str]) -> Callable[[str, _Of], float | None]:
     """The least lead of some algorithms over the paper's demonstrator."""
-    return lambda robot, of: _least([_difference(of(robot, n), evaluation.expert_return("walk", robot)) for n in names])
+    return lambda robot, of: _least(
+        [_difference(of(robot, n), evaluation.expert_return(Setup.of(robot))) for n in names]
+    )
 
 
 def _pairs(robot: str, of: _Of) -> float | None:
@@ -239,7 +242,7 @@ def _is_papers(result: Result) -> bool:
 
 def _expert(row: Row) -> float | None:
     """Return what the paper's demonstrator earns where a run learns; None where the paper does not tell."""
-    return None if row.task_kwargs else evaluation.expert_return(row.task, row.robot)
+    return evaluation.expert_return(Setup.of(row.body, row.task, row.task_kwargs))
 
 
 def _finals(groups: Groups, demonstrators) -> str:

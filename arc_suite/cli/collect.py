@@ -1,4 +1,4 @@
-"""Collect a dataset in Minari's format, or replay one and compare it to the bit.
+"""Collect a dataset in Minari's format, or replay one and check that it is bit-equal.
 
 Both use all cores. Killed or interrupted, the same command continues. Minari keeps datasets in
 ~/.minari/datasets, or where MINARI_DATASETS_PATH points; `minari list local` shows them.
@@ -7,7 +7,7 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1
   arc-suite collect --spec examples/spider.json --policy my_package.policies:make
   arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --checkpoint 200000
-  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --grade medium
+  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --quality medium
   arc-suite collect --verify arc_suite/queen/walk/cpg-medium-v0
 
 --verify imports no module that the dataset names: --task and --set name those that it needs, as in collecting.
@@ -31,11 +31,11 @@ _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all in turn.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_integer("checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", 0)
 flags.DEFINE_enum(
-    "grade",
+    "quality",
     None,
-    checkpoints.GRADES,
-    "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of what "
-    "the best one does; expert, the latest; replay, all checkpoints in turn.",
+    checkpoints.QUALITIES,
+    "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of the "
+    "best one's return; expert, the latest; replay, all checkpoints in turn.",
 )
 flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
@@ -100,19 +100,19 @@ def main() -> None:
 
 
 def chosen() -> tuple[str, str]:
-    """Return the policy, and what the dataset's id calls it: "" for the policy's name.
+    """Return the policy and its label in the dataset's id, "" for the policy's name.
 
     Raises:
-        ValueError: --checkpoint and --grade together, or a run without the checkpoints asked for; one line.
+        ValueError: --checkpoint and --quality together, or a run without such a checkpoint; one line.
     """
-    if FLAGS.checkpoint is None and FLAGS.grade is None:
+    if FLAGS.checkpoint is None and FLAGS.quality is None:
         return FLAGS.policy, ""
-    if FLAGS.checkpoint is not None and FLAGS.grade is not None:
-        raise ValueError("expected one of --checkpoint and --grade, got both")
+    if FLAGS.checkpoint is not None and FLAGS.quality is not None:
+        raise ValueError("expected one of --checkpoint and --quality, got both")
     run = pathlib.Path(FLAGS.policy)
     if FLAGS.checkpoint is not None:
-        policy, grade = str(checkpoints.at(run, FLAGS.checkpoint)), str(FLAGS.checkpoint)
+        policy, label = str(checkpoints.at(run, FLAGS.checkpoint)), str(FLAGS.checkpoint)
     else:
-        policy, grade = checkpoints.graded(run, FLAGS.grade), FLAGS.grade
+        policy, label = checkpoints.of_quality(run, FLAGS.quality), FLAGS.quality
     agent = checkpoints.agents(run / checkpoints.FOLDER)[-1]
-    return policy, f"{agent.algorithm}-{agent.seed}-{grade}"
+    return policy, f"{agent.algorithm}-{agent.seed}-{label}"

@@ -1,7 +1,7 @@
-"""Judge a policy: the task's own figures, then return and length of its episodes.
+"""Evaluate a policy: the task's own metrics, then return and length of its episodes.
 
-Walk's figures are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
-return stands beside that of the paper's demonstrator, where the task is the paper's. IQM is the
+Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
+return is compared with that of the paper's demonstrator, where the task is the paper's. IQM is the
 interquartile mean of the return, with a stratified bootstrap interval.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
@@ -13,9 +13,8 @@ from collections.abc import Mapping
 
 from absl import flags
 
-import arc_suite
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, setups
 from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
@@ -45,15 +44,13 @@ def line(first: str, figures: Mapping[str, str], *cells: str) -> str:
 
 def main() -> None:
     """Print the table and write the JSON."""
-    walkers = bodies(_ROBOT)
-    task_name, task_kwargs = task()
+    asked = setups(_ROBOT)
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     players = {}
-    for name, body in walkers.items():
-        environment = arc_suite.load(body, task_name, task_kwargs)
+    for name, setup in asked.items():
+        environment, body = setup.load(), setup.body
         players[name] = environment, policies.policy(FLAGS.policy, body, FLAGS.preset, task=environment.task.definition)
-    # The paper's demonstrators walked by the published numbers; with others there is nothing to compare with.
-    experts = {name: None if task_kwargs else evaluation.expert_return(task_name, name) for name in walkers}
+    experts = {name: evaluation.expert_return(setup) for name, setup in asked.items()}
     with files.writing_json(FLAGS.json) as file:
         reports = {}
         width = max(12, *map(len, players))
@@ -66,8 +63,8 @@ def main() -> None:
             reports[robot] = report(episodes, experts[robot])
             print(row(robot.ljust(width), reports[robot]), flush=True)
         file.update(
-            task=task_name,
-            task_kwargs=task_kwargs,
+            task=setup.kind.name,
+            task_kwargs=setup.task_kwargs,
             policy=FLAGS.policy,
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,

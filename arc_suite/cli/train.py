@@ -25,6 +25,7 @@ from arc_suite.agents import algorithms, run_folder
 from arc_suite.agents.training import Run, train
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, named_values, only_body, task
 from arc_suite.cli.program import progress, use_one_thread
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, onnx_file
 
 FLAGS = flags.FLAGS
@@ -83,7 +84,7 @@ def picture(run: Run, folder: Path) -> Callable:
         return lambda step, figures: None
     from arc_suite.agents import plots
 
-    expert = None if run.task_kwargs else evaluation.expert_return(run.task, run.body.name)
+    expert = evaluation.expert_return(Setup.of(run.body, run.task, run.task_kwargs))
     lines = {} if expert is None else {"the paper's demonstrator": expert}
 
     def draw(step, figures):

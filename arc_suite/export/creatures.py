@@ -64,7 +64,7 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
 
 
 def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
-    """Return what is known of clips, by name of the animation: figures, and when feet touch down and lift off."""
+    """Return, JSON-able, the metrics and foot contact events of clips by name of the animation."""
     told = {name: _told(clip) for clip in clips for name in _named(clip, ROOT_MOTIONS[root_motion])}
     return {
         "body": body.name,
@@ -84,9 +84,9 @@ def _told(clip: Clip) -> dict[str, Any]:
         "forward_speed": forward,
         "left_speed": left,
         "turn_rate": turning,
-        "footfalls": [
-            {"foot": footfall.foot, "event": footfall.event, "time": round(footfall.time, 6)}
-            for footfall in clip.footfalls
+        "foot_contacts": [
+            {"foot": contact.foot, "event": contact.event, "time": round(contact.time, 6)}
+            for contact in clip.foot_contacts
         ],
     }
 

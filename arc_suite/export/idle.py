@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from arc_suite.cpg.kinematics import Legs
-from arc_suite.export.motions import Motion
+from arc_suite.export.root_motion import Motion
 from arc_suite.models.sizing import GRAVITY, control_timestep
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body

@@ -1,4 +1,4 @@
-"""What is around a body in a recorded episode, as plain data: the ground, obstacles, and marks of what is asked."""
+"""Scenery of a recorded episode as plain data: the ground, obstacles, and debug markers of the command."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from arc_suite.export.parts import KINDS
 from arc_suite.marks import Mark
 from arc_suite.style.tracks import Track
 
-_MARGIN = 12.0  # standing heights of ground about the way
+_MARGIN = 12.0  # standing heights of ground around the path
 _SAME = 1e-3  # of the standing height, by which an episode that is repeated may differ from the recorded one
 
 

@@ -1,4 +1,4 @@
-"""Pictures of tracks: footfalls against the schedule, reward by term, speed against target, path of the torso.
+"""Pictures of tracks: foot contacts against the schedule, reward by term, speed against target, path of the torso.
 
 Each function takes labelled tracks, one or two to compare, and returns a figure. Needs matplotlib
 (extra `plot`).
@@ -37,7 +37,7 @@ _LOOK = {
 }
 _WIDTH = 9.5  # inches
 _BELOW = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}  # a legend
-_WINDOW = 4.0  # s of footfalls
+_WINDOW = 4.0  # s of foot contacts
 
 
 def _drawn(draw):

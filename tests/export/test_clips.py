@@ -12,7 +12,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import export, policies
 from arc_suite.envs.setup import Setup
-from arc_suite.export import footfalls, recordings
+from arc_suite.export import foot_contacts, recordings
 from arc_suite.export.clips import CLIPS
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import policy
@@ -224,7 +224,7 @@ def test_presets_return(robot, preset):
     speed = np.hypot(*np.diff(path, axis=0).T).mean() / recording.step
     assert np.hypot(*clip.motion.twist[:2]) == pytest.approx(speed, rel=0.01)
     if preset == "tuned":
-        assert len(clip.footfalls) == 2 * len(body.legs) * clip.cycles
+        assert len(clip.foot_contacts) == 2 * len(body.legs) * clip.cycles
         assert clip.cycles == 3
 
 
@@ -232,9 +232,9 @@ def test_presets_return(robot, preset):
 def test_random_bodies_step_once_a_cycle(seed):
     body = random_body(seed)
     (clip,) = export.clips(Setup(body), ["walk"])
-    falls = [(footfall.foot, footfall.event) for footfall in clip.footfalls]
+    falls = [(contact.foot, contact.event) for contact in clip.foot_contacts]
     for foot in body.foot_names:
-        for event in (footfalls.TOUCH_DOWN, footfalls.LIFT_OFF):
+        for event in (foot_contacts.TOUCH_DOWN, foot_contacts.LIFT_OFF):
             assert falls.count((foot, event)) == clip.cycles
 
 
@@ -244,9 +244,9 @@ def test_clips_are_in_step(robot):
     first = ROBOTS[robot].foot_names[0]
     assert clips["walk"].cycles == clips["turn_left"].cycles
     for name in ("walk", "turn_left"):
-        assert clips[name].footfalls[0].time == 0.0
-        assert (first, footfalls.TOUCH_DOWN, 0.0) in [(f.foot, f.event, f.time) for f in clips[name].footfalls]
-        times = [footfall.time for footfall in clips[name].footfalls]
+        assert clips[name].foot_contacts[0].time == 0.0
+        assert (first, foot_contacts.TOUCH_DOWN, 0.0) in [(f.foot, f.event, f.time) for f in clips[name].foot_contacts]
+        times = [contact.time for contact in clips[name].foot_contacts]
         assert times == sorted(times) and times[-1] < clips[name].motion.seconds
 
 
@@ -258,9 +258,9 @@ def test_soles_stand_on_the_ground(robot):
         soles = feet_of(body, clip.motion.qpos())[..., 2] - [leg.foot.radius for leg in body.legs]
         stance = np.zeros(soles.shape, bool)
         for leg, foot in enumerate(body.foot_names):
-            events = [footfall for footfall in clip.footfalls if footfall.foot == foot]
-            for time_of_down in (e.time for e in events if e.event == footfalls.TOUCH_DOWN):
-                later = [e.time for e in events if e.event == footfalls.LIFT_OFF and e.time > time_of_down]
+            events = [contact for contact in clip.foot_contacts if contact.foot == foot]
+            for time_of_down in (e.time for e in events if e.event == foot_contacts.TOUCH_DOWN):
+                later = [e.time for e in events if e.event == foot_contacts.LIFT_OFF and e.time > time_of_down]
                 end = min(later, default=clip.motion.seconds)
                 stance[:, leg] |= (clip.times >= time_of_down) & (clip.times <= end)
         assert abs(np.median(soles[stance])) < 0.002 * body.torso.standing_height
@@ -269,7 +269,7 @@ def test_soles_stand_on_the_ground(robot):
 @pytest.mark.parametrize("robot", EACH)
 def test_idle_breathes_on_its_feet(robot):
     body, clip = ROBOTS[robot], made(robot)["idle"]
-    assert clip.cycles == 0 and not clip.footfalls and not clip.moves
+    assert clip.cycles == 0 and not clip.foot_contacts and not clip.moves
     height = body.torso.standing_height
     feet = feet_of(body, clip.motion.qpos())
     assert np.ptp(feet, axis=0).max() < 0.012 * height
