@@ -15,9 +15,10 @@ from numpy.testing import assert_array_equal
 from tiers import never, tiers, turn
 
 import arc_suite
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
-JOINTS = {"queen": 18, "bastion": 12, "tick": 18, "leaper": 12}
+JOINTS = {name: len(body.joint_names) for name, body in ROBOTS.items()}
 # Robots take turns from task to task: one in `make check`, another in `make test`, the others in `make check-long`.
 every_task = pytest.mark.parametrize(
     ("domain", "task"),
