@@ -9,8 +9,8 @@ from arc_suite import registry
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg.demonstrator import ahead, pattern
 from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
-from arc_suite.models.looks import LOOKS
-from arc_suite.models.looks.look import Look
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Visuals
 from arc_suite.registry import MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -24,7 +24,7 @@ def register(
     body: Body | None = None,
     walk: Mapping[str, Any] | None = None,
     tuning: Mapping[str, Preset] | None = None,
-    look: Look | None = None,
+    look: Visuals | None = None,
     tasks: Iterable[type[Task]] = (),
     arenas: Mapping[str, Any] | None = None,
 ) -> None:
@@ -89,7 +89,7 @@ def _register_body(body, row, tuning, look) -> None:
     if tuning is not None:
         _check_tuning(body, tuning)
     ROBOTS[body.name] = body
-    for table, value in ((walk.SETTINGS, row), (TUNINGS, tuning), (LOOKS, look)):
+    for table, value in ((walk.SETTINGS, row), (TUNINGS, tuning), (VISUALS, look)):
         if value is not None:
             table[body.name] = value
 

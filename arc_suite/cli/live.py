@@ -8,7 +8,7 @@ import glfw
 import mujoco
 import numpy as np
 
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.simulation.pictures import Decorated, geom_of
 
 _PRESS = 0.25  # of the body's own speed, by which an arrow changes the command
@@ -89,7 +89,7 @@ class Live:
         data.mocap_pos[:] = self._environment.physics.data.mocap_pos
         mujoco.mj_forward(model, data)
 
-    def marks(self, share: float) -> list[Mark]:
+    def marks(self, share: float) -> list[Marker]:
         """Return what the task asks for, a share of the latest control step after its start, 0 to 1."""
         before, now = self._marks
         if [mark._replace(start=0, end=0) for mark in before] != [mark._replace(start=0, end=0) for mark in now]:
@@ -110,7 +110,7 @@ class Live:
         if self.wanted is not None:
             self._environment.command("command", self.wanted)
 
-    def _asked(self) -> list[Mark]:
+    def _asked(self) -> list[Marker]:
         return self._environment.task.marks(self._environment.physics)
 
     def _qpos(self) -> np.ndarray:

@@ -206,7 +206,7 @@ class Env(DmControlCompatibilityV0):
 
             self._window = Window(decorated, **self.render_kwargs)
             weakref.finalize(self, self._window.close)  # before the interpreter takes GLFW apart
-        self._window.show(self.dt, decorated.marks)
+        self._window.show(self.dt, decorated.markers)
 
     def __getstate__(self):
         return self.__dict__ | {"_window": None}

@@ -8,7 +8,7 @@ import glfw
 import mujoco
 from gymnasium.envs.mujoco.mujoco_rendering import WindowViewer
 
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.simulation import opengl, pictures
 
 
@@ -44,7 +44,7 @@ class Window:
             self._viewer.cam.type, self._viewer.cam.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
         self._due = time.monotonic()
 
-    def show(self, duration: float, marks: Iterable[Mark] = ()) -> None:
+    def show(self, duration: float, marks: Iterable[Marker] = ()) -> None:
         """Draw the present state and marks, and return `duration` seconds after the last picture was due."""
         if self._viewer is None:
             return

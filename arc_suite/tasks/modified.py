@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots import mirror
@@ -293,7 +293,7 @@ class Modified(Task):
         figures = self.task.progress(memory)
         return figures if "fell" in figures else figures | {"fell": memory.terminated * 1.0}
 
-    def marks(self, memory, readings: Readings) -> list[Mark]:
+    def marks(self, memory, readings: Readings) -> list[Marker]:
         """Return the other task's."""
         return self.task.marks(memory, readings)
 

@@ -15,7 +15,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.arenas import Arena
 from arc_suite.arenas.pillars import CELLS, COUNT, PITCH, RADIUS, Pillars
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import steer
 from arc_suite.tasks.contract import Start
@@ -182,11 +182,11 @@ class Navigate(steer.Steer):
         hit = numpy.where((chord >= 0.0) & (along >= 0.0), along - numpy.sqrt(chord.clip(0.0)), SIGHT)
         return (hit.min(axis=-1) / SIGHT).clip(0.0, 1.0)
 
-    def marks(self, memory: Memory, readings: Felt) -> list[Mark]:
+    def marks(self, memory: Memory, readings: Felt) -> list[Marker]:
         """Return steer's arrows, and the goal as a disc within which it is reached."""
         unit = self.scene.arena.unit
         middle = np.array((*self.goal(memory), 0.0))
-        disc = Mark("cylinder", middle, middle + (0.0, 0.0, FLAT * unit), NEAR * unit, GOAL)
+        disc = Marker("cylinder", middle, middle + (0.0, 0.0, FLAT * unit), NEAR * unit, GOAL)
         return [*super().marks(memory, readings), disc]
 
     def progress(self, memory: Memory) -> dict:

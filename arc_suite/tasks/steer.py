@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.standing import standing
 from arc_suite.tasks import mirrors, terms, walk
@@ -205,7 +205,7 @@ class Steer(walk.Walk):
         """Return as terminated who fell; none is truncated."""
         return memory.fell, False
 
-    def marks(self, memory: Memory, readings: Readings) -> list[Mark]:
+    def marks(self, memory: Memory, readings: Readings) -> list[Marker]:
         """Return arrows over the torso: the velocity that is asked for, and that to the side of what is R ahead.
 
         The latter is what turns. At the target velocity an arrow is R long.
@@ -216,8 +216,8 @@ class Steer(walk.Walk):
         ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
         aside = np.array((-ahead[1], ahead[0], 0.0))
         arrows = (middle, forward * ahead + left * aside, GOING), (middle + unit * ahead, turn * aside, TURNING)
-        arrows = [Mark("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
-        return [Mark("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, GOING), *arrows]
+        arrows = [Marker("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
+        return [Marker("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, GOING), *arrows]
 
     def progress(self, memory: Memory) -> dict:
         """Return the mean `tracking`, whether the body `fell`, and `gait_compliance`."""

@@ -43,8 +43,8 @@ def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.xml"]
 
 
-def test_looks_dump_and_reload_bit_for_bit():
-    done = build_model("--robot", "queen", "--looks")
+def test_visuals_dump_and_reload_bit_for_bit():
+    done = build_model("--robot", "queen", "--visuals")
     assert (done.returncode, done.stderr) == (0, "")
     reloaded = mujoco.MjModel.from_xml_string(done.stdout)
     assert saved(reloaded) == saved(compiled(ROBOTS["queen"], decorated=True))
