@@ -114,7 +114,7 @@ def test_three_links_are_the_default():
         (["--legs=six"], "flag --legs=six: invalid literal for int() with base 10: 'six'"),
         (["--legs=6", "--links=0"], "flag --links=0: 0 is not an integer in the range [1, 4]"),
         (["--legs=6", "--links=5"], "flag --links=5: 5 is not an integer in the range [1, 4]"),
-        (["--robot=quen"], "flag --robot=quen: value should be one of <queen|bastion|tick|leaper>"),
+        (["--robot=quen"], f"flag --robot=quen: value should be one of <{'|'.join(ROBOTS)}>"),
         (["--robot=queen", "--links=2"], "--links=2: goes with --legs or --seed, not with --robot"),
         ([], f"{SOURCES}, got none"),
         (["--robot=queen", "--legs=6"], f"{SOURCES}, got --robot and --legs"),

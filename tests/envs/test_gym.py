@@ -25,6 +25,7 @@ from gymnasium.wrappers import (
 from tiers import never, tiers
 
 import arc_suite
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.walk import BONUSES, COSTS
 
@@ -404,7 +405,7 @@ def test_actions_out_of_range_are_clipped():
         ),
         (
             {"domain_name": "quen"},
-            "unknown domain 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
+            f"unknown domain 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
         ),
         ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? (there are: {', '.join(TASKS)})"),
     ],

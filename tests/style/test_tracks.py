@@ -11,6 +11,7 @@ from arc_suite import evaluation
 from arc_suite.arenas import FLAT
 from arc_suite.arenas.bumps import Bumps
 from arc_suite.cpg import Demonstrator
+from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
 from arc_suite.style.tracks import lowest_point_velocities, mirrors
@@ -35,9 +36,7 @@ def test_tracks_agree_with_the_reward(robot):
     assert_array_equal(track.joint_velocities[-1], environment.physics.data.qvel[6:])
     gears = environment.physics.model.ptr.actuator_gear[:, 0]
     assert_allclose(track.torques, track.actions * gears)
-    assert track.mass == pytest.approx(
-        {"queen": 12.0866, "bastion": 5.3677, "leaper": 0.2224, "tick": 0.0814}[robot], 1e-3
-    )
+    assert track.mass == pytest.approx(standing(ROBOTS[robot]).mass, 1e-9)
     assert 0.05 < track.contacts.mean() < 0.95
     assert (track.foot_positions[track.contacts][:, 2] < track.foot_radii[0] + 0.011).all()  # within the contact margin
 

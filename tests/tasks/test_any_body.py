@@ -153,7 +153,7 @@ def test_a_domain_is_a_name_a_body_or_a_file(tmp_path):
         (
             "queeen",
             ValueError,
-            "unknown domain 'queeen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
+            f"unknown domain 'queeen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
         ),
         (str(tmp_path / "a.json"), OSError, f"cannot read {tmp_path / 'a.json'}: no such file or directory"),
     ):

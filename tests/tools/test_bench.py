@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 import arc_suite
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "bench.py"
@@ -87,7 +88,7 @@ def is_a_plot(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--robots=quen"], "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)"),
+        (["--robots=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})"),
         (["--rows=1,many"], "--rows: expected positive integers with commas between, got '1,many'"),
         (["--workers=0"], "--workers: expected positive integers with commas between, got '0'"),
         (["--document=missing.md"], "--document: no file missing.md"),
@@ -102,7 +103,7 @@ def test_bad_flags_are_one_line_errors(arguments, message, tmp_path):
     assert not (tmp_path / "results.json").exists()
 
 
-@pytest.mark.parametrize("robot", ["queen", "bastion", "tick", "leaper"])
+@pytest.mark.parametrize("robot", ROBOTS)
 def test_ordinary_environment_has_the_same_observation_and_reward(robot, tmp_path):
     path = tmp_path / "model.xml"
     path.write_text(ordinary.full_model(robot).to_xml_string())
