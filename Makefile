@@ -30,9 +30,9 @@ INSTALLED := $(VENV)/installed
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	mkdir -p out
-	$(PYTHON) tools/evaluate.py --robot queen --policy cpg --episodes 1
-	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.png
-	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.mp4
+	$(VENV)/bin/arc-suite evaluate --robot queen --policy cpg --episodes 1
+	$(VENV)/bin/arc-suite render --robot queen --policy cpg --output out/queen.png
+	$(VENV)/bin/arc-suite render --robot queen --policy cpg --output out/queen.mp4
 
 # Tests run in as many processes as there are cores; whoever has none left takes some from the others.
 PARALLEL := -n auto --dist worksteal
@@ -144,7 +144,7 @@ bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md
 
 census: $(INSTALLED)
-	$(PYTHON) tools/walk_census.py --count 500
+	$(VENV)/bin/arc-suite census --count 500
 
 obedience: $(INSTALLED)
 	$(PYTHON) tests/obedience.py

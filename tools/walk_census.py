@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/census.py."""
-
-from arc_suite.cli import census, program
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(census.main)
+    main("census")

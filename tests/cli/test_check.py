@@ -1,4 +1,4 @@
-"""tools/check.py tells what is wrong with a body in a spec file."""
+"""`arc-suite check` tells what is wrong with a body in a spec file."""
 
 import json
 from pathlib import Path
@@ -9,11 +9,10 @@ import pytest
 from arc_suite.robots import generator, spec_files
 
 ROOT = Path(__file__).parents[2]
-TOOL = ROOT / "tools" / "check.py"
 
 
 def check(*arguments):
-    return programs.run(TOOL, *arguments)
+    return programs.arc_suite("check", *arguments)
 
 
 @pytest.fixture
@@ -43,7 +42,7 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
     done = check(path)
     line = f"{path}: feet hang 0.8 m above the floor: standing_height 0.4 fits\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, line, "")
-    summary = programs.run(ROOT / "tools" / "build_model.py", "--spec", path, "--summary").stdout
+    summary = programs.arc_suite("build_model", "--spec", path, "--summary").stdout
     assert summary.splitlines()[-1].split(maxsplit=1) == [
         "flaw",
         "feet hang 0.8 m above the floor: standing_height 0.4 fits",
@@ -60,11 +59,11 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
 )
 def test_bad_arguments_are_one_line(arguments, message):
     done = check(*arguments)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"check.py: {message}\n")
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite check: {message}\n")
 
 
 def test_a_file_that_holds_no_body_is_one_line(path):
     write(path, standing_height=-1)
     done = check(path)
-    line = f"check.py: {path}: torso.standing_height: expected a number from 1e-06 to 100, got -1\n"
+    line = f"arc-suite check: {path}: torso.standing_height: expected a number from 1e-06 to 100, got -1\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)

@@ -1,8 +1,7 @@
-"""tools/evaluate.py, run as a user runs it."""
+"""`arc-suite evaluate`, run as a user runs it."""
 
 import importlib.metadata
 import json
-import pathlib
 import re
 
 import programs
@@ -11,11 +10,9 @@ from returns import RETURNS
 
 from arc_suite.robots import ROBOTS
 
-TOOL = pathlib.Path(__file__).parents[2] / "tools" / "evaluate.py"
-
 
 def evaluate(*arguments):
-    return programs.run(TOOL, *arguments)
+    return programs.arc_suite("evaluate", *arguments)
 
 
 def test_table_of_all_robots():
@@ -82,22 +79,12 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
 def test_json_is_refused_before_the_work_starts():
     result = evaluate("--json=/nowhere/a.json")
     assert (result.returncode, result.stdout) == (1, "")
-    assert result.stderr == "evaluate.py: cannot write /nowhere/a.json: no such file or directory\n"
+    assert result.stderr == "arc-suite evaluate: cannot write /nowhere/a.json: no such file or directory\n"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ["--robot=quen"],
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)",
-        ),
-        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
-        (
-            ["--policy=zero", "--preset=fats"],
-            "unknown preset 'fats'; did you mean 'fast'? "
-            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced)",
-        ),
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
         (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
         (["--episode=3"], "Unknown command line flag 'episode'. Did you mean: episodes ?"),
@@ -107,12 +94,12 @@ def test_json_is_refused_before_the_work_starts():
 def test_bad_input_is_one_line_and_exit_status_1(arguments, message):
     result = evaluate(*arguments)
     assert result.returncode == 1
-    assert result.stderr == f"evaluate.py: {message}\n"
+    assert result.stderr == f"arc-suite evaluate: {message}\n"
     assert result.stdout == ""
 
 
 def test_help_shows_an_example_and_the_flags():
     result = evaluate("--help")
-    assert f"python {TOOL} --robot all --policy cpg" in result.stdout
+    assert "arc-suite evaluate --robot all --policy cpg" in result.stdout
     for flag in ("--robot", "--policy", "--preset", "--episodes", "--seed", "--json"):
         assert flag in result.stdout

@@ -88,11 +88,11 @@ def test_what_the_caller_names_is_imported(module):
     named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")
     assert run(*named).returncode == 0
     assert run(f"--verify={ID}").stderr == (
-        f"collect.py: dataset {ID!r}: task 'strolling:stroll': files import nothing; import 'strolling' first\n"
+        f"arc-suite collect: dataset {ID!r}: task 'strolling:stroll': files import nothing; import 'strolling' first\n"
     )
     assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, equal to the bit\n"
     assert run(f"--verify={ID}", "--set=arena=strolling:lawn", "--task=walk").stderr == (
-        f"collect.py: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
+        f"arc-suite collect: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
     )
 
 

@@ -34,7 +34,7 @@ ROOMS = (
     ("export",),  # to take away
     ("agents",),  # who learns
     ("cli",),  # programs
-    ("doctor", "__main__"),  # that Python starts by name
+    ("__main__",),  # that Python starts by name
 )
 HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 
