@@ -147,6 +147,7 @@ def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
     assert (tmp_path / "file").read_text() == "kept"
 
 
+@pytest.mark.slow
 def test_a_task_brings_its_ground(tmp_path):
     path = tmp_path / "stairs.xml"
     result = build_model("--robot=tick", "--task=stairs", "--set=difficulty=1", f"--output={path}")

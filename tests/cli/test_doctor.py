@@ -84,6 +84,7 @@ def test_no_picture(variables, line):
     assert (status, verdict, found["picture"]) == (1, "1 problem", ("PROBLEM", line))
 
 
+@pytest.mark.slow
 def test_a_driver_that_crashes_takes_only_the_picture_along(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(
         "import os, sys\nif 'doctor' in sys.orig_argv[-1] and '-c' in sys.orig_argv: os.abort()\n"

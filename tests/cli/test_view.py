@@ -217,6 +217,7 @@ def run(code, **environment):
     return subprocess.run(command, env=kept | environment, capture_output=True, text=True, timeout=300)
 
 
+@pytest.mark.slow
 def test_without_a_display_a_line_says_what_does_without():
     done = run(["-m", "arc_suite", "view", "--robot=tick"])
     assert (done.returncode, done.stdout) == (1, "")

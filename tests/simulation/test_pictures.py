@@ -39,6 +39,7 @@ def test_the_ground_and_the_reward_are_seen():
         assert not np.array_equal(view, views[index - 1])
 
 
+@pytest.mark.slow
 def test_obstacles_are_seen_where_they_stand():
     def drawn(*place):
         return picture(BODY, Obstacle(), qpos, 60, 80, "tracking", mocap_pos=np.array([place]))
