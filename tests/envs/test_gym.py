@@ -34,11 +34,13 @@ ROOT = pathlib.Path(__file__).parents[2]
 IDS = [f"arc_suite/{robot}-walk-v0" for robot in ("queen", "bastion", "tick", "leaper")]
 SIZES = {"queen": (199, 18), "bastion": (151, 12), "tick": (199, 18), "leaper": (163, 12)}
 PICTURES = ("rgb_array", "depth_array")
-EVERY_ID = pytest.mark.parametrize("env_id", IDS)
 
 
 def robot(env_id):
     return env_id.removeprefix("arc_suite/").removesuffix("-walk-v0")
+
+
+EVERY_ID = pytest.mark.parametrize("env_id", tiers(IDS, lambda env_id: robot(env_id) == "leaper"))
 
 
 def actions(env, count, seed=0):
@@ -471,6 +473,7 @@ def test_impossible_sizes_are_one_line_when_the_environment_is_made(make, size):
         make(IDS[0], render_mode="rgb_array", **size)
 
 
+@pytest.mark.slow
 def test_pictures_of_1920_x_1080():
     env = gymnasium.make(IDS[0], render_mode="rgb_array", width=1920, height=1080)
     env.reset(seed=0)

@@ -49,6 +49,7 @@ def test_guide(package):
     assert package(USING + checks) == ["(107,) 0.15"]
 
 
+@pytest.mark.slow
 def test_guides_robot_walks(package):
     code = (
         "import arc_suite, hopper\n"
@@ -240,6 +241,7 @@ def test_mistakes_are_one_line_and_register_nothing(arguments, message):
     assert [dict(table) for table in tables] == before
 
 
+@pytest.mark.slow
 def test_the_module_is_named_and_not_guessed(package):
     """A wrapper around `register` changes nothing of what other processes import."""
     code = """
