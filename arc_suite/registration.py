@@ -14,8 +14,10 @@ from arc_suite.models.visuals.spec import Visuals
 from arc_suite.registry import MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import TASKS, Task, walk
+from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.contract import STEPS
+from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
+from arc_suite.tasks.walk import Walk
 
 
 def register(
@@ -37,8 +39,8 @@ def register(
         module: whose import makes this call, `__name__` there; processes that do not share this
             one's memory import it to know the names too. None where nobody else needs them.
         body: of the robot; its name becomes a domain.
-        walk: the robot's row of numbers in the task walk: keys and units as in `tasks.walk.SETTINGS`,
-            and any of `tasks.walk.COMMON`; noise that it does not set is fitted, and None has all
+        walk: the robot's row of numbers in the task walk: keys and units as in `tasks.parameters.PARAMETERS`,
+            and any of `tasks.parameters.COMMON`; noise that it does not set is fitted, and None has all
             numbers fitted to the body.
         tuning: presets of a demonstrator of the robot by name, slow, medium and fast among them; None
             to have them fitted likewise.
@@ -89,16 +91,16 @@ def _register_body(body, row, tuning, look) -> None:
     if tuning is not None:
         _check_tuning(body, tuning)
     ROBOTS[body.name] = body
-    for table, value in ((walk.SETTINGS, row), (TUNINGS, tuning), (VISUALS, look)):
+    for table, value in ((PARAMETERS, row), (TUNINGS, tuning), (VISUALS, look)):
         if value is not None:
             table[body.name] = value
 
 
 def _check_row(body: Body, row: Mapping[str, Any]) -> None:
-    needed = walk.SETTINGS["queen"].keys() - {"weights", *walk.SHARED_NOISE}
+    needed = PARAMETERS["queen"].keys() - {"weights", *SHARED_NOISE}
     if missing := sorted(needed - row.keys()):
         raise ValueError(f"walk: {body.name} has no {' and no '.join(missing)}")
-    walk.settings(body, row)
+    Walk.fitted(body, row)
 
 
 def _check_tuning(body: Body, tuning: Mapping[str, Preset]) -> None:
@@ -124,11 +126,8 @@ def register_ids() -> None:
                 entry_point="arc_suite.envs.gym:Env",
                 vector_entry_point="arc_suite.envs.vector:VectorEnv",
                 max_episode_steps=STEPS,
-                kwargs={"domain_name": importable("domain", domain_name), "task_name": importable("task", task_name)},
+                kwargs={
+                    "domain_name": registry.importable("domain", domain_name),
+                    "task_name": registry.importable("task", task_name),
+                },
             )
-
-
-def importable(kind: str, name: str) -> str:
-    """Return a name as another process can look it up: with the module that registers it, if there is one."""
-    module = MODULES.get((kind, name))
-    return name if module is None else f"{module}:{name}"

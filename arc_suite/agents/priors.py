@@ -33,7 +33,7 @@ def mapped(stage: Stage, task: Task) -> Replay:
         OSError: the disk is full, or the like; one line.
     """
     dataset = _opened(stage.prior)
-    settings = dataset.settings
+    settings = dataset.settings.setup
     if settings.body != stage.body:
         raise ValueError(f"prior {stage.prior!r}: of {settings.body.name}, and not of {stage.body.name}")
     asked, found = (json.dumps({"task": name, **kwargs}) for name, kwargs in _tasks(stage, settings))

@@ -10,6 +10,7 @@ from arc_suite import checks, registry
 from arc_suite.agents import algorithms
 from arc_suite.agents.training import Run
 from arc_suite.data import Settings
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
@@ -85,7 +86,7 @@ class Row(NamedTuple):
     @property
     def prior_settings(self) -> Settings:
         """The settings of its prior data."""
-        return Settings(self.body, "cpg", (self.prior.preset,), task=self.task, task_kwargs=self.task_kwargs)
+        return Settings(Setup.of(self.body, self.task, self.task_kwargs), "cpg", (self.prior.preset,))
 
     @property
     def prior_id(self) -> str | None:

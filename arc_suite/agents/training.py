@@ -20,7 +20,7 @@ from arc_suite.agents.algorithms import Algorithm
 from arc_suite.agents.calls import Call, advancing, alone
 from arc_suite.agents.learner import ENVIRONMENT, MOST_SEEDS, Diverged, Learner, Stage
 from arc_suite.agents.run_folder import RunFolder
-from arc_suite.data.settings import model_sha256
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
 from arc_suite.policies.checkpoints import Agent
@@ -96,7 +96,7 @@ class Run(NamedTuple):
             "episodes": evaluation.EPISODES,
             "prior": self.prior,
             "body_sha256": hashlib.sha256(body_to_json(self.body).encode()).hexdigest(),
-            "model_sha256": model_sha256(self.body, self.task, self.task_kwargs),
+            "model_sha256": Setup.of(self.body, self.task, self.task_kwargs).provenance()["model_sha256"],
             "versions": versions.recorded() | {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")},
         }
 
@@ -235,7 +235,7 @@ class _Judge:
 
     def __call__(self, run_files: RunFolder, learner: Learner) -> float:
         run, task = self._run, self._environment.task
-        policy = Network(tuple(learner.policy()), run.robot, task.name, dict(run.task_kwargs), dict(task.blocks))
+        policy = Network(tuple(learner.policy()), Setup.of(run.body, run.task, run.task_kwargs), dict(task.blocks))
         network.save(run_files.path / network.FILE, policy)
         kept = files.folder(run_files.path / checkpoints.FOLDER / str(learner.step))
         network.save(kept / network.FILE, policy)

@@ -2,6 +2,7 @@
 
 import dataclasses
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
 from dm_control import mjcf
 
@@ -13,7 +14,12 @@ class Arena(ABC):
     The start is at the origin, x the way to go. Heights are functions of arrays with any leading
     axes, of operators and methods alone or of the array's own namespace, so that one text serves
     NumPy and JAX.
+
+    Attributes:
+        is_level: whether the ground is the plane z = 0, which pushes out a foot that starts below it.
     """
+
+    is_level: ClassVar[bool] = False
 
     @abstractmethod
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
@@ -28,18 +34,9 @@ class Arena(ABC):
     def height(self, x, y):
         """Return the height of the ground (...) under points x (...) and y (...), m."""
 
-    def clearance(self, points):
-        """Return the heights (...) of points (..., 3) over the ground under them, m."""
-        return points[..., 2] - self.height(points[..., 0], points[..., 1])
-
     def torso_clearance(self, positions):
         """Return the heights (...) of torsos at positions (..., 3) over the ground that counts for them, m."""
-        return self.clearance(positions)
-
-    @property
-    def is_level(self) -> bool:
-        """Return whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
-        return False
+        return positions[..., 2] - self.height(positions[..., 0], positions[..., 1])
 
     @property
     def lists_contacts(self) -> bool:

@@ -11,7 +11,7 @@ from arc_suite.arenas import field
 from arc_suite.arenas.arena import Arena
 from arc_suite.robots.spec import Body
 
-_CELL = 0.5  # of the standing height; feet sink into cells that are small beside them
+_CELL = 0.5  # of the standing height; feet sink into smaller cells
 _LENGTH, _WIDTH = 80.0, 40.0  # of the field, in standing heights: the way of 1000 steps, to either side
 _BASE = 2.0  # thickness of the ground below its lowest point, in standing heights
 _WAVE = 4.0  # from bump to bump, in standing heights

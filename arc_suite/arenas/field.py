@@ -31,7 +31,7 @@ def height(nodes: np.ndarray, u, v):
     Args:
         nodes: (rows, columns)
         u: (...) place along the columns, in cells; beyond the edge, the edge's height.
-        v: (...) along the rows, likewise.
+        v: (...) place along the rows, in cells; beyond the edge, the edge's height.
     """
     numpy = u.__array_namespace__()
     rows, columns = nodes.shape

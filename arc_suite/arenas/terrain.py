@@ -1,7 +1,7 @@
 """Terrain: lanes of rough ground, slopes, stairs and trenches side by side, each level where a body starts.
 
-Lanes lead along x. What is rough or slopes is one height field, whose cells are large beside feet;
-stairs and trenches are boxes, since feet sink into a height field that is steep.
+Lanes lead along x. Rough ground and slopes are one height field with cells larger than feet. Stairs and
+trenches are boxes, since feet sink into a steep height field.
 """
 
 import dataclasses
@@ -70,14 +70,13 @@ KINDS = (*FIELDS, *STEPS)
 class Terrain(Arena):
     """Lanes side by side; in the middle of lane i a body starts at `start(i)`.
 
-    Beside and beyond the lanes there is nothing but the plane below stairs and trenches; `height` goes
-    on there at the edge's.
+    Outside the lanes there is only the plane below stairs and trenches; `height` returns the edge's there.
 
     Attributes:
         unit: m, the standing height of the body for which it is made: all lengths are multiples of it.
         length: of the lanes ahead of the start, in units.
         lanes: kind and difficulty of each, by the order of `KINDS`.
-        seed: of what is random in them; a lane is the same beside any others.
+        seed: of the random ground; a lane does not depend on its neighbours.
     """
 
     unit: float
@@ -190,7 +189,7 @@ class Terrain(Arena):
     def _bottom(self) -> float:
         """Height of the plane below stairs and trenches, in units: their lowest, as a plane costs less than boxes.
 
-        Beside a height field it is below that, or feet would touch both.
+        With a height field it is below that, or feet would touch both.
         """
         return -_TRENCH if self._fields else self._profiles.min()
 

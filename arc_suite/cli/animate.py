@@ -16,7 +16,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, export, files, policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_setup
 from arc_suite.cli.program import VERSION, progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
@@ -42,8 +42,7 @@ def main() -> None:
     """Record, write both files and print a row for each clip."""
     checks.name(FLAGS.rig, export.RIGS, "rig")
     checks.name(FLAGS.root_motion, export.ROOT_MOTIONS, "root_motion")
-    body = only_body(_ROBOT)
-    task_name, task_kwargs = task()
+    setup = only_setup(_ROBOT)
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
     checks.extension(FLAGS.output, [".glb"])
@@ -52,17 +51,15 @@ def main() -> None:
         raise ValueError(f"--output={FLAGS.output}: {beside}, which is written too, is the spec; take another name")
     with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as figures:
         clips = export.clips(
-            body,
+            setup,
             FLAGS.clips,
             FLAGS.policy,
             FLAGS.preset,
-            task_name,
-            task_kwargs,
             FLAGS.fps,
             lambda names: progress(names, "recording", unit="clip", leave=False),
         )
-        temporary.write_bytes(export.glb(body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
-        figures |= export.sidecar(body, clips, FLAGS.root_motion)
+        temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
+        figures |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)
     print(f"wrote {FLAGS.output} and {beside}")
 

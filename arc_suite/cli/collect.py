@@ -19,7 +19,7 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, setups
 from arc_suite.cli.program import progress
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
@@ -59,21 +59,21 @@ def main() -> None:
         from arc_suite import data
     except ImportError as error:
         raise ValueError(str(error)) from None
-    walkers = bodies(_ROBOT)
-    asked, task_kwargs = task()
+    asked = setups(_ROBOT)
     if FLAGS.verify is not None:
-        body = next(iter(walkers.values())) if _ROBOT.present or made_body() else None
-        name = asked if FLAGS["task"].present else None
-        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress, name)
-        print(f"{FLAGS.verify}: {count} episodes replayed, equal to the bit")
+        setup = next(iter(asked.values()))
+        body = setup.body if _ROBOT.present or made_body() else None
+        task = setup.task if FLAGS["task"].present else None
+        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress, task)
+        print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")
         return
-    if FLAGS.id is not None and len(walkers) > 1:
-        raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(walkers)}")
+    if FLAGS.id is not None and len(asked) > 1:
+        raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(asked)}")
     presets = tuple(checks.name(preset, policies.preset_names(), "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
     policy, label = chosen()
-    for body in walkers.values():
-        settings = data.Settings(body, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
+    for setup in asked.values():
+        settings = data.Settings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = FLAGS.id or settings.dataset_id(label)
         missing = data.collect(
             dataset_id,

@@ -1,4 +1,4 @@
-"""Flags that several programs have: of which body, and in which task."""
+"""Flags that several programs have: body, task and its settings."""
 
 import json
 from collections.abc import Iterable
@@ -7,6 +7,7 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, registry
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
@@ -84,6 +85,21 @@ def only_body(robot: flags.FlagHolder) -> Body:
     if others:
         raise ValueError(f"--robot={robot.value}: expected one robot")
     return body
+
+
+def setups(robot: flags.FlagHolder) -> dict[str, Setup]:
+    """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
+
+    Raises:
+        ValueError: as `bodies` and `task`; one line.
+        OSError: as `bodies`.
+    """
+    return {name: Setup.of(body, *task()) for name, body in bodies(robot).items()}
+
+
+def only_setup(robot: flags.FlagHolder) -> Setup:
+    """Return the setup of a program that takes one body; errors as `only_body` and `task`."""
+    return Setup.of(only_body(robot), *task())
 
 
 def task() -> tuple[str, dict[str, Any]]:

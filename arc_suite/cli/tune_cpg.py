@@ -1,8 +1,8 @@
 """Search the numbers of a robot's demonstrator that earn most.
 
 It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off
-at any moment, the same command goes on. At the end the best numbers are judged beside the presets
-that there are over many resets and printed as a row for the table of presets.
+at any moment, the same command goes on. At the end the best numbers are compared with the existing presets
+over many resets, and printed as a row for the table of presets.
 
   arc-suite tune_cpg --robot queen --output out/tune/queen
   arc-suite tune_cpg --robot queen --numbers torques --output out/tune/queen-torques
@@ -17,10 +17,10 @@ from arc_suite import checks, evaluation, files, versions
 from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.cpg.presets import TUNINGS, Preset
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 from arc_suite.tasks.contract import STEPS
-from arc_suite.tuning import Journal, Judge, Search
-from arc_suite.tuning.judge import STYLE
+from arc_suite.tuning import Evaluator, Journal, Search
+from arc_suite.tuning.evaluator import STYLE
 from arc_suite.tuning.search import HARD
 from arc_suite.tuning.space import SPACES
 
@@ -51,14 +51,14 @@ def given(name: str) -> int:
     return getattr(SPACES[FLAGS.numbers], name) if value is None else value
 
 
-def search(folder: pathlib.Path) -> tuple[Search, Journal]:
+def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
-    settings = {name: FLAGS[name].value for name in ("robot", "numbers", "seed")}
+    settings = {name: FLAGS[name].value for name in ("numbers", "seed")}
     settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
-    settings |= dict(zip(("task", "task_kwargs"), task(), strict=True))
-    with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
+    known = setup.to_dict() | settings | {"versions": versions.recorded()}
+    with contextlib.closing(Journal(folder / "journal.jsonl", known)) as journal:
         try:
-            course = Search(**settings)
+            course = Search(setup, **settings)
         except ImportError as error:
             raise ValueError(f"a search needs cma: pip install 'arc_suite[tune]' ({error})") from None
         for generation in journal.generations:
@@ -73,11 +73,11 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     return course, journal
 
 
-def judge(preset: Preset) -> dict:
-    """Return returns, falls and style over the resets: of the result, of what it was searched about, and of medium."""
-    body, there = ROBOTS[FLAGS.robot], TUNINGS[FLAGS.robot]
+def evaluate(setup: Setup, preset: Preset) -> dict:
+    """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
+    there = TUNINGS[FLAGS.robot]
     presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.numbers].preset, "medium")}
-    score = Judge(body, len(presets), FLAGS.resets, STEPS, *task())(list(presets.values()), range(FLAGS.resets))
+    score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
     return {
         name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
         | {cost: float(values[row].mean()) for cost, values in score.style.items()}
@@ -93,9 +93,9 @@ def violations(figures: dict) -> list[str]:
 
 
 def main() -> None:
-    """Search, judge, print and write."""
-    task_name, task_kwargs = task()
+    """Search, evaluate, print and write."""
     checks.name(FLAGS.robot, TUNINGS, "robot")
+    setup = Setup.of(FLAGS.robot, *task())
     checks.name(FLAGS.numbers, SPACES, "numbers")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
@@ -105,14 +105,12 @@ def main() -> None:
         raise ValueError(f"the plot needs matplotlib: pip install 'arc_suite[plot]' ({error})") from None
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
-        course, journal = search(folder)
+        course, journal = search(setup, folder)
         preset = course.result()
         plots.course(FLAGS.robot, course.reward, journal.generations, STEPS).savefig(picture)
-        figures = judge(preset)
+        figures = evaluate(setup, preset)
         file.update(
-            robot=FLAGS.robot,
-            task=task_name,
-            task_kwargs=task_kwargs,
+            **setup.to_dict(),
             numbers=FLAGS.numbers,
             seed=FLAGS.seed,
             generations=len(journal.generations),

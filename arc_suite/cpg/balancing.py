@@ -21,8 +21,8 @@ from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.models.sizing import GRAVITY, control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import walk
 from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.walk import Walk
 
 
 class Balance(NamedTuple):
@@ -90,7 +90,7 @@ class Balanced:
             balance: how it walks.
         """
         body, self._parts = sized(body), len(body.part_names)
-        parameters, pose = walk.settings(body, {}).parameters, standing(body)
+        parameters, pose = Walk.fitted(body, {}).parameters, standing(body)
         self._balance, self._legs = balance, Legs.of(body, _USED)
         self._step, self._height = control_timestep(body), pose.height
         self._cycles = parameters.gait_frequency * self._step  # a control step

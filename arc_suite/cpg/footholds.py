@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.tasks.ground import AHEAD, ASIDE
+from arc_suite.tasks.sensors import AHEAD, ASIDE
 
 # By how much feet may land further ahead, in standing heights. Those ahead count half as much again as those behind,
 # since a foot that has far to go comes late.

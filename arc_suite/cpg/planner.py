@@ -18,7 +18,7 @@ from arc_suite.cpg.law import blocks
 from arc_suite.cpg.steering import STEERING, Manner, Steered
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.fitting import reach
-from arc_suite.tasks.navigate import FAR, RAYS, SIGHT
+from arc_suite.tasks.sensors import FAR, RAYS, SIGHT
 
 _SEEN = 0.95  # share of their farthest at which ranges are taken for pillars
 _POINTS = 12  # about a pillar, through which ways lead

@@ -18,9 +18,9 @@ from arc_suite.cpg.law import blocks, felt, torques
 from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import walk
 from arc_suite.tasks.fitting import reach, velocity_units
-from arc_suite.tasks.ground import SCAN
+from arc_suite.tasks.sensors import SCAN
+from arc_suite.tasks.walk import Walk
 
 
 class Tread(NamedTuple):
@@ -91,7 +91,7 @@ class Sighted:
             tread: how it walks.
         """
         body, self._parts = sized(body), len(body.part_names)
-        parameters, pose = walk.settings(body, {}).parameters, standing(body)
+        parameters, pose = Walk.fitted(body, {}).parameters, standing(body)
         self._tread, self._height, self._legs = tread, pose.height, Legs.of(body)
         self._step = control_timestep(body)
         self._cycles = parameters.gait_frequency * self._step  # a control step

@@ -20,8 +20,8 @@ from arc_suite.cpg.stride import lifted
 from arc_suite.models.sizing import control_timestep, position_gains, sized
 from arc_suite.models.standing import Standing, standing
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import walk
 from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.walk import Walk
 
 
 class Manner(NamedTuple):
@@ -114,7 +114,7 @@ class Steered:
         self._manner = manner
         build = build or robots.row(BUILDS, body, "steering") or Build()
         body, self._parts = sized(body), len(body.part_names)
-        parameters = walk.settings(body, {}).parameters
+        parameters = Walk.fitted(body, {}).parameters
         self._duty, self._unload = parameters.duty_factor, build.unload / self._manner.lift
         self._neutral = _neutral(body, build.share)
         pose = standing(body, tuple(self._neutral))

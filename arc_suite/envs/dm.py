@@ -13,7 +13,7 @@ from dm_env import specs
 
 from arc_suite import checks
 from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.scene import checked_action, checked_command, prepared
+from arc_suite.envs.prepare import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
@@ -39,7 +39,7 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers.Modifiers`;
-            for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.settings`.
+            for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.Settings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
             else dm_control's environments take, steps and substeps are part of the benchmark and are
             refused, and `time_limit` is a setting of the task.
@@ -195,7 +195,7 @@ class TaskRun(control.Task):
         value = checked_command(self.definition, name, value)
         if self.memory is None:
             raise ValueError(f"command {name!r}: no episode has begun; reset first")
-        self.memory = self.memory._replace(**{name: value})
+        self.memory = self.definition.commanded(self.memory, name, value)
 
     def action_spec(self, physics):
         """Return the spec of one control in [-1, 1] for each motor."""

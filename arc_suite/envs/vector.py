@@ -11,9 +11,9 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
-from arc_suite.envs import snapshots
+from arc_suite.envs import snapshots, trees
 from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.scene import checked_action, checked_command, prepared
+from arc_suite.envs.prepare import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
@@ -231,8 +231,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         mask, value = self._rows(rows, "rows"), checked_command(self.task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
-        present = getattr(self._memory, name)
-        self._memory = self._memory._replace(**{name: np.where(mask[:, None], value, present)})
+        self._memory = _chosen(mask, self.task.commanded(self._memory, name, value), self._memory)
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:
@@ -371,7 +370,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     def _render_row(self, row: int) -> np.ndarray:
         task, scene, marks = self.task, self.task.scene, ()
         if self._memory is not None:
-            marks = task.marks(_mapped(lambda field: field[row], self._memory), task.read(self.batch.part(row)))
+            marks = task.marks(trees.mapped(lambda field: field[row], self._memory), task.read(self.batch.part(row)))
         qpos, mocap_pos = self.batch.data.qpos[row], self.batch.mocap_pos[row]
         return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, markers=marks, **self._picture)
 
@@ -380,13 +379,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         task, starts = self.task, []
         for row in np.flatnonzero(rows):
             if not self._streams_begin[row]:
-                self._carries[row] = task.carry(_mapped(lambda field, row=row: field[row], self._memory))
+                self._carries[row] = task.carry(trees.mapped(lambda field, row=row: field[row], self._memory))
             starts.append(task.start(self._randoms[row], self._carries[row]))
         qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         self._streams_begin &= ~rows
         mocap = None if mocap[0] is None else np.stack(mocap)
         self.batch.reset(rows, np.stack(qpos), np.stack(qvel), mocap, models)
-        memory, readings = _mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(rows))
+        memory, readings = trees.mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(rows))
         lifted = task.lift(memory, readings)
         if lifted is not None:
             self.batch.place(rows, lifted)
@@ -441,16 +440,11 @@ def usable_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
-def _mapped(function, memory, *others):
-    """A memory whose fields a function makes of the fields of memories."""
-    return type(memory)(*map(function, memory, *others))
-
-
 def _chosen(rows: np.ndarray, there, elsewhere):
     """A memory that is one in some rows, (num_envs,) booleans, and another in the other rows."""
     if rows.all():
         return there
-    return _mapped(lambda new, old: np.where(rows.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
+    return trees.mapped(lambda new, old: np.where(rows.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
 
 
 def _scattered(rows: np.ndarray, some, memory):
@@ -461,7 +455,7 @@ def _scattered(rows: np.ndarray, some, memory):
         copied[rows] = new
         return copied
 
-    return _mapped(scattered, some, memory)
+    return trees.mapped(scattered, some, memory)
 
 
 def _marked(values: Mapping[str, Any], rows: np.ndarray) -> dict[str, Any]:

@@ -4,14 +4,14 @@ import collections
 import functools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg.demonstrator import Demonstrator, first_preset
-from arc_suite.envs.dm import load
+from arc_suite.envs.setup import Setup
 from arc_suite.export import motions
 from arc_suite.export.footfalls import TOUCH_DOWN, Footfall, footfalls, sole_heights
 from arc_suite.export.idle import idle
@@ -90,12 +90,10 @@ class Clip(NamedTuple):
 
 
 def clips(
-    body: Body,
+    setup: Setup,
     names: Sequence[str],
     policy: str = "cpg",
     preset: str | None = None,
-    task: str = "walk",
-    task_kwargs: Mapping[str, Any] | None = None,
     fps: float = FPS,
     progress: Callable[[Iterable[str]], Iterable[str]] = iter,
 ) -> list[Clip]:
@@ -108,12 +106,10 @@ def clips(
     lie at 0 in the median.
 
     Args:
-        body: any body.
+        setup: body, and the task of the clips that follow no command.
         names: of `CLIPS`.
-        policy: of the clip walk, as `policies.policy` takes it.
+        policy: of the clip walk; see `policies.policy`.
         preset: of the policy; None for tuned, or medium for a body that has no tuned one.
-        task: in which the policy walks, by name.
-        task_kwargs: its settings, as in `arc_suite.load`.
         fps: frames a second.
         progress: is given the names, and hands them on as the work on each begins.
 
@@ -127,6 +123,7 @@ def clips(
         checks.name(name, CLIPS, "clip")
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
+    body = setup.body
     if preset is None:
         preset = first_preset(body, "tuned", "medium")
     model, takes = compiled(body), {}
@@ -134,7 +131,7 @@ def clips(
         shot = CLIPS[name]
         if shot is not None:
             try:
-                takes[name] = _taken(body, shot, policy, preset, task, task_kwargs)
+                takes[name] = _taken(setup, shot, policy, preset)
             except ValueError as error:
                 raise ValueError(f"{body.name}, clip {name}: {error}") from None
     drafts = _loops(body, takes) | {name: _stop(take) for name, take in takes.items() if take.stop is not None}
@@ -171,19 +168,19 @@ class _Draft(NamedTuple):
     stop: tuple[int, int] | None = None
 
 
-def _taken(body: Body, shot: Shot, policy, preset, task, task_kwargs) -> _Take:
+def _taken(setup: Setup, shot: Shot, policy, preset) -> _Take:
     """Record what a clip needs."""
     if shot.command is None:
-        environment = load(body, task, {"random": 0, **(task_kwargs or {})})
+        environment = setup.load(seed=0)
         name, chosen = "cpg" if shot.preset else policy, shot.preset or preset
-        actor = named_policy(name, body, chosen, task=environment.task.definition)
+        actor = named_policy(name, setup.body, chosen, task=environment.task.definition)
         recording = record(environment, actor, _SETTLE, _WALKED)
         cycle = motions.period(recording)
         if cycle is None:
             seconds = len(recording.qpos) * recording.step / 2.0
             raise ValueError(f"the pose does not return within {seconds:.3g} s")
         return _Take(recording, cycle)
-    environment, actor = load(body, "steer", {"random": 0}), Demonstrator(body, "steered")
+    environment, actor = Setup.of(setup.body, "steer").load(seed=0), Demonstrator(setup.body, "steered")
     # It walks by the task's clock; some bodies take every other stride differently.
     cycle = 1.0 / environment.task.definition.parameters.gait_frequency
     if not shot.stops:

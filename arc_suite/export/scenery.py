@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 
 from arc_suite import models
-from arc_suite.envs.dm import load
 from arc_suite.export.parts import KINDS
 from arc_suite.markers import Marker
 from arc_suite.style.tracks import Track
@@ -32,8 +31,7 @@ def scenery(track: Track) -> dict[str, Any]:
             `styles`: of marks, `shape`, `radius` and `colour`;
             `marks`: for every row of the track, of each mark the index of its style, start and end.
     """
-    settings = {name: value for name, value in track.task_kwargs.items() if name not in ("random", "on_divergence")}
-    environment = load(track.body, track.task, settings)
+    environment = track.setup.load()
     environment.reset(track.seed)
     arena = environment.task.definition.scene.arena
     model = mujoco.MjModel.from_xml_string(models.assemble(track.body, arena, decorated=True).to_xml_string())

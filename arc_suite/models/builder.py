@@ -133,7 +133,7 @@ def _framing(body: Body, azimuth: float, elevation: float) -> dict:
 
     With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
     the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and
-    likewise for v: each side of the picture is a plane that touches the hull of the outline.
+    |v - cv| <= t (cb - b): each side of the picture is a plane that touches the hull of the outline.
     """
     back = np.array(
         (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))

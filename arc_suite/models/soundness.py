@@ -25,7 +25,7 @@ class Flaw(NamedTuple):
     """Something that keeps a body from standing or walking.
 
     Attributes:
-        text: one line that says what is wrong, and the value that would fit.
+        text: what is wrong, and a value that fits.
         hopeless: whether nothing can walk with it.
     """
 

@@ -14,8 +14,7 @@ from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import body_to_json
-from arc_suite.tasks import TASKS, Task
+from arc_suite.tasks import Task
 
 _ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
@@ -132,14 +131,13 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     if path.suffix == _ZIP:
         return _from_zip(path, body)
     made = network.load(path)
-    if made.robot != body.name and made.robot != body_to_json(body):
-        name = "another body" if made.robot.startswith("{") else made.robot
+    setup = made.setup
+    if setup.body != body and not (is_robot(setup.body) and setup.body.name == body.name):
+        name = "another body of that name" if setup.body.name == body.name else setup.body.name
         raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
     if made.joints != len(body.joint_names):
         raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
-    learned = {**TASKS[made.task].modifiers, **made.task_kwargs} if made.task in TASKS else made.task_kwargs
-    actions = learned.get("actions", Task.actions)
-    if task is not None and actions != task.actions:
+    if task is not None and (actions := setup.definition.actions) != task.actions:
         raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
     return made
 

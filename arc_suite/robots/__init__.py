@@ -26,7 +26,7 @@ def row(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
         what: the numbers are for, with which an error begins.
 
     Raises:
-        ValueError: a body of a robot's name that has other joints; one line.
+        ValueError: a body of a robot's name that has other joints.
     """
     if body.name not in table:
         return None

@@ -91,7 +91,7 @@ def gait(body: Body, name: str) -> Gait:
     """Return the gait of a body by name.
 
     Raises:
-        ValueError: no such gait, or none for these legs; one line that lists those that fit.
+        ValueError: no such gait, or none for these legs.
     """
     checks.name(name, NAMES, "gait")
     if name not in fitting(body):

@@ -46,7 +46,7 @@ _REACH = 0.9  # of the height, from mount to foot
 
 
 class _Proportions(NamedTuple):
-    """Everything that makes a body beside its counts; lengths of the torso are half-extents.
+    """Proportions of a generated body; lengths of the torso are half-extents.
 
     Attributes:
         height: from the floor to the mounts, m.
@@ -82,7 +82,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
         The body, `walker_<legs>x<links>`, 0.4 m high.
 
     Raises:
-        ValueError: a value out of range; one line that names it.
+        ValueError: a value out of range.
     """
     legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
     layout = _check_layout(layout, legs)
@@ -120,7 +120,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         The body, `random_<seed>`.
 
     Raises:
-        ValueError: a value out of range; one line that names it.
+        ValueError: a value out of range.
     """
     random = np.random.default_rng(checks.seed(seed))
     drawn_legs, drawn_links = (int(random.integers(low, high + 1)) for low, high in (LEGS, (2, LINKS[1])))
@@ -161,7 +161,7 @@ def scaled(body: Body, factor: float) -> Body:
         body of `generate` are down to a height of 2 cm; at 300 kg/m^3 one of 1 cm walks too.
 
     Raises:
-        ValueError: the factor, or a length of the scaled body, is out of range; one line that names it.
+        ValueError: the factor, or a length of the scaled body, is out of range.
     """
     factor = checks.number("scale", factor, *SCALE)
 
@@ -196,7 +196,7 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         The body, `<name>_mutated`, to be sized anew.
 
     Raises:
-        ValueError: a value out of range, or a length grown out of range; one line that names it.
+        ValueError: a value out of range, or a length grown out of range.
     """
     random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
     legs: dict[str, Leg] = {}

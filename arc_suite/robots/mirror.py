@@ -1,4 +1,4 @@
-"""Bodies in a mirror: which leg, joint and part of a body takes the place of which across the x-z plane."""
+"""Left-right symmetry of bodies across the x-z plane: legs, joints and parts, and their counterparts."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ _TURNED = -_REFLECTION  # of the axis of a rotation
 
 
 class Image(NamedTuple):
-    """What of a body takes the place of what in its mirror image, which is the body itself.
+    """Left-right permutation of the legs, joints and parts of a symmetric body.
 
     Attributes:
         legs: (legs,) index of the leg across, its own on the midline.
@@ -29,12 +29,12 @@ class Image(NamedTuple):
 
 
 def image(body: Body) -> Image:
-    """Return what of a body takes the place of what across the x-z plane.
+    """Return the left-right permutation of a symmetric body.
 
-    What counts is geometry, joints and motors, whatever names and order the legs have.
+    It depends on geometry, joints and motors, not on names and order of the legs.
 
     Raises:
-        ValueError: a body that is not its own mirror image; one line that names a part without one.
+        ValueError: the body has no left-right symmetry; the message names a part without a counterpart.
     """
     rounding = _ROUNDING * body.torso.standing_height
     for kind, solids in (("solid", body.torso.solids), ("ballast", body.ballast)):

@@ -5,8 +5,8 @@ A `Body` is a torso, its ballast and its legs; a `Leg` is a chain of `Link`s tha
 kilograms, angles degrees (the only place where they are). Frames: x forward, y left, z up; a
 child's origin is the end of the link before it, and a body stands with all joints at zero.
 
-Every class checks its own fields and raises `SpecError`, one line that names the field. This
-module needs nothing but the standard library.
+Every class checks its own fields and raises `SpecError`, which names the field. This module needs only
+the standard library.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
 
 class SpecError(ValueError):
-    """A spec that no body can be built from; the message is one line that names the field.
+    """A spec that no body can be built from; the message names the field.
 
     Attributes:
         reason: what is wrong, without the field.

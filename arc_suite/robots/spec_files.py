@@ -23,9 +23,9 @@ def load_body(path: str | os.PathLike) -> Body:
     """Read a body from a file.
 
     Raises:
-        SpecError: not JSON, or no body; one line that names the file and the field by its path
-            from the top, `legs[2].links[0].radius`.
-        OSError: the file cannot be read; one line that names it.
+        SpecError: not JSON, or no body; the message names the file and the field by its path,
+            `legs[2].links[0].radius`.
+        OSError: the file cannot be read.
     """
     try:
         with Path(path).open("rb") as file:
@@ -59,7 +59,7 @@ def body_from_json(text: str | bytes) -> Body:
     """Return the body that a text describes.
 
     Raises:
-        SpecError: one line that names the field.
+        SpecError: not JSON, or no body.
     """
     try:
         # Integers of any length become floats, which the field's range then refuses.

@@ -16,9 +16,9 @@ _OF_MODEL = "model_"  # with which names of models' fields begin in a snapshot
 
 
 class Batch:
-    """Many simulations of one model, bit-equal to as many `Physics`, on a thread pool.
+    """Many simulations of one model on a thread pool, bit-identical to as many `Physics`.
 
-    Pickles and copies go on to the bit.
+    Pickles and copies continue bit-identically.
 
     Attributes:
         data: live arrays under the names of `MjData`, with a leading axis for the rows. Writing
@@ -149,7 +149,7 @@ class Batch:
         return {"state": self._simulations.state.copy(), **fields, **models}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on, to the bit, from what `snapshot` returned.
+        """Continue bit-identically from the arrays of `snapshot`.
 
         Raises:
             KeyError, ValueError: an array is missing or does not fit.

@@ -39,7 +39,7 @@ def select_backend() -> None:
 
     `MUJOCO_GL` is set to egl if the user has not set it, there is no display and libEGL loads; a
     user's own value stays. dm_control, which would open OpenGL when it is imported and refuse to be
-    imported where that fails, does so at the first picture instead, whoever asks for it.
+    imported where that fails, does so at the first picture instead.
     """
     if "MUJOCO_GL" not in os.environ and not has_display() and _loads("libEGL.so.1"):
         os.environ["MUJOCO_GL"] = "egl"
@@ -280,7 +280,7 @@ def _wants_glfw() -> bool:
 
 @contextlib.contextmanager
 def _errors():
-    """Turn whatever goes wrong while OpenGL is opened into one line.
+    """Turn errors from opening OpenGL into `RenderingUnavailable`.
 
     Raises:
         RenderingUnavailable: why there is no picture, and the remedy.

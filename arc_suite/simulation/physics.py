@@ -35,7 +35,7 @@ class Physics(dm_mujoco.Physics):
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
             whatever glows; None leaves it its own colour.
         marker: returns the debug markers of pictures, given this simulation; None for none.
-        divergence: how the physics diverged in the latest step, in one line, or None.
+        divergence: how the physics diverged in the latest step, or None.
     """
 
     divergence: str | None = None
@@ -81,7 +81,7 @@ class Physics(dm_mujoco.Physics):
         what happened, and nothing is raised.
 
         Raises:
-            ValueError: `nstep` is no integer from 1; one line.
+            ValueError: `nstep` is no integer from 1.
             ForkError: made before a fork.
         """
         self._check_process()
@@ -117,7 +117,7 @@ class Physics(dm_mujoco.Physics):
             (height, width, 3) uint8; with `depth=True`, (height, width) float32, m.
 
         Raises:
-            ValueError: no such camera, or an impossible size; one line.
+            ValueError: no such camera, or an impossible size.
             RenderingUnavailable: no OpenGL here.
             ForkError: made before a fork.
         """

@@ -124,7 +124,7 @@ def picture(
         (height, width, 3) uint8; with `depth`, (height, width) float32, m.
 
     Raises:
-        ValueError: no such camera, or an impossible size; one line.
+        ValueError: no such camera, or an impossible size.
         RenderingUnavailable: no OpenGL here.
     """
     check_size(height, width)
@@ -142,7 +142,7 @@ def check_size(height: int, width: int) -> None:
     """Check the size of pictures, pixels.
 
     Raises:
-        ValueError: no integers, or too large; one line.
+        ValueError: no integers, or too large.
     """
     checks.integer("height", height, 1, MAX_HEIGHT)
     checks.integer("width", width, 1, MAX_WIDTH)
@@ -152,7 +152,7 @@ def check_camera(model: mujoco.MjModel, camera_id: int | str) -> None:
     """Check that a model has a camera: a name, an index, or -1 for the free one.
 
     Raises:
-        ValueError: it has not; one line that names the nearest.
+        ValueError: it has not.
     """
     cameras = [model.camera(index).name for index in range(model.ncam)]
     if isinstance(camera_id, str):

@@ -40,10 +40,9 @@ from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.mirrors import Mirror, Symmetry
+from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Layout, Readings
-from arc_suite.tasks.terms import Parameters
 
 STEPS = 1000  # control steps of an episode
 
@@ -79,7 +78,8 @@ class Start(NamedTuple):
     Attributes:
         qpos: (nq,) positions.
         qvel: (nv,) velocities.
-        memory: a NamedTuple of numbers and arrays, replaced from step to step and never written in place.
+        memory: numbers and arrays in a NamedTuple, which may hold NamedTuples in turn; replaced from step to step
+            and never written in place.
         mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
         model: fields of `MjModel` that differ in this episode, by name.
     """
@@ -114,8 +114,8 @@ class Task(ABC):
         name: by which `arc_suite.load` and ids know the task.
         version: raised with any change of dynamics, reward or observation.
         reads: fields of the simulation that `read` takes.
-        commands: what may be set from outside while an episode runs, such as by a player's stick:
-            size by name of a field of the memory; NaN stands for what the task itself would do.
+        commands: sizes of what may be set from outside while an episode runs, such as by a player's stick,
+            by name; see `commanded`.
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
@@ -152,9 +152,8 @@ class Task(ABC):
     def blocks(self) -> Mapping[str, int]:
         """The size of every block of the observation by name, in the order of the vector."""
 
-    @property
-    def clock(self) -> Clock | None:
-        """The clock of the prescribed gait, at whose `tick` the memory's field of that name stands; None for none."""
+    def phase(self, memory) -> Any:
+        """Return the phase (...) of the prescribed gait, rad in [0, 2 pi); None where the task prescribes none."""
         return None
 
     @property
@@ -239,6 +238,13 @@ class Task(ABC):
     @abstractmethod
     def after(self, memory, readings: Readings) -> Any:
         """Return the memory after a control step."""
+
+    def commanded(self, memory, name: str, value) -> Any:
+        """Return the memory with a live command: one of `commands` set to (..., size) numbers from outside.
+
+        NaN stands for what the task itself would do.
+        """
+        return memory._replace(**{name: value})
 
     @abstractmethod
     def terms(self, memory, readings: Readings) -> dict:

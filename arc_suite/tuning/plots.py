@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from arc_suite.tuning.judge import STYLE
+from arc_suite.tuning.evaluator import STYLE
 from arc_suite.tuning.search import Generation
 
 # Okabe and Ito's colours, told apart by colour-blind eyes too.

@@ -11,6 +11,7 @@ import pytest
 from arc_suite import data
 from arc_suite.agents import algorithms
 from arc_suite.agents.learner import Stage
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 
 SMALL = {"hidden": 16, "batch": 8, "random_steps": 20}
@@ -42,7 +43,7 @@ def prior(tmp_path_factory):
     """Id of a dataset of Tick, 30 episodes of 40 steps."""
     patch = pytest.MonkeyPatch()
     patch.setenv("MINARI_DATASETS_PATH", str(tmp_path_factory.mktemp("datasets")))
-    settings = data.Settings(ROBOTS["tick"], "cpg", ("medium",), task_kwargs=SHORT)
+    settings = data.Settings(Setup.of("tick", "walk", SHORT), "cpg", ("medium",))
     data.collect(settings.dataset_id(), settings, 30, rows=15, threads=1)
     yield settings.dataset_id()
     patch.undo()

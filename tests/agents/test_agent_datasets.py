@@ -78,7 +78,7 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
     (dataset_id,) = data.ids.existing()
     assert f"/tiny_studies_CLIMB-0-{label}-set" in dataset_id
     dataset = data.open(dataset_id)
-    agents = dataset.metadata["arc_suite"]["settings"]["agents"]
+    agents = dataset.metadata["arc_suite"]["agents"]
     assert [agent["steps"] for agent in agents] == steps
     assert all(agent.keys() == {"algorithm", "steps", "seed", "mean_return"} for agent in agents)
     assert len(dataset) == 6

@@ -7,6 +7,7 @@ import programs
 import pytest
 
 from arc_suite import data, style
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 from arc_suite.style import METRICS
 from arc_suite.tasks import TASKS
@@ -92,7 +93,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
-        "arc_suite/tick/noisy-v0", data.Settings(ROBOTS["tick"], "cpg", ("medium",), 0.2, steps=50), episodes=2
+        "arc_suite/tick/noisy-v0", data.Settings(Setup.of("tick"), "cpg", ("medium",), 0.2, steps=50), episodes=2
     )
     done = run("--policy=arc_suite/tick/noisy-v0", "--compare=cpg", "--episodes=2", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr

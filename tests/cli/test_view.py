@@ -116,7 +116,7 @@ def test_space_pauses_and_backspace_restarts(play):
 
 def test_arrows_command():
     environment, shown = playing()
-    wanted = lambda: environment.task.definition.wanted(environment.task.memory)  # noqa: E731
+    wanted = lambda: environment.task.memory.core.desired  # noqa: E731
     assert shown.wanted is None  # the task's own schedule
     for key in (glfw.KEY_UP, glfw.KEY_UP, glfw.KEY_LEFT):
         shown.press(key)

@@ -12,7 +12,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.planner import PLANS, along, seen, toward, way
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks.navigate import RAYS, SIGHT
+from arc_suite.tasks.sensors import RAYS, SIGHT
 
 PLAN = PLANS["planned"]
 

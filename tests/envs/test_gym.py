@@ -27,9 +27,8 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.walk import BONUSES, COSTS
+from arc_suite.tasks.walk import WEIGHTS
 
-WEIGHTS = BONUSES | COSTS
 ROOT = pathlib.Path(__file__).parents[2]
 IDS = [f"arc_suite/{robot}-walk-v0" for robot in ("queen", "bastion", "tick", "leaper")]
 SIZES = {"queen": (199, 18), "bastion": (151, 12), "tick": (199, 18), "leaper": (163, 12)}

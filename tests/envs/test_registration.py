@@ -13,7 +13,8 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import TUNINGS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.walk import SETTINGS, Walk
+from arc_suite.tasks.parameters import PARAMETERS
+from arc_suite.tasks.walk import Walk
 
 ROOT = pathlib.Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "adding_a_robot.md").read_text()
@@ -169,7 +170,7 @@ for program, *arguments in (
 
 TICK = ROBOTS["tick"]
 OTHER = TICK.replace(name="other")
-ROW = SETTINGS["tick"]
+ROW = PARAMETERS["tick"]
 
 
 class Other(Walk):
@@ -232,7 +233,7 @@ class Misnamed(Walk):
     ],
 )
 def test_mistakes_are_one_line_and_register_nothing(arguments, message):
-    tables = (ROBOTS, SETTINGS, TUNINGS, TASKS, ARENAS)
+    tables = (ROBOTS, PARAMETERS, TUNINGS, TASKS, ARENAS)
     before = [dict(table) for table in tables]
     with pytest.raises(ValueError) as error:
         arc_suite.register(**arguments)

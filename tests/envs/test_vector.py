@@ -226,7 +226,7 @@ def test_calls_and_attributes_of_rows_are_those_of_single_environments():
     steer = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=2)
     steer.reset(seed=0)
     assert steer.call("command", "command", [1.0, 0.0, 0.5]) == (None, None)
-    assert_array_equal(steer._memory.command, [[1.0, 0.0, 0.5]] * 2)
+    assert_array_equal(steer._memory.command.live, [[1.0, 0.0, 0.5]] * 2)
 
 
 def test_seeds_of_all_kinds():

@@ -103,7 +103,8 @@ def test_task_and_demonstrator_take_a_gait():
     gait = gaits.gait(ROBOTS["queen"], "ripple")
     assert parameters.duty_factor == 0.75
     np.testing.assert_allclose(parameters.phase_offsets, 2.0 * np.pi * np.array(gait.offsets))
-    assert arc_suite.load("queen", "walk", {"gait": "ripple", "duty_factor": 0.7}).task.settings.parameters[3] == 0.7
+    environment = arc_suite.load("queen", "walk", {"gait": "ripple", "duty_factor": 0.7})
+    assert environment.task.settings.parameters.duty_factor == 0.7
     with pytest.raises(ValueError, match=r"^gait 'trot' does not fit queen with its 6 legs \(fit: tripod, tetrapod"):
         arc_suite.load("queen", "walk", {"gait": "trot"})
     with pytest.raises(ValueError, match="^gait 'trot' does not fit queen"):

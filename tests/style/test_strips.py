@@ -68,8 +68,8 @@ def test_whoever_follows_commands_is_told_to_go_ahead():
     environment = load("queen", "steer")
     frames = frames_of(strips.strip(environment, policy("cpg", "queen", "steered", task=environment.task.definition)))
     assert len({frame.tobytes() for frame in frames}) == strips.FRAMES
-    memory = environment.task.memory
-    assert memory.command.tolist() == [1.0, 0.0, 0.0]
+    memory = environment.task.memory.core
+    assert memory.desired.tolist() == [1.0, 0.0, 0.0]
     assert memory.tick == strips.ticks(1.5, environment.control_timestep(), 1000)[-1]
     assert np.hypot(*memory.place[:2]) > 0.5
 

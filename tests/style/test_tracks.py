@@ -5,17 +5,19 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from synthetic import synthetic
 from tiers import tiers
 
 import arc_suite
 from arc_suite import evaluation
-from arc_suite.arenas import FLAT
+from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.arenas.bumps import Bumps
 from arc_suite.cpg import Demonstrator
-from arc_suite.models.standing import standing
+from arc_suite.envs.setup import Setup
+from arc_suite.models import standing as poses
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
-from arc_suite.style.tracks import lowest_point_velocities, mirrors
+from arc_suite.style.tracks import lowest_point_velocities
 
 
 @pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "bastion"))
@@ -37,30 +39,32 @@ def test_tracks_agree_with_the_reward(robot):
     assert_array_equal(track.joint_velocities[-1], environment.physics.data.qvel[6:])
     gears = environment.physics.model.ptr.actuator_gear[:, 0]
     assert_allclose(track.torques, track.actions * gears)
-    assert track.mass == pytest.approx(standing(ROBOTS[robot]).mass, 1e-9)
+    assert track.mass == pytest.approx(poses.standing(ROBOTS[robot]).mass, 1e-9)
     assert 0.05 < track.contacts.mean() < 0.95
     assert (track.foot_positions[track.contacts][:, 2] < track.foot_radii[0] + 0.011).all()  # within the contact margin
 
 
 @pytest.mark.parametrize("task", ["steer", "stay"])
 @pytest.mark.parametrize("arena", [FLAT, Bumps(0.2)], ids=["flat", "bumps"])  # small bumps, which begin near the start
-def test_tracks_of_any_task_and_ground(task, arena):
-    settings = {"time_limit": 2.0, "arena": arena}
+def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
+    monkeypatch.setitem(ARENAS, "here", lambda body: arena)
+    settings = {"time_limit": 2.0, "arena": "here"}
     with gaitless.registered():
-        environment = arc_suite.load("queen", task, settings)
+        setup = Setup.of("queen", task, settings)
+        environment = setup.load()
+        track = record(environment, Demonstrator("queen"), seed=3)
     definition = environment.task.definition
-    track = record(environment, Demonstrator("queen"), seed=3)
     episode = evaluation.run(environment, Demonstrator("queen"), seed=3)
-    assert (track.task, track.task_kwargs, track.weights) == (task, settings, definition.settings.weights)
+    assert (track.setup, track.weights) == (setup, definition.settings.weights)
     assert len(track.times) == episode.length == 40
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
     assert track.progress == episode.progress
     assert track.progress.keys() == ({"tracking", "fell", "gait_compliance"} if task == "steer" else set())
     assert np.isnan(track.target_velocity)
-    for points in (track.foot_positions, track.positions):
-        assert arena.height(points[..., 0], points[..., 1]).any() == (arena != FLAT)
-    assert_array_equal(track.foot_heights, arena.clearance(track.foot_positions))
-    assert_array_equal(track.torso_heights, arena.clearance(track.positions))
+    for points, heights in ((track.foot_positions, track.foot_heights), (track.positions, track.torso_heights)):
+        ground = arena.height(points[..., 0], points[..., 1])
+        assert ground.any() == (arena != FLAT)
+        assert_array_equal(heights, points[..., 2] - ground)
     if task == "steer":
         assert measure(track)["gait_compliance"].value == pytest.approx(track.progress["gait_compliance"], rel=1e-12)
         assert_array_equal(track.phases, definition.clock.phases[1:41])
@@ -75,18 +79,23 @@ def test_recording_is_seeded():
     assert (first.positions != other.positions).all()
 
 
+def standing(body):
+    """A track of a body, for what it tells of the body alone."""
+    return synthetic(cycles=1)._replace(setup=Setup(body))
+
+
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_leg_has_its_mirror(robot):
     across = {"l": "r", "r": "l"}
     names = [leg.name for leg in ROBOTS[robot].legs]
-    for name, mirror in zip(names, mirrors(ROBOTS[robot]), strict=True):
+    for name, mirror in zip(names, standing(ROBOTS[robot]).mirrors, strict=True):
         expected = name[0] + across[name[1]] if robot == "leaper" else across[name[0]] + name[1]
         assert names[mirror] == expected
 
 
 def test_legs_without_a_mirror():
     left = ROBOTS["queen"].replace(legs=ROBOTS["queen"].legs[:4])  # l1 l2 l3 r1
-    assert_array_equal(mirrors(left), [3, -1, -1, 0])
+    assert_array_equal(standing(left).mirrors, [3, -1, -1, 0])
 
 
 def test_velocities_of_lowest_points_are_their_motion():

@@ -11,12 +11,13 @@ from tiers import tiers, turn
 
 import arc_suite
 from arc_suite.arenas import ARENAS
-from arc_suite.envs.scene import prepared
+from arc_suite.envs import trees
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks import TASKS, ground
+from arc_suite.tasks import TASKS
 from arc_suite.tasks.contract import Inputs
 from arc_suite.tasks.walk import Walk
 
@@ -49,9 +50,9 @@ every_place_and_body = pytest.mark.parametrize(
 
 def frozen(memory):
     """The memory with arrays that refuse to be written."""
-    for field in memory:
-        if isinstance(field, np.ndarray):
-            field.flags.writeable = False
+    for leaf in trees.leaves(memory):
+        if isinstance(leaf, np.ndarray):
+            leaf.flags.writeable = False
     return memory
 
 
@@ -102,9 +103,7 @@ def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings)
 
 
 def leaves(value):
-    if isinstance(value, dict):
-        value = list(value.values())
-    return [np.asarray(item) for item in value]
+    return [np.asarray(leaf) for leaf in trees.leaves(tuple(value.values()) if isinstance(value, dict) else value)]
 
 
 @pytest.mark.slow
@@ -172,9 +171,8 @@ SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take
 @every_task
 def test_settings_check_themselves(task_name):
     own = f"arena: task {task_name} has a ground of its own, expected none" if TASKS[task_name].own_arena else None
-    kind = task_name if issubclass(TASKS[task_name], ground.Lanes) else "walk"
     for settings, message in (
-        ({"targt_velocity": 1.0}, f"unknown setting of {kind} 'targt_velocity'; did you mean 'target_velocity'?"),
+        ({"targt_velocity": 1.0}, f"unknown setting of {task_name} 'targt_velocity'; did you mean 'target_velocity'?"),
         ({"weights": {"helthy": 1.0}}, "unknown weight 'helthy'; did you mean 'healthy'?"),
         ({"arena": "bump"}, own or f"unknown arena 'bump'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
         ({"time_limit": 0}, "time_limit: expected a finite number from 1e-09 to inf, got 0"),

@@ -27,11 +27,12 @@ def look_into_the_mirror(task):
     def mirrored(random, carry):
         begun = start(random, carry)
         memory = begun.memory
-        if "schedule" in memory._fields:
-            memory = memory._replace(schedule=mirrors.PLANAR(memory.schedule))
+        if "schedule" in getattr(memory, "command", memory)._fields:
+            schedule = mirrors.PLANAR(memory.command.schedule)
+            memory = memory._replace(command=memory.command._replace(schedule=schedule))
         qpos = poses(begun.qpos)
-        if "lane" in memory._fields:
-            qpos[1] += 2.0 * memory.lane  # a lane is mirrored about its middle
+        if "lane" in getattr(memory, "ground", memory)._fields:
+            qpos[1] += 2.0 * memory.ground.lane  # a lane is mirrored about its middle
         return begun._replace(qpos=qpos, qvel=velocities(begun.qvel), memory=memory)
 
     vars(task)["start"] = mirrored

@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tiers import never, tiers, turn
 
 import arc_suite
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import ROBOTS
@@ -183,21 +183,21 @@ def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_agai
     environment = load("tick", "walk", kicks=1.5, time_limit=math.inf)
     environment.reset()
     task, memory, seen = environment.task.definition, environment.task.memory, {}
-    for step in range(1, int(memory.kick_steps[-1]) + 200):
+    for step in range(1, int(memory.changes.kick_steps[-1]) + 200):
         memory, inputs = task.before(memory, np.zeros(18))
         assert inputs.kick.shape == (24,) and not inputs.kick[2:].any()
         if inputs.kick.any():
             seen[step] = inputs.kick[:2]
-    period = memory.kick_steps[-1]
-    due = [*memory.kick_steps, *(period + memory.kick_steps[: len(seen) - 25])]
+    period = memory.changes.kick_steps[-1]
+    due = [*memory.changes.kick_steps, *(period + memory.changes.kick_steps[: len(seen) - 25])]
     assert len(seen) > 25 and list(seen) == due
-    assert_array_equal(list(seen.values())[:25], memory.kicks)
-    assert_array_equal(list(seen.values())[25:], memory.kicks[: len(seen) - 25])
-    sizes = np.hypot(*memory.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
+    assert_array_equal(list(seen.values())[:25], memory.changes.kicks)
+    assert_array_equal(list(seen.values())[25:], memory.changes.kicks[: len(seen) - 25])
+    sizes = np.hypot(*memory.changes.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
     assert sizes.min() > 0.0 and sizes.max() < 1.5
     stronger = load("tick", "walk", kicks=3.0)
     stronger.reset()
-    assert_allclose(stronger.task.memory.kicks, 2.0 * memory.kicks, rtol=1e-15)
+    assert_allclose(stronger.task.memory.changes.kicks, 2.0 * memory.changes.kicks, rtol=1e-15)
 
 
 def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
@@ -211,12 +211,12 @@ def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
         advance(nstep)
 
     monkeypatch.setattr(physics, "step", watched)
-    first = environment.task.memory.kick_steps[0]
+    first = environment.task.memory.changes.kick_steps[0]
     for _ in range(first):
         after = physics.velocity().copy()
         environment.step(np.zeros(18))
     assert not np.any(changes[:-1])
-    assert_allclose(changes[-1], [*environment.task.memory.kicks[0], *np.zeros(22)], atol=1e-15)
+    assert_allclose(changes[-1], [*environment.task.memory.changes.kicks[0], *np.zeros(22)], atol=1e-15)
 
 
 @pytest.mark.parametrize("leg", [True, 0, 4])
@@ -228,8 +228,8 @@ def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
     for step in range(60):
         environment.step(action)
         ctrl = environment.physics.data.ctrl
-        assert_array_equal(ctrl, action if step < 40 else np.where(environment.task.memory.limp, 0.0, action))
-    limp = np.flatnonzero(environment.task.memory.limp)
+        assert_array_equal(ctrl, action if step < 40 else np.where(environment.task.memory.changes.limp, 0.0, action))
+    limp = np.flatnonzero(environment.task.memory.changes.limp)
     assert len({names[index].rpartition("_")[0] for index in limp}) == 1 and len(limp) == 3
     if leg is not True:
         assert_array_equal(limp, [3 * leg, 3 * leg + 1, 3 * leg + 2])
@@ -246,10 +246,11 @@ def test_each_episode_draws_a_leg_a_strength_a_friction_and_a_delay_of_its_own()
     for _ in range(60):
         environment.reset()
         memory, model = environment.task.memory, environment.physics.model.ptr
+        own = memory.changes
         slide, weight = model.pair_friction / friction, (model.body_mass[1:] / mass[1:])
-        for values in (slide, weight, memory.strength):
+        for values in (slide, weight, memory.changes.strength):
             assert_allclose(values, values.flat[0], rtol=1e-12)
-        drawn.append((memory.limp.argmax(), memory.delay, memory.strength[0], slide[0, 0], weight[0]))
+        drawn.append((own.limp.argmax(), own.delay, own.strength[0], slide[0, 0], weight[0]))
     legs, delays, *ranges = zip(*drawn, strict=True)
     assert set(legs) == {0, 3, 6, 9} and set(delays) == {1, 2, 3}
     for values, (low, high) in zip(ranges, ((0.5, 1.0), (0.2, 1.0), (0.8, 2.0)), strict=True):
