@@ -10,8 +10,8 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import law
 from arc_suite.envs.prepare import prepared
-from arc_suite.models.looks import LOOKS
-from arc_suite.models.looks.look import Look
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Visuals
 from arc_suite.registry import MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -26,7 +26,7 @@ def register(
     body: Body | None = None,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     presets: Mapping[str, Any] | None = None,
-    visuals: Look | None = None,
+    visuals: Visuals | None = None,
     tasks: Iterable[type[Task]] = (),
     arenas: Mapping[str, Any] | None = None,
 ) -> None:
@@ -94,7 +94,7 @@ def _register_body(body, parameters, presets, visuals) -> None:
     for table, value in (
         *((PARAMETERS.setdefault(task, {}), row) for task, row in parameters.items()),
         (PRESETS, presets),
-        (LOOKS, visuals),
+        (VISUALS, visuals),
     ):
         if value is not None:
             table[body.name] = value

@@ -372,7 +372,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if self._memory is not None:
             marks = task.marks(trees.mapped(lambda field: field[row], self._memory), task.read(self.batch.part(row)))
         qpos, mocap_pos = self.batch.data.qpos[row], self.batch.mocap_pos[row]
-        return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, marks=marks, **self._picture)
+        return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, markers=marks, **self._picture)
 
     def _begin(self, rows: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some rows, (num_envs,) booleans, and put their observations among the others."""

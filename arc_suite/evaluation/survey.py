@@ -88,7 +88,7 @@ def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
     environment = trial.setup.load(trial.seed)
     demonstrator = Demonstrator(environment, "medium" if trial.froude is None else trial.froude)
     data = environment.physics.data.ptr
-    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in body.torso.solids]
+    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in trial.setup.body.torso.solids]
     step, ending = environment.reset(), "time"
     positions, touching = [data.qpos[:2].copy()], [False]
     try:

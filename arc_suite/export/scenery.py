@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import models
 from arc_suite.export.parts import KINDS
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.style.tracks import Track
 
 _MARGIN = 12.0  # standing heights of ground around the path
@@ -92,7 +92,7 @@ def _marks(environment, track: Track) -> tuple[list, list]:
     return [dict(zip(("shape", "radius", "colour"), style[:3], strict=True)) for style in styles], rows
 
 
-def _styled(marks: Sequence[Mark], styles: dict[tuple, int]) -> list[list]:
+def _styled(marks: Sequence[Marker], styles: dict[tuple, int]) -> list[list]:
     """Marks as indices of styles, start and end; styles that are new are added. None has two marks at once."""
     row, counts = [], {}
     for mark in marks:

@@ -34,7 +34,7 @@ class Physics(dm_mujoco.Physics):
         arena: where.
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
             whatever glows; None leaves it its own colour.
-        marker: returns the marks that pictures show beside the body, given this simulation; None for none.
+        marker: returns the debug markers of pictures, given this simulation; None for none.
         divergence: how the physics diverged in the latest step, or None.
     """
 
@@ -135,8 +135,8 @@ class Physics(dm_mujoco.Physics):
 
     def _pose(self) -> dict:
         data = self.data.ptr
-        marks = self.marker(self) if self.marker else ()
-        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos, "marks": marks}
+        markers = self.marker(self) if self.marker else ()
+        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos, "markers": markers}
 
     def free(self) -> None:
         """Free the simulation, and what a window showed of it."""

@@ -9,9 +9,9 @@ from dm_control import mujoco as dm_mujoco
 
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.marks import Mark
-from arc_suite.models import looks
-from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
+from arc_suite.markers import Marker
+from arc_suite.models import visuals
+from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl
 
@@ -19,13 +19,13 @@ _SHAPES = {"arrow": mujoco.mjtGeom.mjGEOM_ARROW, "cylinder": mujoco.mjtGeom.mjGE
 
 
 class Decorated(dm_mujoco.Physics):
-    """A body with its looks in an arena; it takes poses, and nothing steps it.
+    """A body with its visuals in an arena; it takes poses and is never stepped.
 
     Attributes:
-        marks: what pictures show beside it, but for those of depth or segments.
+        markers: debug markers of pictures; those of depth or segments show none.
     """
 
-    marks: Iterable[Mark] = ()
+    markers: Iterable[Marker] = ()
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> "Decorated":
@@ -41,7 +41,7 @@ class Decorated(dm_mujoco.Physics):
         qpos: np.ndarray,
         share: float | None = None,
         mocap_pos: np.ndarray | None = None,
-        marks: Iterable[Mark] = (),
+        markers: Iterable[Marker] = (),
     ) -> None:
         """Take a pose, and show a reward.
 
@@ -50,15 +50,15 @@ class Decorated(dm_mujoco.Physics):
             share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None
                 leaves it its own colour.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
-            marks: to show beside it.
+            markers: debug markers to show.
         """
-        model, data, self.marks = self.model.ptr, self.data.ptr, marks
+        model, data, self.markers = self.model.ptr, self.data.ptr, markers
         data.qpos[:] = qpos
         if mocap_pos is not None:
             data.mocap_pos[:] = mocap_pos
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
             update(model, data)
-        model.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
+        model.material("glow").rgba = self._glow if share is None else visuals.reward_colour(share)
 
     def render(self, height, width, camera_id, **kwargs):
         """Draw the pose; arguments as in dm_control."""
@@ -68,9 +68,9 @@ class Decorated(dm_mujoco.Physics):
 
         def callback(physics, scene):
             if not (kwargs.get("depth") or kwargs.get("segmentation")):
-                for mark in self.marks:
+                for marker in self.markers:
                     scene.ngeom += 1
-                    geom_of(mark, scene.geoms[scene.ngeom - 1])
+                    geom_of(marker, scene.geoms[scene.ngeom - 1])
             if own is not None:
                 own(physics, scene)
 
@@ -82,11 +82,11 @@ class Decorated(dm_mujoco.Physics):
         return opengl.contexts(self.model)
 
 
-def geom_of(mark: Mark, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
-    """Return a mark as a geom of a scene, a new one or the given one."""
-    geom, kind = geom or mujoco.MjvGeom(), _SHAPES[mark.shape]
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(mark.colour, np.float32))
-    mujoco.mjv_connector(geom, kind, mark.radius, mark.start, mark.end)
+def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
+    """Return a debug marker as a geom of a scene, a new one or the given one."""
+    geom, kind = geom or mujoco.MjvGeom(), _SHAPES[marker.shape]
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(marker.colour, np.float32))
+    mujoco.mjv_connector(geom, kind, marker.radius, marker.start, marker.end)
     return geom
 
 
@@ -103,7 +103,7 @@ def picture(
     camera_id: int | str,
     share: float | None = None,
     mocap_pos: np.ndarray | None = None,
-    marks: Iterable[Mark] = (),
+    markers: Iterable[Marker] = (),
     **kwargs,
 ) -> np.ndarray:
     """Draw the decorated body in a pose.
@@ -117,7 +117,7 @@ def picture(
         camera_id: a camera's name or index, -1 for a free one.
         share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None for none.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
-        marks: to show beside it, but in pictures of depth or segments.
+        markers: debug markers; pictures of depth or segments show none.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
@@ -132,7 +132,7 @@ def picture(
     def draw():
         decorated = _shared(body, arena)
         check_camera(decorated.model.ptr, camera_id)
-        decorated.pose(qpos, share, mocap_pos, marks)
+        decorated.pose(qpos, share, mocap_pos, markers)
         return decorated.render(height, width, camera_id, **kwargs)
 
     return opengl.call(draw)

@@ -14,7 +14,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.arenas.pillars import CELLS, PITCH
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.tasks import terms
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.mirrors import Mirror
@@ -109,7 +109,7 @@ class Command(ABC):
         """Return the outcome (...) by which a curriculum judges an episode: its mean tracking."""
         return tracking / judged
 
-    def markers(self, context: Context, memory) -> list[Mark]:
+    def markers(self, context: Context, memory) -> list[Marker]:
         """Return what pictures show of it, in addition to the command's arrows."""
         return []
 
@@ -323,11 +323,11 @@ class ToGoal(Command):
         """Return how many goals were reached."""
         return {"goals": memory.reached * 1.0}
 
-    def markers(self, context: Context, memory: Chain) -> list[Mark]:
+    def markers(self, context: Context, memory: Chain) -> list[Marker]:
         """Return the goal as the disc within which it is reached."""
         unit = context.arena.unit
         middle = np.array((*_goal(memory.goals, memory.reached), 0.0))
-        return [Mark("cylinder", middle, middle + (0.0, 0.0, _DISC * unit), NEAR * unit, _GOAL)]
+        return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISC * unit), NEAR * unit, _GOAL)]
 
 
 def _goal(goals, reached):

@@ -16,7 +16,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.arenas import Arena
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import clock, mirrors, paper, parameters, terms
@@ -327,7 +327,7 @@ class CommandTask(Task):
         outcome = self.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
-    def marks(self, memory: Memory, readings: Sensed) -> list[Mark]:
+    def marks(self, memory: Memory, readings: Sensed) -> list[Marker]:
         """Return arrows over the torso: the desired velocity, and the sideways velocity of a point R ahead.
 
         The latter shows turning. At the target velocity an arrow is R long.
@@ -338,8 +338,8 @@ class CommandTask(Task):
         ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
         aside = np.array((-ahead[1], ahead[0], 0.0))
         arrows = (middle, forward * ahead + left * aside, _GOING), (middle + unit * ahead, turn * aside, _TURNING)
-        arrows = [Mark("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
-        base = Mark("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, _GOING)
+        arrows = [Marker("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
+        base = Marker("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, _GOING)
         return [base, *arrows, *self.command.markers(self.context, memory.command)]
 
 

@@ -37,7 +37,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
@@ -266,7 +266,7 @@ class Task(ABC):
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""
         return {}
 
-    def marks(self, memory, readings: Readings) -> list[Mark]:
+    def marks(self, memory, readings: Readings) -> list[Marker]:
         """Return what pictures of one environment show of what is asked; no leading axes."""
         return []
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots import mirror
@@ -309,7 +309,7 @@ class Modified(Task):
         metrics = self.task.progress(memory.task)
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
-    def marks(self, memory: Memory, readings: Readings) -> list[Mark]:
+    def marks(self, memory: Memory, readings: Readings) -> list[Marker]:
         """Return the other task's."""
         return self.task.marks(memory.task, readings)
 

@@ -38,6 +38,7 @@ def collected(run, tmp_path, monkeypatch):
     return collect
 
 
+@pytest.mark.slow
 def test_a_run_keeps_the_policy_of_each_evaluation(run):
     table = run_folder.table(run, "evaluations")
     agents = checkpoints.agents(run / "checkpoints")
@@ -89,6 +90,7 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
         assert summary["return"] == pytest.approx(table["return"][index], abs=1e-6), "of the evaluation, seed by seed"
 
 
+@pytest.mark.slow
 def test_random_is_a_quality_too(collected):
     assert collected("--quality=random").returncode == 0
     (dataset_id,) = data.ids.existing()

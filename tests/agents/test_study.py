@@ -325,6 +325,7 @@ def test_without_submitit_it_says_what_to_install(tmp_path):
     assert done.stderr.startswith(line) and done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("task", "presets"),
     [

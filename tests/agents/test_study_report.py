@@ -77,6 +77,7 @@ def test_report(made):
     assert "As in the paper. Begun: 48 of 49 runs.\n" in study_report.write("more", more, folder).read_text()
 
 
+@pytest.mark.slow
 def test_claims(made):
     """On the paper's own finals each sentence comes out as in its table; one does not hold there."""
     study, folder = made

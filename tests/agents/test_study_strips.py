@@ -63,6 +63,7 @@ def test_a_strip_is_published_with_the_style(finished, monkeypatch):
     assert style.read_text() == measured
 
 
+@pytest.mark.slow
 def test_the_policy_is_that_of_the_latest_whole_evaluation(finished, monkeypatch):
     """A later one is there already while its episodes are still played."""
     row, runs, results = finished

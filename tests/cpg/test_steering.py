@@ -58,6 +58,7 @@ def test_random_bodies_obey(seed):
     assert abs(motion - COMMANDS).mean() <= 0.05
 
 
+@pytest.mark.slow
 def test_an_open_loop_does_not():
     motion, _ = obeyed(ROBOTS["queen"], "tuned", 150)
     assert abs(motion - COMMANDS).mean() > 0.2

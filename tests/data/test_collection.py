@@ -164,6 +164,7 @@ def test_episodes_depend_on_seed_and_settings_alone(settings):
     assert len(set(expected)) == 7
 
 
+@pytest.mark.slow
 def test_every_setting_matters():
     base = data.Settings(QUEEN, **SHORT)
     changes = ({}, {"noise": 0.1}, {"presets": ("fast",)}, {"policy": "zero", "presets": ()})
@@ -199,6 +200,7 @@ def test_more_episodes_continue_and_a_finished_dataset_stays_as_it_is(root):
         assert {type(opened.get(name, getlink=True)) for name in opened} == {h5py.HardLink}
 
 
+@pytest.mark.slow
 def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
     settings = data.Settings(QUEEN, **SHORT)
     collect(ID, settings, 2)
@@ -229,6 +231,7 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
     assert [path.name for path in (root / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
 
 
+@pytest.mark.slow
 def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch):
     settings = data.Settings(QUEEN, presets=("slow", "medium"), **SHORT)
     collect(ID, settings, 2)

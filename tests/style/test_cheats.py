@@ -89,6 +89,7 @@ def test_dragging_one_leg_shows(robot):
     assert drag["asymmetry"].legs["fl"] > 0.05
 
 
+@pytest.mark.slow
 @ONE
 def test_walking_backwards_shows(robot):
     honest, cheat = measured(robot), measured(robot, "back")

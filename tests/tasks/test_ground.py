@@ -23,7 +23,7 @@ from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level
 from arc_suite.tasks.sensors import AHEAD, ASIDE, SCAN
 
 KINDS = ("rough", "slopes", "stairs", "gaps")
-every_kind = pytest.mark.parametrize("kind", KINDS)
+every_kind = pytest.mark.parametrize("kind", tiers(KINDS, lambda kind: kind == "gaps"))
 
 
 def opened(kind="stairs", robot="tick", **settings):
@@ -39,7 +39,11 @@ def inner(memory):
 
 @pytest.mark.parametrize(
     ("name", "curriculum", "kinds", "lanes"),
-    [("course", False, KINDS, 8), ("course", True, KINDS, 4 * LEVELS), ("stairs", False, ["stairs"], 4)],
+    [
+        ("course", False, KINDS, 8),
+        pytest.param("course", True, KINDS, 4 * LEVELS, marks=pytest.mark.slow),
+        pytest.param("stairs", False, ["stairs"], 4, marks=pytest.mark.slow),
+    ],
 )
 def test_height_is_that_of_rays_in_every_lane(name, curriculum, kinds, lanes):
     task, model = prepared("leaper", name, {"curriculum": curriculum})
@@ -123,7 +127,11 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, task in TASKS.items() if isinstance(getattr(task, "ground", None), Lanes)]
+    "name",
+    tiers(
+        [name for name, task in TASKS.items() if isinstance(getattr(task, "ground", None), Lanes)],
+        lambda name: name == "course",
+    ),
 )
 def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
     environment, task, _ = opened(name, "bastion")
@@ -140,6 +148,7 @@ def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
     assert lanes <= {arena.start(lane) for lane in range(len(arena.lanes))}
 
 
+@pytest.mark.slow
 def test_what_is_drawn_and_in_which_order():
     """Kind, two for the level, lane, place; then the noise of the state, yaw, ends and commands of the schedule."""
     task = prepared("tick", "course", {"curriculum": True, "level": 3})[0]

@@ -34,6 +34,7 @@ def package(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_task(package):
     out = package("-c", USING_A_TASK + "print(observations.shape, [block.shape for block in blocks.values()])")
     assert out.startswith("[0.7] {'height': ")
@@ -42,6 +43,7 @@ def test_task(package):
     assert out.endswith(f"\n{2 + 4 + 3 + 4}\n")  # the quaternion, hips, velocities of the torso, hips
 
 
+@pytest.mark.slow
 def test_arena(package):
     out = package("-c", USING_AN_ARENA + "print(environment.progress if 0 else steeper.reset().observation.keys())")
     assert out.splitlines()[-1].startswith(

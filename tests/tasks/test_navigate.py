@@ -201,6 +201,7 @@ def test_rows_are_single_environments_and_carry_on_after_a_copy():
     rows.close()
 
 
+@pytest.mark.slow
 def test_pictures_show_the_goal_and_pillars():
     rows = VectorEnv("tick", "navigate", 2, 1, render_mode="rgb_array", height=60, width=80)
     single = arc_suite.load("tick", "navigate")

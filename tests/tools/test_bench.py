@@ -11,8 +11,10 @@ import pytest
 from benchmark import growth, ordinary, report, tasks
 from numpy.testing import assert_allclose
 from PIL import Image
+from tiers import tiers
 
 import arc_suite
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "bench.py"
@@ -87,7 +89,7 @@ def is_a_plot(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--robots=quen"], "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)"),
+        (["--robots=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})"),
         (["--rows=1,many"], "--rows: expected positive integers with commas between, got '1,many'"),
         (["--workers=0"], "--workers: expected positive integers with commas between, got '0'"),
         (["--document=missing.md"], "--document: no file missing.md"),
@@ -102,7 +104,7 @@ def test_bad_flags_are_one_line_errors(arguments, message, tmp_path):
     assert not (tmp_path / "results.json").exists()
 
 
-@pytest.mark.parametrize("robot", ["queen", "bastion", "tick", "leaper"])
+@pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "leaper"))
 def test_ordinary_environment_has_the_same_observation_and_reward(robot, tmp_path):
     path = tmp_path / "model.xml"
     path.write_text(ordinary.full_model(robot).to_xml_string())
@@ -128,6 +130,7 @@ def test_grown_bodies_have_their_legs_and_links(legs, links):
     assert len(body.part_names) == 1 + legs * (links + 1)
 
 
+@pytest.mark.slow
 def test_what_every_task_costs(monkeypatch):
     for name, value in {"ROWS": 2, "_ONSET": 1, "_STEPS": 1}.items():
         monkeypatch.setattr(tasks, name, value)

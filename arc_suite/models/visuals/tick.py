@@ -1,8 +1,8 @@
 """Tick: a pale insect with a head, two black eyes under a brow, and an orange glow below."""
 
-from arc_suite.models.looks.look import Look, Ornament
+from arc_suite.models.visuals.spec import Ornament, Visuals
 
-LOOK = Look(
+VISUALS = Visuals(
     colours={
         "shell": (0.86, 0.82, 0.72),
         "trim": (0.60, 0.50, 0.38),

@@ -1,17 +1,17 @@
-"""Marks: what a task asks for, as pictures show it beside the simulation."""
+"""Debug markers: arrows and cylinders that show a task's command in pictures."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 
-class Mark(NamedTuple):
-    """A solid that is only there to be seen.
+class Marker(NamedTuple):
+    """A solid in pictures, absent from the simulation.
 
     Attributes:
         shape: "arrow" or "cylinder".
         start: (3,) of its axis in the world, m.
-        end: (3,) likewise; an arrow's tip.
+        end: (3,) of its axis, or of an arrow's tip, in the world, m.
         radius: m; of an arrow's shaft.
         colour: red, green, blue and opacity, 0 to 1.
     """

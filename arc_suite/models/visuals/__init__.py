@@ -1,18 +1,18 @@
-"""What a body looks like: decorations that weigh nothing and touch nothing."""
+"""Visuals of a body: colours and decorations, without mass or contacts."""
 
 import math
 
 import numpy as np
 from dm_control import mjcf
 
-from arc_suite.models.looks import bastion, leaper, queen, tick
-from arc_suite.models.looks.generic import generic
-from arc_suite.models.looks.look import Look
-from arc_suite.models.looks.scene import add_scene
+from arc_suite.models.visuals import bastion, leaper, queen, tick
+from arc_suite.models.visuals.generic import generic
+from arc_suite.models.visuals.scene import add_scene
+from arc_suite.models.visuals.spec import Visuals
 from arc_suite.robots.spec import Body, Leg, Link
 
-# A creature without a row has the look `generic`.
-LOOKS = {"queen": queen.LOOK, "bastion": bastion.LOOK, "tick": tick.LOOK, "leaper": leaper.LOOK}
+# A creature without an entry has the visuals `generic`.
+VISUALS = {"queen": queen.VISUALS, "bastion": bastion.VISUALS, "tick": tick.VISUALS, "leaper": leaper.VISUALS}
 
 GROUP = 2  # of decorations; what weighs or touches is in group 0
 _INERT = {"group": GROUP, "mass": 0.0, "contype": 0, "conaffinity": 0}
@@ -31,35 +31,35 @@ def reward_colour(share: float) -> np.ndarray:
 
 
 def decorate(root: mjcf.RootElement, body: Body) -> None:
-    """Add looks to a body on its ground; nothing of its dynamics changes.
+    """Add visuals to a body on its ground; its dynamics stay the same.
 
-    Added are sky, light and a grid on the ground, materials of all geoms, and geoms without mass or
-    contacts to torso and joints. All of it is named; the geoms are called `look-...`, which no
-    part of a spec can be. The material `glow` is the one that can show a reward.
+    Adds sky, light and a grid on the ground, materials for all geoms, and geoms without mass or
+    contacts on torso and joints. All of them are named; the names of the geoms begin with `visual-`,
+    which no part of a spec can have. The material `glow` can show a reward.
 
     Args:
         root: of `builder.build`, with a geom `floor`.
         body: the spec it was built from.
     """
-    look = LOOKS.get(body.name) or generic(body)
+    visuals = VISUALS.get(body.name) or generic(body)
     add_scene(root, body.torso.standing_height)
-    for name, colour in look.colours.items():
+    for name, colour in visuals.colours.items():
         emission, specular, shininess = _FINISHES.get(name, _PLAIN)
         root.asset.add(
             "material", name=name, rgba=(*colour, 1.0), emission=emission, specular=specular, shininess=shininess
         )
     for solid in (*body.torso.solids, *body.ballast):
-        root.find("geom", solid.name).material = look.solids.get(solid.name, "shell")
+        root.find("geom", solid.name).material = visuals.solids.get(solid.name, "shell")
     torso = root.find("body", "torso")
-    for ornament in look.ornaments:
+    for ornament in visuals.ornaments:
         for part in (ornament, ornament.mirrored()) if ornament.paired else (ornament,):
             euler = [math.radians(angle) for angle in part.euler_deg]
             _add(torso, part.name, part.material, part.shape, part.size, pos=part.position, euler=euler)
     for leg in body.legs:
-        _dress(root, leg, look)
+        _dress(root, leg, visuals)
 
 
-def _dress(root: mjcf.RootElement, leg: Leg, look: Look) -> None:
+def _dress(root: mjcf.RootElement, leg: Leg, visuals: Visuals) -> None:
     radius = 0.0
     for link in leg.links:
         name = leg.full_name(link)
@@ -67,7 +67,7 @@ def _dress(root: mjcf.RootElement, leg: Leg, look: Look) -> None:
         root.find("geom", name).material = "limb"
         radius = max(radius, link.radius)  # the wider of the two links that meet here
         if link.joint:
-            light = "glow" if look.glowing is None or link.joint.name in look.glowing else "trim"
+            light = "glow" if visuals.glowing is None or link.joint.name in visuals.glowing else "trim"
             axis = link.joint.axis
             _add(part, f"{name}_hub", "frame", "cylinder", (1.12 * radius, radius), zaxis=axis)
             _add(part, f"{name}_band", light, "cylinder", (1.2 * radius, 0.3 * radius), zaxis=axis)
@@ -95,4 +95,4 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _add(part, name: str, material: str, shape: str, size, **place) -> None:
-    part.add("geom", name=f"look-{name}", material=material, type=shape, size=size, **place, **_INERT)
+    part.add("geom", name=f"visual-{name}", material=material, type=shape, size=size, **place, **_INERT)

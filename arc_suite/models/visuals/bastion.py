@@ -1,8 +1,8 @@
 """Bastion: three overlapping armour shells, a face shield with a cyan eye slit, and a gun."""
 
-from arc_suite.models.looks.look import Look, Ornament
+from arc_suite.models.visuals.spec import Ornament, Visuals
 
-LOOK = Look(
+VISUALS = Visuals(
     colours={
         "shell": (0.36, 0.43, 0.38),
         "side": (0.25, 0.31, 0.28),

@@ -1,4 +1,4 @@
-"""What looks are made of: colours and ornaments."""
+"""The parts of visuals: colours and ornaments."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -8,16 +8,16 @@ Vector = tuple[float, float, float]
 
 
 class Ornament(NamedTuple):
-    """A shape on the torso that is only there to be seen.
+    """A shape on the torso without mass or contacts.
 
     Attributes:
-        name: unique in the look; the geom is called `look-<name>`.
-        material: a key of the look's colours.
+        name: unique in the visuals; the geom is called `visual-<name>`.
+        material: a key of the visuals' colours.
         shape: a MuJoCo geom type.
         size: half-extents as MuJoCo takes them for the shape, m.
         position: centre in the torso's frame, m.
         euler_deg: turns about the x, y and z axes of the turning frame, in that order.
-        paired: has a twin across the x-z plane, `look-<name>_right`.
+        paired: has a twin across the x-z plane, `visual-<name>_right`.
     """
 
     name: str
@@ -34,8 +34,8 @@ class Ornament(NamedTuple):
         return self._replace(name=f"{self.name}_right", position=(x, -y, z), euler_deg=(-a, b, -c), paired=False)
 
 
-class Look(NamedTuple):
-    """The looks of one creature.
+class Visuals(NamedTuple):
+    """Colours and ornaments of one creature.
 
     Attributes:
         colours: of the materials; "shell", "trim", "frame", "limb" and "glow" are those of any body.

@@ -1,8 +1,8 @@
 """Leaper: a white ball with one dark eye ringed in red, thrusters behind, yellow joints."""
 
-from arc_suite.models.looks.look import Look, Ornament
+from arc_suite.models.visuals.spec import Ornament, Visuals
 
-LOOK = Look(
+VISUALS = Visuals(
     colours={
         "shell": (0.78, 0.80, 0.83),
         "trim": (0.85, 0.08, 0.06),

@@ -1,4 +1,4 @@
-"""The place in which creatures are shown: sky, ground, light and the quality of pictures."""
+"""The scene in pictures: sky, ground, light and rendering quality."""
 
 import math
 

@@ -1,8 +1,8 @@
 """Queen: a wide ivory shell that floats above a dark chassis, amber joints, a cyan eye."""
 
-from arc_suite.models.looks.look import Look, Ornament
+from arc_suite.models.visuals.spec import Ornament, Visuals
 
-LOOK = Look(
+VISUALS = Visuals(
     colours={
         "shell": (0.80, 0.77, 0.71),
         "trim": (0.38, 0.20, 0.46),
