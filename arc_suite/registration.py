@@ -104,7 +104,7 @@ def _check_parameters(body: Body, task: str, row: Mapping[str, Any]) -> None:
     needed = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
     if task == "walk" and (missing := sorted(needed - row.keys())):
         raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
-    TASKS[task].fitted(body, row)
+    TASKS[task].settings_for(body, row)
 
 
 def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any]) -> None:

@@ -133,7 +133,7 @@ MUTANTS = (
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
     # Modifiers.
-    Mutant("a leg limp from the start", "memory.elapsed >= LIMP_FROM", "memory.elapsed >= 0"),
+    Mutant("a leg limp from the start", "memory.elapsed >= FAILS_FROM", "memory.elapsed >= 0"),
     Mutant("kicks a step late", "% last + 1 == memory.kick_steps", "% last == memory.kick_steps"),
     Mutant("weak motors give all", "ctrl = memory.strength * inputs.ctrl", "ctrl = inputs.ctrl"),
     Mutant("actions not delayed", "memory, asked = _delayed(memory, action)", "memory, _ = _delayed(memory, action)"),

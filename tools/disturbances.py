@@ -43,7 +43,7 @@ MODIFIERS = [
 def modifiers(body) -> list[dict]:
     """Settings of the rows of a table: those of every body, and each leg of its left side limp."""
     legs = [index for index, leg in enumerate(body.legs) if leg.foot_position[1] > 0.0]
-    return [*MODIFIERS, *({"limp": leg} for leg in legs)]
+    return [*MODIFIERS, *({"actuator_failure": leg} for leg in legs)]
 
 
 def episodes(task: str, body, settings: dict, policy: str, preset: str, command=None) -> dict[str, np.ndarray]:

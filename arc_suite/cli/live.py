@@ -113,7 +113,7 @@ class Live:
             self._environment.command("command", self.wanted)
 
     def _asked(self) -> list[Marker]:
-        return self._environment.task.marks(self._environment.physics)
+        return self._environment.task.markers(self._environment.physics)
 
     def _qpos(self) -> np.ndarray:
         return self._environment.physics.data.qpos.copy()

@@ -54,4 +54,4 @@ def gait_of(task: Task) -> Gait:
 
 
 def _usual(body: Body) -> Parameters:
-    return TASKS["walk"].fitted(body, {}).parameters
+    return TASKS["walk"].settings_for(body, {}).parameters

@@ -34,7 +34,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     if arena is not None and kind.own_arena:
         raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
     changes = {**kind.modifiers, **{name: settings.pop(name) for name in modifiers.NAMES if name in settings}}
-    settings = kind.fitted(body, settings)
+    settings = kind.settings_for(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)
     step = SUBSTEPS * model.opt.timestep

@@ -23,8 +23,8 @@ def taken(environment) -> dict[str, np.ndarray]:
     arrays = {f"batch/{name}": array for name, array in environment.batch.snapshot().items()}
     arrays |= {f"memory/{place}": leaf.copy() for place, leaf in enumerate(trees.leaves(environment._memory))}
     arrays |= {name.lstrip("_"): getattr(environment, name).copy() for name in _ARRAYS}
-    for row, carry in enumerate(environment._carries):
-        arrays |= {f"carry/{row}/{place}": np.asarray(leaf) for place, leaf in enumerate(trees.leaves(carry))}
+    for row, carry in enumerate(environment._streams):
+        arrays |= {f"stream/{row}/{place}": np.asarray(leaf) for place, leaf in enumerate(trees.leaves(carry))}
     return arrays | {
         "random/keys": np.array(keys),
         "random/positions": np.array(positions),
@@ -53,8 +53,8 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
             key, position, half, normal = parts
             random.set_state(("MT19937", key, int(position), int(half), float(normal)))
             first = environment.task.first()
-            carry = (arrays[f"carry/{row}/{place}"] for place, _ in enumerate(trees.leaves(first)))
-            environment._carries[row] = _refilled(first, carry)
+            carry = (arrays[f"stream/{row}/{place}"] for place, _ in enumerate(trees.leaves(first)))
+            environment._streams[row] = _refilled(first, carry)
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise ValueError(f"snapshot: of other rows or another task: {checks.quoted(error)}") from None
 

@@ -104,7 +104,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.batch = Batch(model, self.num_envs, threads, self.task.reads)
         self._memory = None  # of all rows, with a leading axis
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
-        self._carries = [self.task.first() for _ in range(self.num_envs)]
+        self._streams = [self.task.first() for _ in range(self.num_envs)]
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # rows whose next episode is the first of its stream
         if seed is not None:
@@ -370,7 +370,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     def _render_row(self, row: int) -> np.ndarray:
         task, scene, marks = self.task, self.task.scene, ()
         if self._memory is not None:
-            marks = task.marks(trees.mapped(lambda field: field[row], self._memory), task.read(self.batch.part(row)))
+            marks = task.markers(trees.mapped(lambda field: field[row], self._memory), task.read(self.batch.part(row)))
         qpos, mocap_pos = self.batch.data.qpos[row], self.batch.mocap_pos[row]
         return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, markers=marks, **self._picture)
 
@@ -379,14 +379,14 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         task, starts = self.task, []
         for row in np.flatnonzero(rows):
             if not self._streams_begin[row]:
-                self._carries[row] = task.carry(trees.mapped(lambda field, row=row: field[row], self._memory))
-            starts.append(task.start(self._randoms[row], self._carries[row]))
+                self._streams[row] = task.stream_state(trees.mapped(lambda field, row=row: field[row], self._memory))
+            starts.append(task.start(self._randoms[row], self._streams[row]))
         qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         self._streams_begin &= ~rows
         mocap = None if mocap[0] is None else np.stack(mocap)
         self.batch.reset(rows, np.stack(qpos), np.stack(qvel), mocap, models)
         memory, readings = trees.mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(rows))
-        lifted = task.lift(memory, readings)
+        lifted = task.clear_spawn(memory, readings)
         if lifted is not None:
             self.batch.place(rows, lifted)
             readings = task.read(self.batch.part(rows))
@@ -422,7 +422,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Start new streams of random numbers in some rows, but for rows whose seed is None."""
         for row in np.flatnonzero(rows):
             if seeds[row] is not None:
-                self._randoms[row], self._carries[row] = np.random.RandomState(seeds[row]), self.task.first()
+                self._randoms[row], self._streams[row] = np.random.RandomState(seeds[row]), self.task.first()
                 self._stream_seeds[row], self._streams_begin[row] = seeds[row], True
 
     def _rows(self, mask, name: str = "reset_mask") -> np.ndarray:

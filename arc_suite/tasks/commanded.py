@@ -126,7 +126,7 @@ class CommandTask(Task):
         cls.own_arena, cls.commands = cls.ground.own_arena, cls.command.live
 
     @classmethod
-    def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
         names, elsewhere = (*cls.ground.settings, *parameters.NAMES), () if cls.own_arena else ("arena",)
         given = parameters.values(body, overrides, cls.name, names, elsewhere)
@@ -180,13 +180,13 @@ class CommandTask(Task):
         """Return the ground's stream state."""
         return self.settings.ground.first()
 
-    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the start, in this order: ground, state, yaw, schedule, obstacles, and what the command draws.
 
         The schedule is drawn for every command, and used by `command.Schedule` alone.
         """
         context, ground = self.context, self.settings.ground
-        ground_memory, displacement = ground.place(context, random, carry)
+        ground_memory, displacement = ground.place(context, random, stream)
         qpos, qvel = paper.drawn_state(self.scene.standing, self.settings.noise, random)
         qpos[:2] += displacement
         qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
@@ -207,9 +207,9 @@ class CommandTask(Task):
         readings = reading.read(data, layout, self.scene.arena, forces)
         return Sensed(*readings, heading, self.settings.ground.touches(data))
 
-    def lift(self, memory: Memory, readings: Sensed) -> np.ndarray:
+    def clear_spawn(self, memory: Memory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
-        return self.lifted(readings)
+        return self.cleared(readings)
 
     def begin(self, memory: Memory, readings: Sensed) -> Memory:
         """Remember where the torso is, and what the command asks for there."""
@@ -322,12 +322,12 @@ class CommandTask(Task):
         numpy = memory.core.place.__array_namespace__()
         return numpy.where(terminated | truncated, self.context.steps, steps + (steps == 0))
 
-    def carry(self, memory: Memory) -> Any:
+    def stream_state(self, memory: Memory) -> Any:
         """Return the stream state of the ground, by the outcome of the episode."""
         outcome = self.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
-    def marks(self, memory: Memory, readings: Sensed) -> list[Marker]:
+    def markers(self, memory: Memory, readings: Sensed) -> list[Marker]:
         """Return arrows over the torso: the desired velocity, and the sideways velocity of a point R ahead.
 
         The latter shows turning. At the target velocity an arrow is R long.

@@ -10,10 +10,10 @@ what differs between one environment and a batch.
 
 An episode, as a driver runs it, for one environment or with a leading axis for all rows:
 
-    start = task.start(random, carry)            # all randomness of the episode
+    start = task.start(random, stream)            # all randomness of the episode
     ... the driver resets the simulation to start.qpos and start.qvel ...
     readings = task.read(data)
-    qpos = task.lift(start.memory, readings)     # if not None: written, and read again
+    qpos = task.clear_spawn(start.memory, readings)     # if not None: written, and read again
     memory = task.begin(start.memory, readings)
     while not ended:
         memory, inputs = task.before(memory, action)
@@ -22,7 +22,7 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
         memory = task.after(memory, readings)
         terms, blocks = task.terms(memory, readings), task.observe(memory, readings)
         terminated, truncated = task.ended(memory, readings)
-    carry = task.carry(memory)
+    carry = task.stream_state(memory)
 """
 
 import collections
@@ -139,7 +139,7 @@ class Task(ABC):
 
     @classmethod
     @abstractmethod
-    def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Any:
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Any:
         """Return the settings for a body, some of them overridden.
 
         Raises:
@@ -199,7 +199,7 @@ class Task(ABC):
         return None
 
     @abstractmethod
-    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw how an episode starts, and everything else that is random in it.
 
         The number of draws is fixed and does not depend on what is drawn, so that an episode is a
@@ -214,14 +214,14 @@ class Task(ABC):
         """Take the readings of `MjData`, or of anything with its fields under leading axes."""
         return reading.read(data, self.scene.layout, self.scene.arena)
 
-    def lift(self, memory, readings: Readings) -> np.ndarray | None:
+    def clear_spawn(self, memory, readings: Readings) -> np.ndarray | None:
         """Return the positions (..., nq) that bring every foot clear of the ground at the start of an episode.
 
         None on level ground, which pushes out what starts in it; any other ground holds it fast.
         """
-        return None if self.scene.arena.is_level else self.lifted(readings)
+        return None if self.scene.arena.is_level else self.cleared(readings)
 
-    def lifted(self, readings: Readings) -> np.ndarray:
+    def cleared(self, readings: Readings) -> np.ndarray:
         """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
         radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
         clear = radii + _CLEAR * self.scene.body.torso.standing_height
@@ -266,11 +266,11 @@ class Task(ABC):
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""
         return {}
 
-    def marks(self, memory, readings: Readings) -> list[Marker]:
+    def markers(self, memory, readings: Readings) -> list[Marker]:
         """Return what pictures of one environment show of what is asked; no leading axes."""
         return []
 
-    def carry(self, memory) -> Any:
+    def stream_state(self, memory) -> Any:
         """Return what the next episode of the stream starts from, given the memory at an episode's end."""
         return None
 

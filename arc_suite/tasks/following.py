@@ -21,7 +21,7 @@ class Shoved(CommandTask):
 class Limp(CommandTask):
     """Following a velocity command with a leg, drawn for each episode, whose motors fail."""
 
-    name, command, modifiers = "limp", Schedule(), {"limp": True}
+    name, command, modifiers = "limp", Schedule(), {"actuator_failure": True}
 
 
 class Rough(CommandTask):

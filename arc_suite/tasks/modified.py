@@ -19,7 +19,7 @@ from arc_suite.robots import mirror
 from arc_suite.tasks import noise
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Mirror
-from arc_suite.tasks.modifiers import LIMP_FROM, Modifiers, checked
+from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
 from arc_suite.tasks.readings import Readings
 
 KICKS, SHORTEST, LONGEST = 25, 40, 121  # of a schedule, and control steps from one to the next
@@ -37,7 +37,7 @@ class Changes(NamedTuple):
         kick_steps: (..., KICKS) control steps, counted from 1, before which kicks come.
         kicks: (..., KICKS, 2) changes of the torso's velocity in the world, m/s.
         strength: (..., joints) of the motors, a share.
-        limp: (..., joints) whether they are those of the limp leg.
+        failing: (..., joints) whether they are those of the leg whose motors fail.
         noise_key: (..., 1) uint32, from which the noise of the episode follows.
         delay: (...) of actions, control steps.
         waiting: (..., longest delay, joints) the latest actions, the newest first.
@@ -50,7 +50,7 @@ class Changes(NamedTuple):
     kick_steps: np.ndarray
     kicks: np.ndarray
     strength: np.ndarray
-    limp: np.ndarray
+    failing: np.ndarray
     noise_key: np.ndarray
     delay: np.ndarray
     waiting: np.ndarray
@@ -145,7 +145,7 @@ class Modified(Task):
     target_velocity = property(lambda self: self.task.target_velocity)
 
     @classmethod
-    def fitted(cls, body, overrides):
+    def settings_for(cls, body, overrides):
         """Refuse, as the other task fits its own settings."""
         raise TypeError("a modified task is made by tasks.modified.modified, of a task that is fitted")
 
@@ -154,17 +154,17 @@ class Modified(Task):
         """The other task's; what is drawn is as likely on either side.
 
         Raises:
-            ValueError: a leg of one side is limp in every episode, or as the other task; one line.
+            ValueError: a leg of one side fails in every episode, or as the other task; one line.
         """
-        leg = self.changes.limp
+        leg = self.changes.actuator_failure
         if not isinstance(leg, bool) and mirror.image(self.scene.body).legs[leg] != leg:
-            raise ValueError(f"limp: expected a leg that is drawn, or one on the midline, got {leg}")
+            raise ValueError(f"actuator_failure: expected a leg that is drawn, or one on the midline, got {leg}")
         return self.task.mirrors
 
     @functools.cached_property
     def blocks(self) -> Mapping[str, int]:
         """Those of the other task, but for what is left out."""
-        return {name: size for name, size in self.task.blocks.items() if name not in self.changes.without}
+        return {name: size for name, size in self.task.blocks.items() if name not in self.changes.exclude_blocks}
 
     @functools.cached_property
     def members(self) -> np.ndarray:
@@ -198,22 +198,22 @@ class Modified(Task):
         """Return the other task's."""
         return self.task.first()
 
-    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the other task's start, then what is random in the modifiers; see `Draws`."""
-        start, body, changes = self.task.start(random, carry), self.scene.body, self.changes
+        start, body, changes = self.task.start(random, stream), self.scene.body, self.changes
         drawn = draw(random, len(body.legs))
         joints = len(body.joint_names)
         directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
         unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
         low, high = changes.delay
-        leg = drawn.leg if changes.limp is True else changes.limp
+        leg = drawn.leg if changes.actuator_failure is True else changes.actuator_failure
         own = Changes(
             elapsed=np.zeros(1, np.uint32),
             terminated=np.False_,
             kick_steps=drawn.kick_steps,
             kicks=unit * drawn.kick_sizes[:, None] * directions,
             strength=np.full(joints, _within(changes.motor_strength, drawn.strength)),
-            limp=np.zeros(joints, bool) if changes.limp is False else self.members[leg],
+            failing=np.zeros(joints, bool) if changes.actuator_failure is False else self.members[leg],
             noise_key=np.array([drawn.noise_key], np.uint32),
             delay=low + int(drawn.delay * (high - low + 1)),
             waiting=np.zeros((high, joints)),
@@ -233,9 +233,9 @@ class Modified(Task):
         """Take the other task's readings."""
         return self.task.read(data)
 
-    def lift(self, memory: Memory, readings: Readings) -> np.ndarray | None:
+    def clear_spawn(self, memory: Memory, readings: Readings) -> np.ndarray | None:
         """Return the other task's qpos (..., nq) of the start, or None."""
-        return self.task.lift(memory.task, readings)
+        return self.task.clear_spawn(memory.task, readings)
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
         """Return the other task's memory, and the state of the joints."""
@@ -254,8 +254,8 @@ class Modified(Task):
             action = self.torques(own, action)
         inner, inputs = self.task.before(memory.task, action)
         ctrl = own.strength * inputs.ctrl
-        if changes.limp is not False:
-            ctrl = ctrl * ~(own.limp & (own.elapsed >= LIMP_FROM))
+        if changes.actuator_failure is not False:
+            ctrl = ctrl * ~(own.failing & (own.elapsed >= FAILS_FROM))
         kick = self._kick(own, inputs.kick) if changes.kicks else inputs.kick
         return Memory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick)
 
@@ -293,7 +293,7 @@ class Modified(Task):
     def observe(self, memory: Memory, readings: Readings) -> dict:
         """Return the other task's blocks with noise, without those that are left out."""
         observed, own = self.task.observe(memory.task, readings), memory.changes
-        blocks = {name: observed[name] for name in observed if name not in self.changes.without}
+        blocks = {name: observed[name] for name in observed if name not in self.changes.exclude_blocks}
         if self.noises:
             count = max(part.stop for part, _ in self.noises.values())
             drawn = noise.noise(own.noise_key, own.elapsed, count)
@@ -309,17 +309,17 @@ class Modified(Task):
         metrics = self.task.progress(memory.task)
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
-    def marks(self, memory: Memory, readings: Readings) -> list[Marker]:
+    def markers(self, memory: Memory, readings: Readings) -> list[Marker]:
         """Return the other task's."""
-        return self.task.marks(memory.task, readings)
+        return self.task.markers(memory.task, readings)
 
     def phase(self, memory: Memory):
         """Return the other task's phase (...) of the gait, rad."""
         return self.task.phase(memory.task)
 
-    def carry(self, memory: Memory) -> Any:
+    def stream_state(self, memory: Memory) -> Any:
         """Return the other task's."""
-        return self.task.carry(memory.task)
+        return self.task.stream_state(memory.task)
 
     def _sensed(self, changes: Changes, readings: Readings) -> Changes:
         if self.changes.actions == "torque":

@@ -71,7 +71,7 @@ class Walk(Task):
     name = "walk"
 
     @classmethod
-    def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
         given = parameters.values(body, overrides, cls.name, NAMES, elsewhere=("arena",))
         return Settings(
@@ -114,7 +114,7 @@ class Walk(Task):
         """Return the phase (...) of the gait, rad."""
         return self.clock.at(self.clock.phases, memory.tick)
 
-    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the state: the standing pose, with noise. The clock starts at 0, with no action before."""
         qpos, qvel = paper.drawn_state(self.scene.standing, self.settings.noise, random)
         still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)

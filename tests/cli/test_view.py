@@ -136,7 +136,7 @@ def test_markers_of_the_task_are_shown(play):
     shown.press(glfw.KEY_UP)
     viewer = Viewer(40)
     play(shown, viewer)
-    markers = environment.task.marks(environment.physics)
+    markers = environment.task.markers(environment.physics)
     assert viewer.user_scn.ngeom == len(markers) == 2  # no arrow turns
     before, middle, after = (shown.markers(share)[1].end for share in (0.0, 0.5, 1.0))
     np.testing.assert_allclose(middle, 0.5 * (before + after))

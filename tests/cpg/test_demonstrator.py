@@ -59,7 +59,7 @@ LEFT = ("l1", "l2", "l3", "fl", "rl")
         (ROBOTS["queen"], "walk", {}, "refined"),
         (ROBOTS["queen"], "shoved", {}, "steered"),
         (ROBOTS["tick"], "rough", {}, "surefooted"),
-        (ROBOTS["tick"], "rough", {"without": "command"}, "refined"),
+        (ROBOTS["tick"], "rough", {"exclude_blocks": "command"}, "refined"),
         (ROBOTS["leaper"], "rough", {}, "balanced"),
         (ROBOTS["tick"], "gaps", {}, "sighted"),
         (ROBOTS["tick"], "navigate", {}, "planned"),

@@ -55,8 +55,14 @@ def replay(environment, seed, actions):
     return np.array(observations), np.array(rewards), terms, np.array(terminations), np.array(truncations)
 
 
-MODIFIERS = {"kicks": 1.0, "motor_strength": [0.5, 1.0], "limp": True, "friction": [0.3, 1.0], "mass": [0.8, 1.5]}
-MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "without": "contact_forces"}
+MODIFIERS = {
+    "kicks": 1.0,
+    "motor_strength": [0.5, 1.0],
+    "actuator_failure": True,
+    "friction": [0.3, 1.0],
+    "mass": [0.8, 1.5],
+}
+MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "exclude_blocks": "contact_forces"}
 BUMPS = Setup.of("queen", "walk", {"arena": "bumps"})
 RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
 

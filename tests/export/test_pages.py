@@ -106,7 +106,7 @@ def test_obstacles_and_goals_come_along():
     assert places >= {tuple(place) for place in data.mocap_pos if abs(place - data.qpos[:3]).max() < near}
     assert {solid["kind"] for solid in found["solids"]} == {"capsule"} and found["planes"] == [0.0]
     assert len(found["marks"]) == 12
-    wanted = run.marks(environment.physics)
+    wanted = run.markers(environment.physics)
     for (style, *ends), mark in zip(found["marks"][-1], wanted, strict=True):
         assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "colour": tuple(mark.colour)}
         np.testing.assert_allclose(ends, [*mark.start, *mark.end])

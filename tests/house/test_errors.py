@@ -48,7 +48,7 @@ class World:
         """Everything that a call could have changed."""
         rows = self.rows
         streams = [stream.get_state() for stream in rows._randoms]
-        episodes = rows._memory, rows._carries, rows._steps, rows._ended, rows._resting, rows._streams_begin
+        episodes = rows._memory, rows._streams, rows._steps, rows._ended, rows._resting, rows._streams_begin
         return (
             pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._law._clock)),
             rows.batch._simulations.state.tobytes(),

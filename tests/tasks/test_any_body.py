@@ -169,7 +169,7 @@ def test_a_domain_is_a_name_a_body_or_a_file(tmp_path):
 
 def test_settings_are_fitted_by_the_documented_formulas():
     body = generator.scaled(BODY, 2.0)  # 0.8 m high
-    settings = Walk.fitted(body, {})
+    settings = Walk.settings_for(body, {})
     parameters, weights, noise = settings.parameters, settings.weights, settings.noise
     assert parameters.target_velocity == pytest.approx(0.2 * math.sqrt(9.81 * 0.8))
     assert settings.velocity_band == pytest.approx(0.75 * parameters.target_velocity)
@@ -181,25 +181,29 @@ def test_settings_are_fitted_by_the_documented_formulas():
     assert parameters.phase_offsets == pytest.approx(expected)
     speed, rate = math.sqrt(9.81 * 0.8), math.sqrt(9.81 / 0.8)
     assert noise == pytest.approx((0.05 * 0.8, 0.02, 0.01 * speed, 0.004 * rate, 0.1, 0.02 * rate))
-    assert weights == Walk.fitted(ROBOTS["queen"], {}).weights
-    changed = Walk.fitted(body, {"target_velocity": 1.0, "healthy_range": (0.1, 2.0), "weights": {"control": -1.0}})
+    assert weights == Walk.settings_for(ROBOTS["queen"], {}).weights
+    changed = Walk.settings_for(
+        body, {"target_velocity": 1.0, "healthy_range": (0.1, 2.0), "weights": {"control": -1.0}}
+    )
     assert changed.parameters.target_velocity == 1.0
     assert changed.healthy_range == (0.1, 2.0)
     assert changed.weights["control"] == -1.0
     with pytest.raises(ValueError, match="^unknown setting of walk 'target_velocty'; did you mean 'target_velocity'"):
-        Walk.fitted(body, {"target_velocty": 1.0})
+        Walk.settings_for(body, {"target_velocty": 1.0})
 
 
 def test_numbers_go_by_the_name_of_a_body_that_has_the_joints():
     queen = ROBOTS["queen"]
     heavier = queen.replace(density=10.001)
-    for given, published in zip(Walk.fitted(heavier, {}).parameters, Walk.fitted(queen, {}).parameters, strict=True):
+    for given, published in zip(
+        Walk.settings_for(heavier, {}).parameters, Walk.settings_for(queen, {}).parameters, strict=True
+    ):
         np.testing.assert_array_equal(given, published)
     renamed = heavier.replace(name="heavier")
-    assert Walk.fitted(renamed, {}).parameters.target_velocity == pytest.approx(0.2 * unit(queen))
+    assert Walk.settings_for(renamed, {}).parameters.target_velocity == pytest.approx(0.2 * unit(queen))
     for body, got in ((BODY, "18"), (generator.generate(4, 3), "12 with other names")):
         with pytest.raises(ValueError) as error:
-            Walk.fitted(body.replace(name="bastion"), {})
+            Walk.settings_for(body.replace(name="bastion"), {})
         line = "walk: expected a body named 'bastion' to have the 12 joints of bastion, got"
         assert str(error.value) == f"{line} {got}; give it another name"
 

@@ -63,7 +63,7 @@ def started(task, seed=0):
     row = np.ones(1, bool)
     batch.reset(row, start.qpos[None], start.qvel[None])
     memory = frozen(start.memory)
-    lifted = task.lift(memory, task.read(read_only(batch, task)))
+    lifted = task.clear_spawn(memory, task.read(read_only(batch, task)))
     if lifted is not None:
         batch.place(row, lifted[None])
     return batch, frozen(task.begin(memory, task.read(read_only(batch, task))))
@@ -236,9 +236,9 @@ class Kicked(Walk):
     def first(self):
         return 100
 
-    def start(self, random, carry):
-        start = super().start(random, carry)
-        start.qpos[0] = carry
+    def start(self, random, stream):
+        start = super().start(random, stream)
+        start.qpos[0] = stream
         return start
 
     def before(self, memory, action):
@@ -247,7 +247,7 @@ class Kicked(Walk):
         kick[..., 2] = 0.5 * (memory.tick < 3)
         return memory, Inputs(inputs.ctrl, kick)
 
-    def carry(self, memory):
+    def stream_state(self, memory):
         return int(memory.tick)
 
 

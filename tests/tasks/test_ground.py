@@ -237,7 +237,7 @@ def test_distance_is_the_share_of_what_was_asked_for():
     assert distance == pytest.approx(0.5)
     fell = walked._replace(health=memory.health._replace(fell=np.True_))
     assert task.progress(fell)["distance"] == pytest.approx(0.25), "of 200 steps"
-    assert task.carry(walked) == Stream(0, distance, False)
+    assert task.stream_state(walked) == Stream(0, distance, False)
 
 
 @pytest.mark.parametrize(
@@ -362,6 +362,6 @@ def test_roaming_follows_commands_from_the_middle_of_the_lane():
     assert_array_equal(memory.core.desired, memory.command.schedule[0])
     assert "distance" not in environment.task.progress and "tracking" in environment.task.progress
     walked = memory._replace(core=memory.core._replace(steps=200, tracking=np.float64(120.0)))
-    assert task.carry(walked).outcome == pytest.approx(0.6)
+    assert task.stream_state(walked).outcome == pytest.approx(0.6)
     fell = walked._replace(health=memory.health._replace(fell=np.True_))
-    assert task.carry(fell).outcome == pytest.approx(0.12)
+    assert task.stream_state(fell).outcome == pytest.approx(0.12)

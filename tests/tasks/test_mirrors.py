@@ -24,8 +24,8 @@ def look_into_the_mirror(task):
     velocities = mirrors.joined([mirrors.POLAR, mirrors.AXIAL, action])
     start, clock = task.start, task.clock
 
-    def mirrored(random, carry):
-        begun = start(random, carry)
+    def mirrored(random, stream):
+        begun = start(random, stream)
         memory = begun.memory
         if "schedule" in getattr(memory, "command", memory)._fields:
             schedule = mirrors.PLANAR(memory.command.schedule)
@@ -108,7 +108,11 @@ def test_a_gait_whose_sides_move_together_keeps_its_clock():
     [
         ("queen", {"phase_offsets": (0, 1, 2, 3, 4, 5)}, "phase_offsets: expected legs across from each other to move"),
         ("queen", {"default_angles": np.arange(18) / 9}, "default_angles: expected mirrored poses left and right"),
-        ("queen", {"limp": 1}, "limp: expected a leg that is drawn, or one on the midline, got 1"),
+        (
+            "queen",
+            {"actuator_failure": 1},
+            "actuator_failure: expected a leg that is drawn, or one on the midline",
+        ),
         (generator.random_body(0), {}, "phase_offsets: expected legs across from each other"),
         (generator.random_body(10), {}, "random_10 is not its own mirror image: no leg is across from leg1"),
     ],
@@ -138,9 +142,9 @@ def test_every_task_has_a_mirror(robot, task):
 
 def test_modifiers_leave_a_task_its_mirror_image():
     plain = arc_suite.symmetry("tick", "steer")
-    modified = arc_suite.symmetry("tick", "steer", {"limp": True, "kicks": 1.0, "actions": "position"})
+    modified = arc_suite.symmetry("tick", "steer", {"actuator_failure": True, "kicks": 1.0, "actions": "position"})
     for mine, other in zip(modified, plain, strict=True):
         assert_array_equal(mine.sources, other.sources)
         assert_array_equal(mine.signs, other.signs)
-    blind = arc_suite.symmetry("tick", "steer", {"without": "contact_forces"})
+    blind = arc_suite.symmetry("tick", "steer", {"exclude_blocks": "contact_forces"})
     assert len(blind.observation.sources) == len(plain.observation.sources) - 150

@@ -211,7 +211,7 @@ def test_pictures_show_the_goal_and_pillars():
     shown = single.physics.render(60, 80)
     assert_array_equal(rows.render()[1], shown)
     task, memory = single.task.definition, single.task.memory
-    disc = task.marks(memory, task.read(single.physics.data.ptr))[-1]
+    disc = task.markers(memory, task.read(single.physics.data.ptr))[-1]
     assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.context.reach)
     assert_array_equal(disc.start[:2], memory.command.goals[0])
     single.physics.data.mocap_pos[:, :2] += 100.0

@@ -252,7 +252,7 @@ def test_pictures_show_the_command_as_arrows():
     environment.command("command", (0.5, -0.25, 0.5))
     task, memory = environment.task.definition, environment.task.memory
     readings, heading, reach = task.read(environment.physics.data.ptr), memory.core.place[2], task.context.reach
-    hub, going, turning = task.marks(memory, readings)
+    hub, going, turning = task.markers(memory, readings)
     assert (hub.shape, going.shape, turning.shape) == ("cylinder", "arrow", "arrow")
     assert_array_equal(hub.start, going.start)
     assert_allclose(rotations.headed((going.end - going.start)[:2], heading), (0.5 * reach, -0.25 * reach))
@@ -260,7 +260,7 @@ def test_pictures_show_the_command_as_arrows():
     assert_allclose(rotations.headed((turning.end - turning.start)[:2], heading), (0.0, 0.5 * reach), atol=1e-12)
     shown = environment.physics.render(60, 80)
     environment.command("command", (0.0, 0.0, 0.0))
-    assert [mark.shape for mark in task.marks(environment.task.memory, readings)] == ["cylinder"]
+    assert [mark.shape for mark in task.markers(environment.task.memory, readings)] == ["cylinder"]
     stopped = environment.physics.render(60, 80)
     assert not np.array_equal(shown, stopped)
     rows = VectorEnv("queen", "steer", 2, render_mode="rgb_array", height=60, width=80)

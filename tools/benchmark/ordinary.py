@@ -52,7 +52,7 @@ class OrdinaryEnv(MujocoEnv):
             **kwargs: of `MujocoEnv`.
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
-        settings = Walk.fitted(ROBOTS[robot], {})
+        settings = Walk.settings_for(ROBOTS[robot], {})
         self._settings, self._weights, self._numbers = settings, settings.weights, settings.parameters
         self._base_noise, self._joint_noise = settings.noise.position_noise, settings.noise.joint_angle_noise
         self._torso = self.model.body("torso").id
