@@ -434,7 +434,7 @@ def test_live_commands_reach_the_task():
         ({"kicks": True}, "kicks: expected a number from 0 to 100, got True"),
         ({"actuator_failure": 6}, "actuator_failure: expected an integer from 0 to 5, got 6"),
         ({"actuator_failure": -1}, "actuator_failure: expected an integer from 0 to 5, got -1"),
-        ({"limp": "left"}, "actuator_failure: expected an integer from 0 to 5, got 'left'"),
+        ({"actuator_failure": "left"}, "actuator_failure: expected an integer from 0 to 5, got 'left'"),
         (
             {"motor_strength": -0.1},
             "motor_strength: expected a number from 0 to 1, or two of them, the lower first, got",
