@@ -47,14 +47,14 @@ POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
-    "saved, whose pickles are run; or module:attribute, which makes a policy from a robot's name, or from the Body of "
-    "what is no robot of the suite."
+    "saved, whose pickles are run; or module:attribute, a function that makes a policy from a robot's name, or from "
+    "any other Body."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
 
 
 def preset_names() -> tuple[str, ...]:
-    """Return the names of the presets that there are for any robot, those of other packages included."""
+    """Return the names of the presets of all robots, including those of other packages."""
     return tuple(dict.fromkeys(itertools.chain(PRESETS, *TUNINGS.values())))
 
 
@@ -79,8 +79,8 @@ def policy(
             that take turns from seed to seed.
         rows: of the batch.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
-        task: that it is to act in: the demonstrator, whose actions are torques, then gives positions where
-            the task asks for them, as `protocol.Positioned`. None for torques. Other policies give what they give.
+        task: the task to act in; None for torques. If its actions are positions, the demonstrator's torques are
+            converted, see `protocol.Positioned`; other policies are used as they are.
 
     Raises:
         ValueError: an unknown name, or a value out of range; one line that names it and the nearest
