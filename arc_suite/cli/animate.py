@@ -1,4 +1,4 @@
-"""Make animation clips of a robot for game engines: glTF (.glb), figures beside it.
+"""Make animation clips of a robot for game engines: glTF (.glb), and their metrics (.json).
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
@@ -49,7 +49,7 @@ def main() -> None:
     beside = Path(FLAGS.output).with_suffix(".json")
     if FLAGS.spec is not None and beside.resolve() == Path(FLAGS.spec).resolve():
         raise ValueError(f"--output={FLAGS.output}: {beside}, which is written too, is the spec; take another name")
-    with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as figures:
+    with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as metrics:
         clips = export.clips(
             setup,
             FLAGS.clips,
@@ -59,7 +59,7 @@ def main() -> None:
             lambda names: progress(names, "recording", unit="clip", leave=False),
         )
         temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
-        figures |= export.sidecar(setup.body, clips, FLAGS.root_motion)
+        metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)
     print(f"wrote {FLAGS.output} and {beside}")
 
@@ -70,6 +70,6 @@ def print_table(clips: list[export.Clip]) -> None:
     print(line.format(*_COLUMNS))
     for clip in clips:
         forward, left, turning = clip.motion.twist + 0.0
-        figures = [f"{forward:.3f}", f"{left:.3f}", f"{math.degrees(turning):.1f}"]
+        cells = [f"{forward:.3f}", f"{left:.3f}", f"{math.degrees(turning):.1f}"]
         seam = f"{math.degrees(clip.motion.seam):.3f}" if clip.loops else "-"
-        print(line.format(clip.name, f"{clip.motion.seconds:.3f}", len(clip.times), clip.cycles, *figures, seam))
+        print(line.format(clip.name, f"{clip.motion.seconds:.3f}", len(clip.times), clip.cycles, *cells, seam))

@@ -33,7 +33,7 @@ flags.DEFINE_enum(
     "layout",
     None,
     list(generator.LAYOUTS),
-    "Mirrored pairs, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
+    "Pairs, left and right, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE)
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
@@ -49,7 +49,7 @@ flags.DEFINE_string("render", None, "File to write a picture of the standing bod
 
 
 def main() -> None:
-    """Build the body and write what is asked for."""
+    """Build the body and write it."""
     if FLAGS.render is not None:
         checks.extension(FLAGS.render, [".png"])
     body = _body()

@@ -25,20 +25,20 @@ flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
-flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")
+flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 
 _WIDTHS = (18, 26, 9, 12)  # of the columns that every task has
 
 
-def line(first: str, figures: Mapping[str, str], *cells: str) -> str:
+def line(first: str, metrics: Mapping[str, str], *cells: str) -> str:
     """Return a line of the table.
 
     Args:
-        first: what is in its first column, as wide as that is.
-        figures: the task's own by name, which matter first.
+        first: cell of the first column, as wide as the column.
+        metrics: the task's own by name.
         *cells: of the columns that every task has.
     """
-    own = [f"{cell:>{max(len(name), 6)}}" for name, cell in figures.items()]
+    own = [f"{cell:>{max(len(name), 6)}}" for name, cell in metrics.items()]
     return " ".join([first, *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))])
 
 
@@ -88,32 +88,32 @@ def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
 
 
 def report(episodes: list[evaluation.Episode], expert: float | None) -> dict:
-    """Return the figures of one robot, as they go into the JSON.
+    """Return the metrics of one robot, as in the JSON.
 
     Args:
         episodes: of the robot.
         expert: return of the paper's demonstrator, if it has one.
     """
-    figures = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
+    progress = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
     return {
         "expert_return": expert,
         "return": evaluation.summary([episode.total for episode in episodes]),
         "length": evaluation.summary([episode.length for episode in episodes]),
-        **{name: evaluation.summary(values) for name, values in figures.items()},
+        **{name: evaluation.summary(values) for name, values in progress.items()},
         "episodes": episodes,
     }
 
 
-def row(robot: str, figures: dict) -> str:
+def row(robot: str, metrics: dict) -> str:
     """Return one line of the table."""
-    total, progress = figures["return"], figures["episodes"][0].progress
+    total, progress = metrics["return"], metrics["episodes"][0].progress
     return line(
         robot,
-        {name: f"{figures[name].mean:.3f}" for name in progress},
+        {name: f"{metrics[name].mean:.3f}" for name in progress},
         f"{total.mean:.1f} +- {total.deviation:.1f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
-        f"{figures['length'].mean:.1f}",
-        "-" if figures["expert_return"] is None else f"{figures['expert_return']:.0f}",
+        f"{metrics['length'].mean:.1f}",
+        "-" if metrics["expert_return"] is None else f"{metrics['expert_return']:.0f}",
     )
 
 

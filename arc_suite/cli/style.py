@@ -1,4 +1,4 @@
-"""Judge how a robot and each of its legs walk: gait, course, torso, joints and effort.
+"""Measure how a robot and each of its legs walk: gait, course, torso, joints and effort.
 
   arc-suite style --robot queen --policy cpg --preset medium
   arc-suite style --policy my_package.policies:make --compare cpg --output out/style
@@ -31,11 +31,11 @@ define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all. [default: the one of stored tracks, else queen]")
 flags.DEFINE_string("policy", "cpg", sources.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
-flags.DEFINE_string("compare", None, "A second policy, file or dataset, shown beside the first.")
+flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
 flags.DEFINE_string("compare_preset", "medium", "Preset of --compare, if that is the cpg.")
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
-flags.DEFINE_string("json", None, "File to write the figures to, as JSON.")
+flags.DEFINE_string("json", None, "File to write the metrics to, as JSON.")
 flags.DEFINE_string(
     "output",
     None,
@@ -47,7 +47,7 @@ flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz)
 
 
 def chosen_sources() -> dict[str, style.Source]:
-    """Return what is shown side by side, by label."""
+    """Return the sources of the columns, by label."""
     first = style.source(FLAGS.policy, FLAGS.preset)
     if FLAGS.compare is None:
         return {first.label: first}
@@ -82,7 +82,7 @@ def spread(summary: evaluation.Summary) -> str:
 
 
 def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, list[str]]]) -> None:
-    """Print rows of a name, a metric's figures, and a cell for each column."""
+    """Print rows of a name, a metric, and a cell for each column."""
     width = max(8, *(len(text) for text in [*columns, *(cell for _, _, cells in rows for cell in cells)]))
     first = max(18, len(heading))
     line = f"{{:<{first}}} {{:<8}} {{:>10}}" + f"  {{:>{width}}}" * len(columns)
@@ -95,20 +95,20 @@ def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, li
 
 
 def print_report(robot: str, reports: dict) -> None:
-    """Print the tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
+    """Print the tables of one robot: its own metrics, policies side by side, then those of the legs for each policy."""
     first = next(iter(reports.values()))
     rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
-    asked = [name for name in first["progress"] if name not in first["metrics"]]
-    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in asked]
+    others = [name for name in first["progress"] if name not in first["metrics"]]
+    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in others]
     rows += [
         (name, metric, [spread(r["metrics"][name]["robot"]) for r in reports.values()])
         for name, metric in first["metrics"].items()
     ]
     print_table(robot, list(reports), rows)
-    for label, figures in reports.items():
+    for label, metrics in reports.items():
         rows = [
             (name, metric, [number(summary.mean) for summary in metric["legs"].values()])
-            for name, metric in figures["metrics"].items()
+            for name, metric in metrics["metrics"].items()
             if metric["legs"]
         ]
         print_table(f"{robot}, {label}", list(first["metrics"]["foot_slip"]["legs"]), rows)

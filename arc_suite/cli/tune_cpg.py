@@ -1,11 +1,11 @@
-"""Search the numbers of a robot's demonstrator that earn most.
+"""Search the parameters of a robot's demonstrator with the highest return.
 
 It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off
-at any moment, the same command goes on. At the end the best numbers are compared with the existing presets
+at any moment, the same command goes on. At the end the best parameters are compared with the existing presets
 over many resets, and printed as a row for the table of presets.
 
   arc-suite tune_cpg --robot queen --output out/tune/queen
-  arc-suite tune_cpg --robot queen --numbers torques --output out/tune/queen-torques
+  arc-suite tune_cpg --robot queen --space torques --output out/tune/queen-torques
 """
 
 import contextlib
@@ -29,15 +29,15 @@ FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(PRESETS)}.")
 flags.DEFINE_string(
-    "numbers", "law", "law: those of the paper's law, about `medium`; torques: of what is added to it, about `tuned`."
+    "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
 )
 for name, least, most, what in (
     ("generations", 1, None, "Generations of the search, more make a finished one go on"),
-    ("episodes", 1, None, "Episodes by which a candidate is judged"),
+    ("episodes", 1, None, "Episodes by which a candidate is evaluated"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
     ("starts", 0, None, f"Starts, of which candidates are tried in the {HARD} hardest; 0 for none"),
 ):
-    usual = " and ".join(f"{getattr(kind, name)} for {numbers}" for numbers, kind in SPACES.items())
+    usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
     flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
@@ -47,14 +47,14 @@ flags.DEFINE_string(
 
 
 def given(name: str) -> int:
-    """Return the value of a flag, or what is usual for the numbers that are searched."""
+    """Return the value of a flag, or the default of the space."""
     value = FLAGS[name].value
-    return getattr(SPACES[FLAGS.numbers], name) if value is None else value
+    return getattr(SPACES[FLAGS.space], name) if value is None else value
 
 
 def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
-    settings = {name: FLAGS[name].value for name in ("numbers", "seed")}
+    settings = {name: FLAGS[name].value for name in ("space", "seed")}
     settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
     known = setup.to_dict() | settings | {"versions": versions.recorded()}
     with contextlib.closing(Journal(folder / "journal.jsonl", known)) as journal:
@@ -77,7 +77,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
 def evaluate(setup: Setup, preset: Preset) -> dict:
     """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
     there = PRESETS[FLAGS.robot]
-    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.numbers].preset, "medium")}
+    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.space].preset, "medium")}
     score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
     return {
         name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
@@ -86,9 +86,9 @@ def evaluate(setup: Setup, preset: Preset) -> dict:
     }
 
 
-def violations(figures: dict) -> list[str]:
-    """Return in what the result is not as good as it must be, a line each."""
-    found, medium = figures["found"], figures["medium"]
+def violations(metrics: dict) -> list[str]:
+    """Return the constraints that the result violates, a text for each."""
+    found, medium = metrics["found"], metrics["medium"]
     worse = [f"{name} {found[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if found[name] > medium[name]]
     return worse + [f"{found['falls']} falls"] * bool(found["falls"])
 
@@ -97,7 +97,7 @@ def main() -> None:
     """Search, evaluate, print and write."""
     checks.name(FLAGS.robot, PRESETS, "robot")
     setup = Setup.of(FLAGS.robot, *task())
-    checks.name(FLAGS.numbers, SPACES, "numbers")
+    checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
     try:
@@ -109,23 +109,23 @@ def main() -> None:
         course, journal = search(setup, folder)
         preset = course.result()
         plots.course(FLAGS.robot, course.reward, journal.generations, STEPS).savefig(picture)
-        figures = evaluate(setup, preset)
+        metrics = evaluate(setup, preset)
         file.update(
             **setup.to_dict(),
-            numbers=FLAGS.numbers,
+            space=FLAGS.space,
             seed=FLAGS.seed,
             generations=len(journal.generations),
             resets=FLAGS.resets,
             preset=preset,
-            figures=figures,
+            metrics=metrics,
             versions=versions.recorded(),
         )
     columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
     header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
     print(header, "-" * len(header), sep="\n")
-    for name, row in figures.items():
+    for name, row in metrics.items():
         total = f"{row['return'].mean:.1f} +- {row['return'].deviation:.1f}"
         print(columns.format(name, total, row["falls"], *(f"{row[cost]:.3f}" for cost in STYLE)))
     print(f"\n{preset}")
-    if broken := violations(figures):
+    if broken := violations(metrics):
         raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")

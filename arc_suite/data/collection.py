@@ -1,4 +1,4 @@
-"""Collects datasets: plays the episodes that are missing, and keeps what is finished whatever happens."""
+"""Collects datasets: plays the missing episodes, and keeps finished ones if it is killed."""
 
 import contextlib
 import math
@@ -43,22 +43,22 @@ def collect(
         dataset_id: Minari's.
         settings: what the episodes depend on.
         episodes: how many the dataset is to have.
-        rows: how many are played at a time; what is collected does not depend on it.
-        threads: on which to simulate; None for all cores. Nor does it depend on these.
+        rows: how many are played at a time; the data do not depend on it.
+        threads: on which to simulate; None for all cores. The data do not depend on it.
         overwrite: replace a dataset that is there, when the new one is complete.
         progress: makes progress bars as `tqdm` does.
         author: for Minari's metadata; None for none, or for the one that the dataset has already.
-        code_permalink: where the code lies that made the dataset, likewise.
-        wait: until no other process collects the dataset, in place of an error.
+        code_permalink: address of the code that made the dataset; None as for the author.
+        wait: wait for another process that collects the dataset; else that is an error.
 
     Returns:
         The number of episodes that were missing.
 
     Raises:
         ValueError: settings that do not fit, a dataset that is damaged or has other settings, or a
-            policy whose action is none; one line. Episodes finished before are kept.
-        OSError: the disk is full, or the like; likewise.
-        KeyboardInterrupt: likewise.
+            policy with an invalid action; one line. Episodes finished before are kept.
+        OSError: the disk is full, or another error of writing; one line. Finished episodes are kept.
+        KeyboardInterrupt: the same.
     """
     _check(settings, episodes)
     said = {} if author is None else {"author": [author]}  # Minari makes a set of it
@@ -153,7 +153,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
 
 
 def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) -> dict:
-    """Return Minari's metadata, but for the counts."""
+    """Return Minari's metadata without the counts."""
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     environment = settings.environment(evaluation.EPISODES, threads)
@@ -178,8 +178,6 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) ->
 
 
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
-    """Return the mean return over the seeds of the evaluation protocol, one in each row of the environment."""
-    count = environment.num_envs
-    played = rollouts.play(environment, _policy(settings, count, environment.task), range(count), settings.steps)
-    totals = {episode.seed: episode.total for step in played for episode in step.finished}
-    return float(np.mean([totals[seed] for seed in range(count)]))  # in one order, whichever falls first
+    """Return the mean return by the evaluation protocol."""
+    policy = _policy(settings, environment.num_envs, environment.task)
+    return float(np.mean([episode.total for episode in evaluation.episodes_in_rows(environment, policy)]))

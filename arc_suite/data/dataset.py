@@ -33,8 +33,8 @@ MAIN = "main_data.hdf5"
 def open(dataset_id: str) -> "Dataset":
     """Open a dataset that `collect` has written.
 
-    Files are data: nothing that they name is imported. A dataset with a robot, task or arena of
-    another package opens where the caller has imported that package.
+    Nothing that the files name is imported: for a dataset with a robot, task or arena of another package, import
+    that package first.
 
     Args:
         dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari says where datasets lie.
@@ -47,7 +47,7 @@ def open(dataset_id: str) -> "Dataset":
 
 
 class Dataset:
-    """A dataset of recorded episodes: a sequence of `Episode`s, each read when it is asked for.
+    """A dataset of recorded episodes: a sequence of `Episode`s, each read on access.
 
     Attributes:
         id: Minari's.
@@ -77,10 +77,6 @@ class Dataset:
             )
             self._length = checks.integer("total_episodes", self.metadata["total_episodes"], 0, 1 << 32)
             checks.integer("total_steps", self.metadata["total_steps"], 0, 1 << 53)
-
-    def environment(self):
-        """Return the dm_env in which the episodes play."""
-        return self.settings.setup.load()
 
     def __len__(self) -> int:
         return self._length
@@ -135,7 +131,7 @@ def damages(dataset_id: str, file: Path):
 
 
 def plain(path: Path) -> Path:
-    """Return the path of a file; whatever else it may be, such as a pipe, is not waited for.
+    """Return the path if it is that of a file; reading a pipe would block.
 
     Raises:
         OSError: there is no file.

@@ -1,4 +1,4 @@
-"""Settings of datasets: everything that their episodes depend on."""
+"""Settings of datasets: all that their episodes depend on."""
 
 import hashlib
 import re

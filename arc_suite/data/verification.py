@@ -1,4 +1,4 @@
-"""Verifies datasets: replays them and compares to the bit."""
+"""Verifies datasets: replays them and compares bit by bit."""
 
 import contextlib
 from collections.abc import Callable
@@ -22,15 +22,15 @@ def verify(
     progress: Callable = tqdm,
     task: str | None = None,
 ) -> int:
-    """Replay every episode of a dataset from its seed and compare everything to the bit.
+    """Replay every episode of a dataset from its seed and compare all arrays bit by bit.
 
     Args:
         dataset_id: Minari's.
-        body: what should have moved; None for any.
+        body: the expected body; None for any.
         rows: how many are replayed at a time.
         threads: on which to simulate; None for all cores.
         progress: makes a progress bar as `tqdm` does.
-        task: name of what should have been done; None for any.
+        task: name of the expected task; None for any.
 
     Returns:
         The number of episodes.

@@ -60,7 +60,7 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
 
 
 def run(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Episode:
-    """Play one episode and sum it up; the arguments are those of `rollout`."""
+    """Play one episode and return its results; for the arguments see `rollout`."""
     rewards = [timestep.reward for timestep in rollout(environment, policy, seed, max_steps) if not timestep.first()]
     progress = {name: float(value) for name, value in environment.task.progress.items()}
     return Episode(float(sum(rewards)), len(rewards), progress)
@@ -72,7 +72,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
     Args:
         environment: of `arc_suite.load`.
         policy: made for one row.
-        seeds: of the episodes; those of the protocol if not given.
+        seeds: of the episodes; by default the protocol's.
     """
     return [run(environment, policy, seed) for seed in seeds]
 
@@ -85,7 +85,7 @@ def episodes_in_rows(environment: VectorEnv, policy: Policy, seeds: Sequence[int
     Args:
         environment: one row for each seed, in the mode Disabled.
         policy: made for as many rows.
-        seeds: of the episodes; those of the protocol if not given.
+        seeds: of the episodes; by default the protocol's.
     """
     rows = len(seeds)
     observations, _ = environment.reset(seed=list(seeds))

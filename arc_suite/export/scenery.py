@@ -18,9 +18,9 @@ _SAME = 1e-3  # of the standing height, by which an episode that is repeated may
 def scenery(track: Track) -> dict[str, Any]:
     """Return the scenery of an episode; lengths are in m and the world's axes.
 
-    The episode is begun anew by its seed, which tells where obstacles stand, and repeated by its actions where its
-    task marks what it asks for. Marks end where the repetition is not what was recorded, as where motors are weak:
-    actions are recorded as they are applied.
+    The episode is started again by its seed, which places the obstacles, and replayed by its actions if its task has
+    debug markers. Markers end where the replay differs from the recording, for example with weak motors, as the
+    recorded actions are the applied ones.
 
     Returns:
         A dictionary:

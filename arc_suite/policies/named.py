@@ -47,8 +47,8 @@ POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
-    "saved, whose pickles are run; or module:attribute, which makes a policy from a robot's name, or from the Body of "
-    "what is no robot of the suite."
+    "saved, whose pickles are run; or module:attribute, a function that makes a policy from a robot's name, or from "
+    "any other Body."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the robot has."
 

@@ -178,7 +178,7 @@ def load(path: str | os.PathLike) -> Network:
 
 
 def digest(path: str | os.PathLike) -> str:
-    """Return the sha256 of a policy file, of that of a run's folder, or of all those of a folder of checkpoints."""
+    """Return the sha256 of a policy file, of a run's policy file, or of all policy files of a folder of checkpoints."""
     path = Path(path)
     files_of = [path / FILE] if (path / FILE).is_file() else checkpoint_files(path) if path.is_dir() else [path]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files_of)).hexdigest()

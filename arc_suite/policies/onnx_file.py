@@ -84,7 +84,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
 
 
 def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
-    """The operators of a layer: names, constants beside the input, attributes."""
+    """The operators of a layer: names, constants after the input, attributes."""
     arrays = [np.ascontiguousarray(array, np.float32) for array in layer.arrays]
     one = np.float32(1.0)
     return {

@@ -92,7 +92,7 @@ def load(path: str | os.PathLike) -> list[Track]:
                 if any(_names(track) != _names(tracks[0]) for track in tracks):
                     raise ValueError("expected the same progress and gait in all tracks")
                 return tracks
-        except Exception as error:  # a damaged archive raises whatever its damage leads to
+        except Exception as error:  # a damaged archive may raise anything
             raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
 

@@ -22,7 +22,7 @@ class Source(NamedTuple):
     """A source of tracks.
 
     Attributes:
-        label: by which it is shown.
+        label: its name in tables.
         setup: of the tracks that it has; None for a policy, which is recorded in any.
         recorders: takes a setup and seeds; returns functions, each of which returns a track.
     """
@@ -33,7 +33,7 @@ class Source(NamedTuple):
 
 
 def source(name: str, preset: str = "medium") -> Source:
-    """Open a source, told by its form.
+    """Open a source, of a kind that follows from its name.
 
     Args:
         name: a policy, see `policies.policy`, which is recorded once for every seed; a file of tracks,
@@ -92,7 +92,7 @@ def _replayed(dataset_id: str) -> Source:
         if not np.array_equal(track.rewards, episode.rewards):
             raise ValueError(
                 f"dataset {dataset_id!r}: episode {index} earned {episode.total:.3f} and its replay "
-                f"{track.rewards.sum():.3f}; arc-suite collect --verify={dataset_id} tells more"
+                f"{track.rewards.sum():.3f}; arc-suite collect --verify={dataset_id} shows more"
             )
         return track
 

@@ -39,7 +39,7 @@ class Track(NamedTuple):
         terms: the reward's unweighted terms by name, each (steps,).
         weights: signed weight of every term.
         progress: the task's metrics at the end by name.
-        target_velocity: m/s along world x, that the task asks for all the time; NaN if it does not.
+        target_velocity: constant target of the task along world x, m/s; NaN if it has none.
         parameters: prescribed schedule and standing pose; None in a task without a gait.
         mass: kg, of the whole body.
         gravity: m/s^2, downwards.

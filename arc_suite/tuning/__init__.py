@@ -1,4 +1,4 @@
-"""Search for the demonstrators' numbers that earn most."""
+"""Search for the demonstrators' parameters with the highest return."""
 
 from arc_suite.tuning.evaluator import Evaluator, Score
 from arc_suite.tuning.journal import Journal

@@ -1,4 +1,4 @@
-"""Searches by CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the numbers of a demonstrator.
+"""Searches by CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the parameters of a demonstrator.
 
 A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
 generation and the same for all of its candidates, less two penalties: for a style that is worse
@@ -17,7 +17,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.tuning.evaluator import STYLE, Evaluator, Score
 from arc_suite.tuning.space import SPACES
 
-SPREAD = 0.5  # of the first generation, in scales of the numbers
+SPREAD = 0.5  # of the first generation, in scales of the parameters
 HARD = 8  # starts that candidates are tried in
 
 _EXCESS = 1.5  # reward that a cost of style twice as large takes
@@ -48,7 +48,7 @@ class Search:
     """A search about a robot's preset, by generations.
 
     It is determined by its arguments and the fitness of its generations, so that one that was
-    broken off goes on where it was told of these.
+    broken off resumes from the fitness of its past generations.
 
     Attributes:
         reward: mean reward of `medium`.
@@ -62,7 +62,7 @@ class Search:
         episodes: int,
         steps: int,
         starts: int,
-        numbers: str = "law",
+        space: str = "law",
     ):
         """Evaluate `medium` and the possible starting points; the search starts from the best.
 
@@ -71,8 +71,8 @@ class Search:
             seed: of the search and its episodes.
             episodes: by which a candidate is evaluated.
             steps: control steps of each.
-            starts: of which the hard ones are taken, at least `HARD`; 0 for none.
-            numbers: that are searched, a name of `space.SPACES`.
+            starts: to choose the hard ones from, at least `HARD`; 0 for none.
+            space: of the searched parameters, a name of `space.SPACES`.
 
         Raises:
             ImportError: no package `cma`.
@@ -80,7 +80,7 @@ class Search:
         """
         import cma  # of the extra "tune"
 
-        tuning, kind = PRESETS[setup.body.name], SPACES[numbers]
+        tuning, kind = PRESETS[setup.body.name], SPACES[space]
         self._medium = tuning["medium"]
         self._space, self._episodes = kind.space(setup.body, tuning[kind.preset]), episodes
         self._first = _SEEDS * (1 + seed)

@@ -48,7 +48,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--spec=a.json"], "cannot read a.json: no such file or directory"),
         (["--spec=a.json", "--legs=4"], "expected one of --spec and --legs, got both"),
         (["--links=4"], "--links=4: goes with --legs"),
-        (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot beside --spec or --legs"),
+        (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
         (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),

@@ -188,7 +188,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         (["--save=tracks.json"], "--save=tracks.json: expected a file that ends in .npz"),
         (["--save=a.npz", "--robot=all"], f"--save=a.npz: expected one robot, got {', '.join(ROBOTS)}"),
         (["--save=nowhere/a.npz"], "cannot write nowhere/a.npz: no such file or directory"),
-        ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot beside --spec or --legs"),
+        ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
         (
             ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],

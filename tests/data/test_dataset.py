@@ -47,7 +47,7 @@ def test_metadata():
 def test_style_records_a_dataset():
     collect(ID, data.Settings(QUEEN, **SHORT), 2)
     dataset = data.open(ID)
-    environment = dataset.environment()
+    environment = dataset.settings.setup.load()
     for episode in dataset:
         playback = episode.playback()
         for _ in range(2):  # the reset rewinds it

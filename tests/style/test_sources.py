@@ -114,7 +114,7 @@ def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
     with pytest.raises(ValueError) as error:
         take(source(dataset.id), LEAPER, range(1))
     assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")
-    assert str(error.value).endswith(f"; arc-suite collect --verify={dataset.id} tells more")
+    assert str(error.value).endswith(f"; arc-suite collect --verify={dataset.id} shows more")
 
 
 def test_datasets_that_cannot_be_replayed_are_one_line(dataset):

@@ -24,7 +24,7 @@ def test_a_search_goes_on_where_it_was_broken_off():
 
 @pytest.mark.slow
 def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_tuned():
-    settings = SETTINGS | {"setup": Setup.of("leaper"), "numbers": "torques", "episodes": 1, "steps": 40, "starts": 0}
+    settings = SETTINGS | {"setup": Setup.of("leaper"), "space": "torques", "episodes": 1, "steps": 40, "starts": 0}
     straight, resumed = Search(**settings), Search(**settings)
     generations = [straight.step() for _ in range(3)]
     for generation in generations[:2]:
