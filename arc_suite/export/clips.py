@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.selection import first_preset
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.dm import load
 from arc_suite.export import motions
 from arc_suite.export.footfalls import TOUCH_DOWN, Footfall, footfalls, sole_heights
@@ -129,7 +129,7 @@ def clips(
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     if preset is None:
-        preset = first_preset(body, "tuned", "medium")
+        preset = "tuned" if "tuned" in presets_of(body) else "medium"
     model, takes = compiled(body), {}
     for name in progress(list(names)):
         shot = CLIPS[name]
