@@ -176,7 +176,7 @@ MUTANTS = (
     Mutant("two threads in one environment", "not lock.acquire(False)", "False"),
     # Demonstrators and policies.
     Mutant("sign of the sweep", "= -1.0 if leg.side", "= 1.0 if leg.side"),
-    Mutant("steered the wrong way", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),
+    Mutant("steered the wrong way", "copysign(STEERING, speed)", "copysign(STEERING, -speed)"),
     Mutant("damping has the wrong sign", "- damping * velocities", "+ damping * velocities"),
     Mutant("no crouch", "steps < self.settle", "steps < 0"),
     Mutant("a row walks by another's preset", "for value in values]", "for value in values[::-1]]"),

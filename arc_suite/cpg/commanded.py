@@ -26,7 +26,7 @@ class State(NamedTuple):
         motion: (environments, 3) requested of the feet, in the same units; held while the command rests.
         size: (environments, 1) of the gait, from 0 to 1.
         phase: (environments,) of the gait in the next control step, cycles; held while the command rests.
-        plan: NamedTuple of a law's own.
+        plan: a law's own, an array or a NamedTuple of arrays.
     """
 
     command: np.ndarray

@@ -114,7 +114,7 @@ class Clocked:
 
 
 def restarted(state, initial, mask):
-    """Return a state that is `initial` where a mask (environments,) holds; states are NamedTuples, nested or not."""
+    """Return a state, an array or a NamedTuple of states, that is `initial` where a mask (environments,) holds."""
     if isinstance(state, tuple):
         return type(state)(*(restarted(*fields, mask) for fields in zip(state, initial, strict=True)))
     return mask.__array_namespace__().where(mask.reshape(-1, *[1] * (state.ndim - 1)), initial, state)

@@ -93,10 +93,15 @@ class Prescribed(NamedTuple):
         Raises:
             ValueError: it does not fit the body; one line.
         """
-        laid = pattern(body, preset)
-        crouch = pattern(body, preset._replace(centre=preset.crouch)).centre if preset.crouch else laid.centre
-        numbers = (getattr(preset, name) for name in cls._fields[4:])
-        return cls(laid, feedforward(body, preset), crouch, control_timestep(body), *numbers)
+        legs, offsets = len(body.legs), len(preset.phase_offsets)
+        if legs != offsets:
+            raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
+        try:
+            laid, added = pattern(body, preset), feedforward(body, preset)
+            crouch = pattern(body, preset._replace(centre=preset.crouch)).centre if preset.crouch else laid.centre
+        except (AttributeError, LookupError, TypeError, ValueError) as error:
+            raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
+        return cls(laid, added, crouch, control_timestep(body), *(getattr(preset, name) for name in cls._fields[4:]))
 
     @classmethod
     def stacked(cls, controls: Sequence[Self]) -> Self:
@@ -144,34 +149,8 @@ class PrescribedLaw(Clocked):
 
 
 def pattern(body: Body, preset: Preset) -> Pattern:
-    """Return a preset, laid out over a body's joints.
+    """Return a preset, laid out over a body's joints."""
 
-    Raises:
-        ValueError: it does not fit the body; one line.
-    """
-    return _laid_out(_pattern, body, preset)
-
-
-def feedforward(body: Body, preset: Preset) -> Feedforward | None:
-    """Return the torques that a preset adds to the PD loop's, laid out over a body's joints; None for none.
-
-    Raises:
-        ValueError: it does not fit the body; one line.
-    """
-    return _laid_out(_feedforward, body, preset)
-
-
-def _laid_out(function, body: Body, preset: Preset):
-    legs, offsets = len(body.legs), len(preset.phase_offsets)
-    if legs != offsets:
-        raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")
-    try:
-        return function(body, preset)
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        raise ValueError(f"preset: does not fit {body.name}: {type(error).__name__}: {error}") from None
-
-
-def _pattern(body: Body, preset: Preset) -> Pattern:
     def by_rank(angle: ByRank, rank: int) -> float:
         return math.radians(angle[rank] if isinstance(angle, tuple) else angle)
 
@@ -189,7 +168,8 @@ def _pattern(body: Body, preset: Preset) -> Pattern:
     return Pattern(preset.frequency, preset.duty_factor, *np.array(rows).T)
 
 
-def _feedforward(body: Body, preset: Preset) -> Feedforward | None:
+def feedforward(body: Body, preset: Preset) -> Feedforward | None:
+    """Return the torques that a preset adds to the PD loop's, laid out over a body's joints; None for none."""
     if preset.torques is None and not preset.steering:
         return None
     amplitudes, steering = [], []

@@ -60,16 +60,6 @@ def preset_names() -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for row in (*PRESETS.values(), DEFAULTS) for name in row))
 
 
-def first_preset(body: Body, *names: str) -> str:
-    """Return the first of some presets that a body has; every body has `medium`.
-
-    Raises:
-        ValueError: as `presets_of`.
-    """
-    presets = presets_of(body)
-    return next(name for name in names if name in presets)
-
-
 def suited_preset(task: Task) -> str:
     """Return the preset that suits a task and its body best.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.selection import first_preset
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.export import root_motion
 from arc_suite.export.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
@@ -125,7 +125,7 @@ def clips(
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     body = setup.body
     if preset is None:
-        preset = first_preset(body, "tuned", "medium")
+        preset = "tuned" if "tuned" in presets_of(body) else "medium"
     model, recorded = compiled(body), {}
     for name in progress(list(names)):
         spec = CLIPS[name]

@@ -1,5 +1,8 @@
 """Laws as pure functions: held at stops, the same under JAX, fitted to a task however it is given."""
 
+import pathlib
+import re
+
 import gymnasium
 import numpy as np
 import pytest
@@ -127,3 +130,8 @@ def test_what_suits_a_task_follows_from_its_attributes(monkeypatch):
         suited_preset(arc_suite.load("tick", "stay").task.definition)
     assert str(error.value).startswith("task stay: nothing suits ") and "steered" in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_guide():
+    pages = pathlib.Path(__file__).parents[2] / "docs" / "demonstrators.md"
+    exec("".join(re.findall(r"```python\n(.*?)```", pages.read_text(), re.DOTALL)), {})

@@ -50,7 +50,7 @@ class World:
         streams = [stream.get_state() for stream in rows._randoms]
         episodes = rows._memory, rows._streams, rows._steps, rows._ended, rows._resting, rows._streams_begin
         return (
-            pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._law._clock)),
+            pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._state)),
             rows.batch._simulations.state.tobytes(),
             pickle.dumps(np.random.get_state()),
             (dict(ROBOTS), dict(TASKS), set(gymnasium.registry), dict(os.environ), os.getcwd()),
