@@ -73,7 +73,7 @@ class Terrain(Arena):
     Outside the lanes there is only the plane below stairs and trenches; `height` returns the edge's there.
 
     Attributes:
-        unit: m, the standing height of the body for which it is made: all lengths are multiples of it.
+        unit: m, the standing height of the body; all lengths are multiples of it.
         length: of the lanes ahead of the start, in units.
         lanes: kind and difficulty of each, by the order of `KINDS`.
         seed: of the random ground; a lane does not depend on its neighbours.
@@ -119,7 +119,7 @@ class Terrain(Arena):
                 yield size, middle + (0.0, self.start(lane), 0.0)
 
     def height(self, x, y):
-        """Return the height (...) of the ground under points, as collisions meet it, m."""
+        """Return the height (...) of the collision geometry under points, m."""
         numpy = x.__array_namespace__()
         along, across = x / self.unit + BACK, y / self.unit + (len(self.lanes) // 2 + 0.5) * WIDTH
         if not self._fields:
@@ -147,7 +147,7 @@ class Terrain(Arena):
 
     @property
     def lists_contacts(self) -> bool:
-        """Return whether all is one height field: boxes are many."""
+        """Return whether the ground is one height field: boxes are many."""
         return self._fields == len(self.lanes)
 
     @functools.cached_property
@@ -201,14 +201,14 @@ class Terrain(Arena):
 
 
 def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(DIFFICULTY,), seed: int = 0) -> Terrain:
-    """Return lanes that suit a body's size.
+    """Return lanes of the size of a body.
 
     Args:
         body: any.
         kinds: how many lanes of each difficulty, by kind of ground.
         length: of lanes ahead of the start, in standing heights.
         levels: difficulties, from 0 to 1.
-        seed: of what is random in the ground.
+        seed: of the random lanes.
 
     Returns:
         The lanes: by kind, in the order of `KINDS`, then by difficulty.
@@ -218,5 +218,5 @@ def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(
 
 
 def fitted(kind: str):
-    """Return the function that makes lanes of a kind suit a body."""
+    """Return the function from a body to lanes of a kind."""
     return lambda body: made(body, {kind: _LANES})

@@ -56,7 +56,7 @@ class Batch:
         return self._simulations.bind("mocap_pos")
 
     def part(self, rows: np.ndarray | int) -> types.SimpleNamespace:
-        """Return `data` of some rows alone: a copy for (rows,) booleans, views without that axis for one's index."""
+        """Return `data` of some rows: copies for a mask (rows,), views without that axis for an index."""
         return types.SimpleNamespace(**{name: array[rows] for name, array in vars(self.data).items()})
 
     def step(self, nstep: int, rows: np.ndarray) -> np.ndarray:
@@ -119,7 +119,7 @@ class Batch:
         self._simulations.forward(rows)
 
     def place(self, rows: np.ndarray, qpos: np.ndarray) -> None:
-        """Move some rows to other positions, and bring derived quantities up to date.
+        """Move some rows to other positions and update derived quantities.
 
         Args:
             rows: mask (rows,) of those to move.
@@ -143,7 +143,7 @@ class Batch:
                 change(own, self._changed | fields, scratch)
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return copies of the simulations' state, of `data` and of models' fields, from which `restore` goes on."""
+        """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
         fields = {name: array.copy() for name, array in vars(self.data).items()}
         models = {f"{_OF_MODEL}{name}": np.stack([getattr(own, name) for own in self._own]) for name in self._changed}
         return {"state": self._simulations.state.copy(), **fields, **models}
@@ -178,14 +178,14 @@ class Batch:
 
 
 def _silent(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A copy of a model that computes no sensors."""
+    """Return a copy of a model with sensors disabled."""
     model = copy.copy(model)
     model.opt.disableflags |= _SENSOR
     return model
 
 
 def _fill(array: np.ndarray, values: np.ndarray) -> None:
-    """Write into a bound array, be it an output, which MuJoCo hands out for reading alone."""
+    """Write into a bound array, including read-only outputs."""
     writeable = array.flags.writeable
     array.flags.writeable = True
     array[...] = values

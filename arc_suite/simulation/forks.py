@@ -15,7 +15,7 @@ _threaded = weakref.WeakSet()
 
 
 class ForkError(RuntimeError):
-    """An object was used in a forked child, but made before the fork."""
+    """An object from before a fork was used in the child process."""
 
 
 def refuse(what: str):

@@ -1,4 +1,4 @@
-"""Pictures of a body in an arena: the decorated model, posed as a simulation stands."""
+"""Pictures of a body in an arena: the decorated model in the pose of a simulation."""
 
 import functools
 from collections.abc import Iterable
@@ -33,7 +33,7 @@ class Decorated(dm_mujoco.Physics):
         decorated = cls.from_xml_string(models.assemble(body, arena, decorated=True).to_xml_string())
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
-        buffer.offwidth = buffer.offheight = 1  # it grows with the pictures that are asked for
+        buffer.offwidth = buffer.offheight = 1  # grows with the size of pictures
         return decorated
 
     def pose(
@@ -43,12 +43,12 @@ class Decorated(dm_mujoco.Physics):
         mocap_pos: np.ndarray | None = None,
         markers: Iterable[Marker] = (),
     ) -> None:
-        """Take a pose, and show a reward.
+        """Take a pose and show a reward.
 
         Args:
             qpos: (nq,) positions of the simulation to look at.
-            share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None
-                leaves it its own colour.
+            share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None
+                keeps its own colour.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
             markers: debug markers to show.
         """
@@ -90,7 +90,7 @@ def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeo
     return geom
 
 
-# Drawn from by whoever asks for a picture of the same body; used in OpenGL's thread alone.
+# Shared by all pictures of the same body; used in OpenGL's thread alone.
 _shared = functools.lru_cache(maxsize=8)(Decorated.from_body)
 
 
@@ -115,7 +115,7 @@ def picture(
         height: pixels.
         width: pixels.
         camera_id: a camera's name or index, -1 for a free one.
-        share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None for none.
+        share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.

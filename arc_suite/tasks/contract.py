@@ -188,7 +188,7 @@ class Task(ABC):
         the image walks on mirrored ground.
 
         Raises:
-            ValueError: the body is not its own mirror image, or see `mirrors`; one line.
+            ValueError: the body is not left-right symmetric, or see `mirrors`; one line.
         """
         action = mirrors.joints(mirror.image(self.scene.body))
         blocks = self.mirrors

@@ -114,7 +114,7 @@ def test_a_gait_whose_sides_move_together_keeps_its_clock():
             "actuator_failure: expected a leg that is drawn, or one on the midline",
         ),
         (generator.random_body(0), {}, "phase_offsets: expected legs across from each other"),
-        (generator.random_body(10), {}, "random_10 is not its own mirror image: no leg is across from leg1"),
+        (generator.random_body(10), {}, "random_10 is not left-right symmetric: no leg is across from leg1"),
     ],
 )
 def test_what_has_no_mirror_image_is_refused_in_one_line(body, settings, message):
