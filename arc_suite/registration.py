@@ -86,13 +86,13 @@ def _register_body(body, parameters, presets, visuals) -> None:
         raise ValueError(f"body: expected a spec.Body, got {body!r}")
     if ROBOTS.get(body.name, body) != body:
         raise ValueError(f"robot {body.name!r} is already registered")
-    for task, row in parameters.items():
-        _check_parameters(body, checks.name(task, TASKS, "task of parameters"), row)
+    for task, given in parameters.items():
+        _check_parameters(body, checks.name(task, TASKS, "task of parameters"), given)
     if presets is not None:
         _check_presets(body, parameters.get("walk", {}), presets)
     ROBOTS[body.name] = body
     for table, value in (
-        *((PARAMETERS.setdefault(task, {}), row) for task, row in parameters.items()),
+        *((PARAMETERS.setdefault(task, {}), given) for task, given in parameters.items()),
         (PRESETS, presets),
         (VISUALS, visuals),
     ):
@@ -100,11 +100,11 @@ def _register_body(body, parameters, presets, visuals) -> None:
             table[body.name] = value
 
 
-def _check_parameters(body: Body, task: str, row: Mapping[str, Any]) -> None:
+def _check_parameters(body: Body, task: str, given: Mapping[str, Any]) -> None:
     needed = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
-    if task == "walk" and (missing := sorted(needed - row.keys())):
+    if task == "walk" and (missing := sorted(needed - given.keys())):
         raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
-    TASKS[task].settings_for(body, row)
+    TASKS[task].settings_for(body, given)
 
 
 def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any]) -> None:

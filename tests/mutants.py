@@ -77,7 +77,7 @@ MUTANTS = (
     # Simulations.
     Mutant("no sensors, so no contact forces", "option.disableflags = flags\n", "pass\n"),
     Mutant("one substep too few", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
-    Mutant("one substep of rows too few", "simulations.step(rows, nstep - 1)", "simulations.step(rows, nstep - 2)"),
+    Mutant("one substep of rows too few", "simulations.step(mask, nstep - 1)", "simulations.step(mask, nstep - 2)"),
     Mutant("margin of a pair not summed", "model.geom_margin[both].sum()", "model.geom_margin[both].max()"),
     Mutant("friction of a pair not mixed", "friction.max(axis=0)", "friction[0]"),
     Mutant("Euler without damping", "        and model.dof_damping.any()\n", ""),

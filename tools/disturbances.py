@@ -54,7 +54,7 @@ def episodes(task: str, body, settings: dict, policy: str, preset: str, command=
     seeds = range(FLAGS.seed, FLAGS.seed + count)
     with contextlib.closing(rows):
         observations, _ = rows.reset(seed=FLAGS.seed)
-        acting.begin(range(count), seeds)
+        acting.reset(range(count), seeds)
         if command is not None:
             rows.command("command", command)
         first, totals, rewards = rows.batch.data.qpos[:, :7].copy(), np.zeros(count), np.zeros(count)

@@ -223,7 +223,7 @@ def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
         for preset in dict.fromkeys((*usual, suited_preset(rows.task))):
             if preset in presets_of(body):
                 policy = policies.policy("cpg", body, preset, evaluation.EPISODES, task=rows.task)
-                found[preset] = evaluation.episodes_in_rows(rows, policy)
+                found[preset] = evaluation.episodes_in_batch(rows, policy)
     return found
 
 

@@ -239,7 +239,7 @@ class _Judge:
         network.save(run_files.path / network.FILE, policy)
         kept = files.folder(run_files.path / checkpoints.FOLDER / str(learner.step))
         network.save(kept / network.FILE, policy)
-        episodes = evaluation.episodes_in_rows(self._environment, policy)
+        episodes = evaluation.episodes_in_batch(self._environment, policy)
         for seed, episode in enumerate(episodes):
             figures = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
             run_files.append("evaluations", {"step": learner.step, **figures})

@@ -23,7 +23,7 @@ class Demonstrator:
     Gait, units of the command, control step and body are those of the task. The presets slow, medium,
     fast, tuned and refined walk straight ahead by a clock of their own, and read joint angles, joint
     velocities and the torso's orientation alone. All others follow the observed command of a task, by
-    its gait's clock; planned finds a command of its own. A demonstrator acts in a batch by `begin` and
+    its gait's clock; planned finds a command of its own. A demonstrator acts in a batch by `reset` and
     `act`, as every policy does, and in one environment as a function of a `TimeStep` with named blocks;
     the first `TimeStep` of an episode restarts it.
 
@@ -63,13 +63,13 @@ class Demonstrator:
         self._body, self._law = body, law(task or prepared(body, "walk")[0], preset)
         self._state, self._started = None, []
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
+    def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start episodes in some environments, given by their indices; seeds make no difference."""
         if self._state is not None:
             mask = np.zeros(len(self._state[0]), bool)
-            mask[rows] = True
+            mask[indices] = True
             self._state = restarted(self._state, self._law.initial(len(mask)), mask)
-        self._started = list(rows)
+        self._started = list(indices)
 
     def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
         """Return the actions of a control step.
@@ -99,7 +99,7 @@ class Demonstrator:
     def __call__(self, timestep) -> np.ndarray:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""
         if timestep.first():
-            self.begin([0])
+            self.reset([0])
         return self.act(timestep.observation)
 
     def _check_heights(self, heights: np.ndarray) -> None:

@@ -17,7 +17,7 @@ def _commanded(sighted: SightedParameters, **build) -> dict:
     return {"steered": steered, "surefooted": surefooted, "sighted": sighted, "planned": PlanningParameters(steered)}
 
 
-# Of bodies without a row, and of robots whose row lacks them; a number is a speed as a share of sqrt(g h).
+# Of bodies and robots without presets of their own of these names; a number is a speed as a share of sqrt(g h).
 DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_commanded(SightedParameters())}
 
 _hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=TRIPOD)

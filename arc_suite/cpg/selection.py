@@ -46,18 +46,18 @@ def _kind(preset: Any):
 
 
 def presets_of(body: Body) -> Mapping[str, Any]:
-    """Return a body's presets by name: those of its row, and the defaults of others.
+    """Return a body's presets by name: its own, and the defaults of others.
 
     Raises:
         ValueError: a body of a robot's name that has other joints; one line.
     """
-    row = robots.row(PRESETS, body, "presets") or {}
-    return row | {name: preset for name, preset in DEFAULTS.items() if name not in row}
+    own = robots.parameters(PRESETS, body, "presets") or {}
+    return own | {name: preset for name, preset in DEFAULTS.items() if name not in own}
 
 
 def preset_names() -> tuple[str, ...]:
     """Return the names of the presets of all robots, those of other packages included."""
-    return tuple(dict.fromkeys(name for row in (*PRESETS.values(), DEFAULTS) for name in row))
+    return tuple(dict.fromkeys(name for presets in (*PRESETS.values(), DEFAULTS) for name in presets))
 
 
 def suited_preset(task: Task) -> str:

@@ -67,8 +67,8 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
     return array.clip(-1.0, 1.0)
 
 
-def checked_command(task: Task, name: str, value, rows: tuple[int, ...] = ()) -> np.ndarray:
-    """Return the value of a live command as floats, (*rows, size); None stands for what the task itself would do.
+def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ()) -> np.ndarray:
+    """Return the value of a live command as floats, (*leading, size); None stands for what the task itself would do.
 
     Raises:
         ValueError: the task has no such command, or the value has another size; one line.
@@ -77,9 +77,9 @@ def checked_command(task: Task, name: str, value, rows: tuple[int, ...] = ()) ->
         raise ValueError(f"command {name!r}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     numbers = np.full(size, np.nan) if value is None else _real(value)
-    if numbers is None or numbers.shape not in ((size,), (*rows, size)) or np.isinf(numbers).any():
+    if numbers is None or numbers.shape not in ((size,), (*leading, size)) or np.isinf(numbers).any():
         raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
-    return np.broadcast_to(numbers, (*rows, size)).copy()
+    return np.broadcast_to(numbers, (*leading, size)).copy()
 
 
 def _real(value) -> np.ndarray | None:

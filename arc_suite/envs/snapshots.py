@@ -10,7 +10,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.envs import trees
 
-# Attributes of the environment that are arrays with a leading axis for the rows.
+# Attributes of the environment that are arrays with a leading axis for the environments.
 _ARRAYS = ("_stream_seeds", "_streams_begin", "_steps", "_ended", "_resting", "_observation")
 
 
@@ -23,8 +23,8 @@ def taken(environment) -> dict[str, np.ndarray]:
     arrays = {f"batch/{name}": array for name, array in environment.batch.snapshot().items()}
     arrays |= {f"memory/{place}": leaf.copy() for place, leaf in enumerate(trees.leaves(environment._memory))}
     arrays |= {name.lstrip("_"): getattr(environment, name).copy() for name in _ARRAYS}
-    for row, carry in enumerate(environment._streams):
-        arrays |= {f"stream/{row}/{place}": np.asarray(leaf) for place, leaf in enumerate(trees.leaves(carry))}
+    for index, stream in enumerate(environment._streams):
+        arrays |= {f"stream/{index}/{place}": np.asarray(leaf) for place, leaf in enumerate(trees.leaves(stream))}
     return arrays | {
         "random/keys": np.array(keys),
         "random/positions": np.array(positions),
@@ -48,15 +48,15 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
         environment._memory = trees.mapped(lambda like: _fitting(next(memory), like), environment._memory)
         for name in _ARRAYS:
             setattr(environment, name, _fitting(arrays[name.lstrip("_")], getattr(environment, name)))
-        for row, random in enumerate(environment._randoms):
-            parts = (arrays[f"random/{part}"][row] for part in ("keys", "positions", "halves", "normals"))
+        for index, random in enumerate(environment._randoms):
+            parts = (arrays[f"random/{part}"][index] for part in ("keys", "positions", "halves", "normals"))
             key, position, half, normal = parts
             random.set_state(("MT19937", key, int(position), int(half), float(normal)))
             first = environment.task.first()
-            carry = (arrays[f"stream/{row}/{place}"] for place, _ in enumerate(trees.leaves(first)))
-            environment._streams[row] = _refilled(first, carry)
+            stream = (arrays[f"stream/{index}/{place}"] for place, _ in enumerate(trees.leaves(first)))
+            environment._streams[index] = _refilled(first, stream)
     except (KeyError, ValueError, TypeError, IndexError) as error:
-        raise ValueError(f"snapshot: of other rows or another task: {checks.quoted(error)}") from None
+        raise ValueError(f"snapshot: of another task or number of environments: {checks.quoted(error)}") from None
 
 
 def _fitting(array: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -11,6 +11,11 @@ def mapped(function: Callable, tree, *others) -> Any:
     return None if tree is None else function(tree, *others)
 
 
+def at(tree, index: int) -> Any:
+    """Return the tree of the entries that leaves have at an index of their first axis."""
+    return mapped(lambda leaf: leaf[index], tree)
+
+
 def leaves(tree) -> Iterator:
     """Yield the numbers and arrays of a tree, depth first."""
     if isinstance(tree, tuple):

@@ -47,7 +47,7 @@ def strip(environment, policy: Policy, seed: int = 0) -> np.ndarray | None:
 
     Args:
         environment: of `arc_suite.load`.
-        policy: made for one row.
+        policy: made for one environment.
         seed: of the episode's start.
 
     Returns:

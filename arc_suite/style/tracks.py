@@ -127,7 +127,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
 
     Args:
         environment: of `arc_suite.load`.
-        policy: made for one row.
+        policy: made for one environment.
         seed: of the episode's start.
         max_steps: to stop early.
 

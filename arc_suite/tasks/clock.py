@@ -54,7 +54,7 @@ class Clock(NamedTuple):
         )
 
     def at(self, table: np.ndarray, tick):
-        """Return the rows (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
+        """Return the entries (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
         if not isinstance(tick, int):
             table = tick.__array_namespace__().asarray(table)
         return table[tick % len(self.phases)]

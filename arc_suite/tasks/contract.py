@@ -3,12 +3,12 @@
 A task says how an episode starts, what is remembered of it, what a policy observes, what a step
 earns and when it ends. It holds no state and touches no simulation: memory is a value that comes in
 and goes out, and what is to be written is returned. Arrays may carry any leading axes `...`: none
-for one environment, one for the rows of a batch. Where a function is needed it comes from the
+for one environment, one for a batch. Where a function is needed it comes from the
 array's own namespace, so that the same text runs under NumPy and JAX. NumPy rounds powers of scalars and
 of arrays differently: write `x * x` where `x` has only leading axes. `arc-suite check --task` finds
 what differs between one environment and a batch.
 
-An episode, as a driver runs it, for one environment or with a leading axis for all rows:
+An episode, as a driver runs it, for one environment or with a leading axis for a batch:
 
     start = task.start(random, stream)            # all randomness of the episode
     ... the driver resets the simulation to start.qpos and start.qvel ...

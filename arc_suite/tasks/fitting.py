@@ -35,7 +35,7 @@ _STABLE = 0.05  # of h: static stability margin that is enough throughout a cycl
 
 
 def fitted_parameters(body: Body) -> dict:
-    """Return a row of walk's table for any body: units as in `terms.Parameters`, every noise by itself."""
+    """Return parameters of walk for any body: units as in `terms.Parameters`, every noise by itself."""
     height = body.torso.standing_height
     unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
     speed = TARGET_FROUDE * unit

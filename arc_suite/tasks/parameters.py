@@ -12,7 +12,7 @@ from arc_suite.tasks import modifiers
 from arc_suite.tasks.clock import TWO_PI
 from arc_suite.tasks.fitting import fitted_noise, fitted_parameters
 
-# What a robot's row may leave out.
+# What the parameters of a robot may leave out.
 COMMON = {"duty_factor": 0.6, "default_angles": 0.0, "weights": {}}
 
 # One number for several kinds of noise, whatever their units, as published: name -> the settings that it sets.
@@ -72,7 +72,7 @@ _WALK = {
     },
 }
 
-# By task, then by robot; what a task has no row of is walk's.
+# By task, then by robot; what a task has no entry for is walk's.
 PARAMETERS = {"walk": _WALK}
 
 
@@ -143,9 +143,9 @@ def values(body: Body, overrides: Mapping[str, Any], task: str, names: Iterable[
     """
     for name in overrides:
         checks.name(name, names, f"setting of {task}", near=("time_limit", *elsewhere, *modifiers.NAMES))
-    row = robots.row(PARAMETERS["walk"], body, "walk")
-    table = COMMON | (fitted_parameters(body) if row is None else row)
-    table |= robots.row(PARAMETERS.get(task, {}), body, task) or {}
+    own = robots.parameters(PARAMETERS["walk"], body, "walk")
+    table = COMMON | (fitted_parameters(body) if own is None else own)
+    table |= robots.parameters(PARAMETERS.get(task, {}), body, task) or {}
     if overrides.get("gait") is not None:
         gait = gaits.gait(body, overrides["gait"])
         offsets = tuple(TWO_PI * offset for offset in gait.offsets)

@@ -74,7 +74,7 @@ class Evaluator:
             lengths += counted
             sensed = proprioception(checked(split(observations), Clocked.reads, joints))
             uprightness = rotations.upright(sensed[0])
-            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all rows start anew
+            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all start anew
             costs["tilt"] = 1.0 - uprightness**2
             for name, cost in costs.items():
                 style[name] += cost * counted

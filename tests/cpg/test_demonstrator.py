@@ -131,9 +131,9 @@ def test_batch_rows_are_single_demonstrators_and_restart_alone():
     for step in range(60):
         observations = rng.normal(0, 0.3, (3, 199))
         restarting = {25: [1], 40: [0, 2]}.get(step, [])
-        batch.begin(restarting)
+        batch.reset(restarting)
         for row in restarting:
-            singles[row].begin([0])
+            singles[row].reset([0])
         actions = batch.act(split(observations))
         for row, single in enumerate(singles):
             assert_array_equal(actions[row], single.act(split(observations[row])))

@@ -92,7 +92,7 @@ def test_a_row_that_begins_again_does_as_the_first_time(robot, task, preset):
 
     def walked():
         observations = rows.reset(seed=4)[0]
-        policy.begin([0, 1])
+        policy.reset([0, 1])
         for _ in range(20):
             actions = policy.act(rows.task.split(observations))
             observations = rows.step(actions)[0]

@@ -133,7 +133,7 @@ class Rounded:
 
     def __init__(self, policy):
         self.policy = policy
-        self.begin = policy.begin
+        self.reset = policy.reset
 
     def act(self, observation, rewards):
         return self.policy.act(observation, rewards).astype(np.float32)
@@ -159,10 +159,10 @@ def test_an_episode_is_what_the_single_environment_plays():
     ids=["presets and noise", "spider", "random", "own"],
 )
 def test_episodes_depend_on_seed_and_settings_alone(settings):
-    collect(ID, settings, 7, rows=7, threads=1)
+    collect(ID, settings, 7, num_envs=7, threads=1)
     expected = digests()
     for name, rows, threads in (("a", 1, 1), ("b", 3, 2), ("c", 100, 4)):
-        collect(f"{ID[:-3]}-{name}-v0", settings, 7, rows=rows, threads=threads)
+        collect(f"{ID[:-3]}-{name}-v0", settings, 7, num_envs=rows, threads=threads)
         assert digests(f"{ID[:-3]}-{name}-v0") == expected
     later = settings._replace(seed=settings.seed + 4)
     collect(f"{ID[:-3]}-later-v0", later, 3)

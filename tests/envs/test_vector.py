@@ -285,7 +285,7 @@ def test_reset_mask_restarts_some_rows(mode):
         batch.reset(options={"reset_mask": np.zeros(4, bool)})
     with pytest.raises(ValueError, match="^reset_mask"):
         batch.reset(options={"reset_mask": np.arange(4)})
-    with pytest.raises(ResetNeeded, match="^cannot reset some rows: reset all of them first$"):
+    with pytest.raises(ResetNeeded, match="^cannot reset some environments: reset all of them first$"):
         make(num_envs=4).reset(options={"reset_mask": mask})
 
 
@@ -416,7 +416,7 @@ def test_calls_at_the_wrong_time():
         ({"camera_id": "tracing"}, "unknown camera 'tracing'; did you mean 'tracking'?"),
         ({"task_kwargs": {"weigths": {}}}, "unknown setting of walk 'weigths'; did you mean 'weights'?"),
         ({"task_kwargs": {"random": -1}}, "seed: expected an integer from 0 to 4294967295, got -1"),
-        ({"task_kwargs": {"on_divergence": "raise"}}, "unknown on_divergence of rows 'raise'"),
+        ({"task_kwargs": {"on_divergence": "raise"}}, "unknown on_divergence of many environments 'raise'"),
     ],
 )
 def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
@@ -434,7 +434,7 @@ def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
 @pytest.mark.parametrize(
     ("seed", "message"),
     [
-        ([1, 2], "seed: expected one for each of 3 rows, got 2"),
+        ([1, 2], "seed: expected one for each of 3 environments, got 2"),
         (2**32 - 2, f"seed: expected an integer from 0 to 4294967295, got {2**32}"),
         ("one", "seed: expected an integer from 0 to 4294967295, got 'one'"),
         ([1, 2, 2.5], "seed: expected an integer from 0 to 4294967295, got 2.5"),

@@ -122,7 +122,7 @@ CASES = [
     (lambda w: w.rows.reset(seed=-1), f"{SEED} -1"),
     (lambda w: w.rows.reset(seed=2**32 - 1), f"{SEED} 4294967296"),
     (lambda w: w.rows.reset(seed=1.5), f"{SEED} 1.5"),
-    (lambda w: w.rows.reset(seed=[1, 2]), "seed: expected one for each of 3 rows, got 2"),
+    (lambda w: w.rows.reset(seed=[1, 2]), "seed: expected one for each of 3 environments, got 2"),
     (lambda w: w.rows.reset(seed=[1, 2, "x"]), f"{SEED} 'x'"),
     (
         lambda w: w.rows.reset(options={"reset_mask": np.zeros(3, bool)}),
@@ -132,7 +132,7 @@ CASES = [
         lambda w: w.rows.reset(seed=3, options={"reset_mask": np.array([1, 0, 1])}),
         "reset_mask: expected 3 booleans, at least one of them true, got array([1, 0, 1])",
     ),
-    (rows(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 rows, got 3"),
+    (rows(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 environments, got 3"),
     (lambda w: policies.alone(policies.policy("random", "queen"), seed=-1), f"{SEED} -1"),
     # Ids.
     (lambda w: arc_suite.load("Queen", "walk"), f"unknown domain 'Queen'; did you mean 'queen'? {DOMAINS}"),
@@ -174,8 +174,8 @@ CASES = [
     (lambda w: w.dm.physics.render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),
     (make(width=-1), "width: expected an integer from 1 to 3840, got -1"),
     (rows(height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
-    (lambda w: w.rows.render([5]), "rows: expected integers from 0 to 2, got 5"),
-    (lambda w: w.rows.render(["a"]), "rows: expected integers from 0 to 2, got 'a'"),
+    (lambda w: w.rows.render([5]), "indices: expected integers from 0 to 2, got 5"),
+    (lambda w: w.rows.render(["a"]), "indices: expected integers from 0 to 2, got 'a'"),
     # Presets and policies.
     (
         lambda w: Demonstrator("bastion", "meduim"),

@@ -27,7 +27,7 @@ class Scripted:
         self.pattern = honest._replace(**changes.get(cheat, {}))
         self.limp = len(body.legs[0].joints)
 
-    def begin(self, rows, seeds):
+    def reset(self, indices, seeds):
         self.clock = 0
 
     def act(self, observation, rewards):

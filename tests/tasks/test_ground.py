@@ -114,9 +114,9 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
         rows = VectorEnv(
             ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0}
         )  # none is lifted
-        policy = policies.policy("cpg", robot, "tuned", rows=6)
+        policy = policies.policy("cpg", robot, "tuned", num_envs=6)
         observations, rewards, total = rows.reset(seed=0)[0], np.zeros(6), 0.0
-        policy.begin(range(6), range(6))
+        policy.reset(range(6), range(6))
         for _ in range(300):
             observations, rewards, *_ = rows.step(policy.act(rows.task.split(observations.astype(float)), rewards))
             total += rewards.mean()
@@ -306,9 +306,9 @@ def test_ground_has_no_scale():
     for scale in (0.075, 1.0, 10.0):
         body = generator.scaled(generator.generate(6, 3), scale)
         rows = VectorEnv(body, "rough", 6, task_kwargs={"terrain_seed": 3})
-        policy = policies.policy("cpg", body, "surefooted", rows=6)
+        policy = policies.policy("cpg", body, "surefooted", num_envs=6)
         observations, rewards = rows.reset(seed=0)[0], np.zeros(6)
-        policy.begin(range(6), range(6))
+        policy.reset(range(6), range(6))
         for _ in range(250):
             actions = policy.act(rows.task.split(observations.astype(float)), rewards)
             observations, rewards, *_, infos = rows.step(actions)

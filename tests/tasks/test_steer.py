@@ -112,7 +112,7 @@ def test_live_commands_of_rows_are_those_of_single_environments():
     env = gymnasium.make("arc_suite/tick-steer-v0")
     envs.reset(seed=5), env.reset(seed=6)
     desired = np.array([0.3, 0.1, -0.2])
-    envs.command("command", desired, rows=np.array([False, True, False]))
+    envs.command("command", desired, mask=np.array([False, True, False]))
     env.unwrapped.command("command", desired)
     for _ in range(5):
         observations, rewards, *_ = envs.step(np.zeros(envs.action_space.shape))
