@@ -15,11 +15,6 @@ when it is wanted, as it needs JAX, and has one function:
     arrays()                everything that it goes on from, NumPy arrays by name: a checkpoint
     restore(arrays)         goes on from there, to the same bits
 
-and, if it leaves the calls of its compiled functions to whoever drives it, so that those of many runs can be one
-program (`calls`, `together`),
-
-    calls(limit)            does what `advance` does, and yields each call, a `calls.Call`
-
 `training.train` does the rest: it evaluates, writes the folder of the run, and resumes. All that is
 random is drawn from generators seeded by the run's seed, a purpose and a count (`learner.generator`), so
 that nothing of it needs to be kept. Environments go on from `VectorEnv.snapshot()`.

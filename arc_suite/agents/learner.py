@@ -58,9 +58,6 @@ class Stage(NamedTuple):
 class Learner(Protocol):
     """What learns, an object that goes from slice to slice.
 
-    One that has `calls` too, a generator that does what `advance` does and yields each call of a compiled function
-    (`arc_suite.agents.calls`), can learn beside others in one program.
-
     Attributes:
         step: environment steps that are done with.
     """

@@ -7,8 +7,8 @@ to stop.
 """
 
 import functools
-from collections.abc import Generator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +16,6 @@ import numpy as np
 
 from arc_suite.agents import networks, priors
 from arc_suite.agents import soft_actor_critic as sac
-from arc_suite.agents.calls import Call, alone
 from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.replay import Fenced, Replay, Transitions
 from arc_suite.agents.rows import SoftActorCritic
@@ -113,17 +112,13 @@ class OffPolicy:
 
     def advance(self, limit: int) -> Mapping[str, float] | None:
         """Learn for up to `SLICE` environment steps, or up to the next look in a phase; see `Learner`."""
-        return alone(self.calls(limit))
-
-    def calls(self, limit: int) -> Generator[Call, Any, Mapping[str, float] | None]:
-        """Do what `advance` does, and yield the calls that it takes: actions and updates."""
         count = self._count
         if self._phase is not None:
-            yield from self._advance_phase()
+            self._advance_phase()
         else:
             until = min(limit, (count["steps"] // SLICE + 1) * SLICE)
             while count["steps"] < until and self._phase is None:
-                yield from self._step()
+                self._step()
         is_due = count["steps"] % SLICE == 0 or count["steps"] == self._steps_of_run
         return self._figures() if is_due and self._phase is None else None
 
@@ -157,10 +152,10 @@ class OffPolicy:
             self._prepare_phase()
         self._observation = restore_environment(self._environment, arrays)[0]
 
-    def _step(self) -> Generator[Call, Any, None]:
+    def _step(self) -> None:
         """Act, store the transition, update, and begin a phase if it is time."""
         row, count = self._row, self._count
-        action = yield from self._action()
+        action = self._action()
         observations, rewards, terminated, truncated, info = self._environment.step(action[None])
         is_last = bool(terminated[0] or truncated[0])
         following = info["final_obs"][0] if is_last else observations[0]
@@ -172,26 +167,25 @@ class OffPolicy:
         count["steps"] += 1
         spent = _zeros(_OF_CRITICS)
         for _ in range(row.updates_per_step - 1):
-            spent = yield from self._update(spent, with_policy=False)
-        self._sums = yield from self._update(self._sums, with_policy=True)
+            spent = self._update(spent, with_policy=False)
+        self._sums = self._update(self._sums, with_policy=True)
         count["summed"] += 1
         if row.phase_updates and count["steps"] % row.phase_every == 0:
             self._begin_phase()
 
-    def _action(self) -> Generator[Call, Any, np.ndarray]:
+    def _action(self) -> np.ndarray:
         random = generator(self._seed, "action", self._count["steps"])
         if len(self._sources[0]) <= self._row.random_steps:
             return random.uniform(-1.0, 1.0, self._joints).astype(np.float32)
         noise = random.standard_normal(self._joints, np.float32)
-        action = np.asarray((yield Call(_act, (), (self._state.policy, self._observation, noise))))
+        action = np.asarray(_act(self._state.policy, self._observation, noise))
         if not np.isfinite(action).all():
             raise Diverged(f"the learner diverged: its action is not finite at step {self.step}")
         return action
 
-    def _update(self, sums: dict, with_policy: bool) -> Generator[Call, Any, dict]:
+    def _update(self, sums: dict, with_policy: bool) -> dict:
         """Make an update, and return the sums of its figures and those before."""
-        given = self._state, sums, *self._drawn(with_policy)
-        self._state, sums = yield Call(_update, (self._core,), given)
+        self._state, sums = _update(self._core, self._state, sums, *self._drawn(with_policy))
         self._count["updates"] += 1
         return sums
 
@@ -240,12 +234,12 @@ class OffPolicy:
                 result[first : first + _ROWS] = numbers[: len(source) - first]
         return results
 
-    def _advance_phase(self) -> Generator[Call, Any, None]:
+    def _advance_phase(self) -> None:
         """Make updates of the critics up to the next look, take it, and end the phase if it is time."""
         row, count, phase, sums = self._row, self._count, self._phase, _zeros(_OF_CRITICS)
         updates = min(row.check_every, row.phase_updates - phase.updates)
         for _ in range(updates):
-            sums = yield from self._update(sums, with_policy=False)
+            sums = self._update(sums, with_policy=False)
         self._phase = phase = phase._replace(updates=phase.updates + updates)
         if phase.held_out:
             patience = phase.patience.looked(row.early_stop, self._look(), row.improvement, updates)

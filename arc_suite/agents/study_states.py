@@ -82,7 +82,7 @@ def watched(
     return look
 
 
-def remaining(states: Sequence[State], jobs: float) -> float | None:
+def remaining(states: Sequence[State], jobs: int) -> float | None:
     """Return about how many seconds a study still takes; None where nothing tells yet.
 
     A run goes on as fast as it has gone so far, or as the others of its kind, or as all others.

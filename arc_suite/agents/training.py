@@ -6,7 +6,7 @@ import functools
 import hashlib
 import json
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,6 @@ from tqdm import tqdm
 from arc_suite import checks, evaluation, files, registry, versions
 from arc_suite.agents import priors, run_folder
 from arc_suite.agents.algorithms import Algorithm
-from arc_suite.agents.calls import Call, advancing, alone
 from arc_suite.agents.learner import ENVIRONMENT, MOST_SEEDS, Diverged, Learner, Stage
 from arc_suite.agents.run_folder import RunFolder
 from arc_suite.data.settings import model_sha256
@@ -101,21 +100,15 @@ class Run(NamedTuple):
         }
 
 
-def train(run: Run, folder: Path, **settings) -> bool:
-    """Train, or go on, and return whether the run is finished; arguments and errors are those of `training`."""
-    return alone(training(run, folder, **settings))
-
-
-def training(
+def train(
     run: Run,
     folder: Path,
     minutes: float | None = None,
     threads: int = 1,
     progress: Callable = tqdm,
     told: Callable[[int, Mapping[str, float]], None] = lambda step, figures: None,
-    beside: Callable[[], int] = lambda: 1,
-) -> Generator[Call, Any, bool]:
-    """Train, or go on, and yield the calls that the learner leaves to whoever drives it.
+) -> bool:
+    """Train, or go on.
 
     Args:
         run: what the run depends on.
@@ -125,7 +118,6 @@ def training(
         progress: makes a progress bar as `tqdm` does.
         told: called after each line of training.csv, and after each evaluation, with the environment
             step and figures by name; an evaluation's is `return`.
-        beside: tells how many runs this process is making; each is counted its share of the processor's seconds.
 
     Returns:
         Whether the run is finished.
@@ -148,14 +140,14 @@ def training(
         if run_files.arrays is not None:
             _restore(learner, run_files)
         judge = _Judge(run, threads)
-        clock = _Clock(state, beside)
+        clock = _Clock(state)
         bar = progress(total=run.steps, initial=learner.step, desc=Path(folder).name, unit="step", unit_scale=True)
         with bar, contextlib.closing(judge):
             while state["evaluated"] < run.steps:
                 if minutes is not None and time.monotonic() - began > 60.0 * minutes:
                     return False
                 due = min((state["evaluated"] // run.interval + 1) * run.interval, run.steps)
-                figures = yield from advancing(learner, due)
+                figures = learner.advance(due)
                 bar.update(learner.step - bar.n)
                 arrays = learner.arrays()
                 _check_finite(arrays, learner.step)
@@ -208,13 +200,13 @@ def _shown(figures: Mapping[str, float], state: Mapping[str, Any]) -> str:
 class _Clock:
     """Adds seconds up over all processes of a run, into its times."""
 
-    def __init__(self, state: dict[str, Any], beside: Callable[[], int]):
-        self._state, self._beside, self._latest = state, beside, (time.monotonic(), time.process_time())
+    def __init__(self, state: dict[str, Any]):
+        self._state, self._latest = state, (time.monotonic(), time.process_time())
 
     def read(self, run_files: RunFolder, step: int, write: bool) -> None:
         now = time.monotonic(), time.process_time()
         self._state["wall"] += now[0] - self._latest[0]
-        self._state["cpu"] += (now[1] - self._latest[1]) / self._beside()
+        self._state["cpu"] += now[1] - self._latest[1]
         self._latest = now
         if write:
             seconds = {f"{name}_seconds": round(self._state[name], 3) for name in ("wall", "cpu")}

@@ -8,31 +8,23 @@ enough to be committed, and the report is made of that folder alone.
   arc-suite study first-steps --report
   arc-suite study paper --jobs 8 --shard 3/16
   arc-suite study paper --submit 16 --hours 24
-  arc-suite study paper --together 10
   arc-suite study my_studies:MINE
 """
 
 import shutil
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from absl import flags
 
 from arc_suite.agents import studies, study_report, study_runner, study_states
-from arc_suite.agents.studies import Row
 from arc_suite.agents.study_states import State
-from arc_suite.cli.program import progress, use_one_thread
+from arc_suite.cli.program import progress
 from arc_suite.envs.vector import usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
-flags.DEFINE_integer(
-    "together",
-    None,
-    "Runs at a time in this process, those that learn alike in one program: for a GPU, in place of --jobs.",
-    lower_bound=1,
-)
 flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth, from the ith on, which counts from 0.")
 flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
 flags.DEFINE_float("hours", 24.0, "Of a job; it comes back until its share is done.", lower_bound=0.1)
@@ -60,35 +52,20 @@ def main(name: str | None = None) -> int:
         study_runner.publish_all(rows, folder, results)
         print(study_report.write(name, study, results))
         return 0
-    if (FLAGS.together, FLAGS.jobs, FLAGS.submit).count(None) < 2:
-        raise ValueError("--together, --jobs, --submit: one process, several, or a cluster; give one of them")
+    if FLAGS.jobs is not None and FLAGS.submit is not None:
+        raise ValueError("--jobs, --submit: this machine, or a cluster; give one of them")
     if FLAGS.submit is not None:
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(name, min(FLAGS.submit, len(rows)), folder, results)
-    width = FLAGS.together or FLAGS.jobs or usable_cores()
-    run, jobs = (study_runner.run, width) if FLAGS.together is None else together(rows, width)
+    jobs = FLAGS.jobs or usable_cores()
     show = shown(jobs)
-    states = run(rows, folder, results, width, show, progress)
+    states = study_runner.run(rows, folder, results, jobs, show, progress)
     show(states, whole=True)
     failed = [each.row.name for each in states if each.word == "failed"]
     for each in failed:
         print(f"{folder / each}.log: {last_line(folder / f'{each}.log')}", file=sys.stderr)
     return 1 if failed else 0
-
-
-def together(rows: Sequence[Row], width: int) -> tuple[Callable, float]:
-    """Return what makes runs side by side in this process, and how many it makes at a time.
-
-    Raises:
-        ValueError: JAX is not installed; one line.
-    """
-    use_one_thread()
-    try:
-        from arc_suite.agents import study_together
-    except ImportError as error:
-        raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
-    return study_together.run, len(rows) / len(list(study_together.groups(rows, width)))
 
 
 def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
@@ -120,7 +97,7 @@ def shard(text: str) -> tuple[int, int]:
     return int(part), int(parts)
 
 
-def table(states: list[State], jobs: float, most: int | None = None) -> str:
+def table(states: list[State], jobs: int, most: int | None = None) -> str:
     """Return as text how the runs stand, and how long they still take.
 
     Args:
@@ -149,7 +126,7 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min"
 
 
-def shown(jobs: float) -> Callable[..., None]:
+def shown(jobs: int) -> Callable[..., None]:
     """Return what shows states: on a terminal a table in its place, elsewhere a line for each change.
 
     With `whole`, at the end, it shows the table of all runs; before that, as many as the terminal has lines for.

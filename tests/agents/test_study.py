@@ -273,7 +273,7 @@ def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
         ),
         (
             ["first-steps", "--jobs=2", "--submit=3"],
-            "arc-suite study: --together, --jobs, --submit: one process, several, or a cluster; give one of them",
+            "arc-suite study: --jobs, --submit: this machine, or a cluster; give one of them",
         ),
         (["first-steps", "--shard=6/7"], "arc-suite study: --shard=6/7: no run, as the study has 6"),
         (["arc_suite:load"], "arc-suite study: study 'arc_suite:load': expected a Study, got function"),

@@ -67,8 +67,6 @@ THIRD_PARTY = {
     "agents": {"numpy", "gymnasium", "tqdm"},
     "agents.networks": {"numpy", "jax"},
     "agents.plots": {"numpy", "matplotlib"},
-    "agents.calls": set(),
-    "agents.together": {"numpy", "jax"},
     "agents.off_policy": {"numpy", "jax"},
     "agents.soft_actor_critic": {"numpy", "jax", "optax"},
     "agents.imitation": {"numpy", "jax", "optax"},
