@@ -18,10 +18,10 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite.agents import studies, study_report, study_runner, study_states
-from arc_suite.agents.study_states import State
 from arc_suite.cli.program import progress
 from arc_suite.envs.vector import usable_cores
+from arc_suite.studies import report, runner, tables, watch
+from arc_suite.studies.watch import State
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
@@ -40,17 +40,17 @@ _WORDS = ("running", "elsewhere", "failed", "waiting", "finished")
 def main(name: str | None = None) -> int:
     """Make the runs, or write the report; the exit status tells whether all runs are finished."""
     if name is None:
-        raise ValueError(f"expected a study: {', '.join(studies.STUDIES)}, or module:attribute; see --help")
-    study = studies.study(name)
+        raise ValueError(f"expected a study: {', '.join(tables.STUDIES)}, or module:attribute; see --help")
+    study = tables.study(name)
     part, parts = shard(FLAGS.shard)
     rows = study.rows[part::parts]
     if not rows:
         raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.rows)}")
-    folder = Path(FLAGS.runs or Path("runs", studies.folder_name(name)))
-    results = Path(FLAGS.results or Path("studies", studies.folder_name(name)))
+    folder = Path(FLAGS.runs or Path("runs", tables.folder_name(name)))
+    results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
     if FLAGS.report:
-        study_runner.publish_all(rows, folder, results)
-        print(study_report.write(name, study, results))
+        runner.publish_all(rows, folder, results)
+        print(report.write(name, study, results))
         return 0
     if FLAGS.jobs is not None and FLAGS.submit is not None:
         raise ValueError("--jobs, --submit: this machine, or a cluster; give one of them")
@@ -60,7 +60,7 @@ def main(name: str | None = None) -> int:
         return submit(name, min(FLAGS.submit, len(rows)), folder, results)
     jobs = FLAGS.jobs or usable_cores()
     show = shown(jobs)
-    states = study_runner.run(rows, folder, results, jobs, show, progress)
+    states = runner.run(rows, folder, results, jobs, show, progress)
     show(states, whole=True)
     failed = [each.row.name for each in states if each.word == "failed"]
     for each in failed:
@@ -75,7 +75,7 @@ def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
         ValueError: submitit is not installed; one line.
     """
     try:
-        from arc_suite.agents import cluster
+        from arc_suite.studies import cluster
     except ImportError as error:
         raise ValueError(f"--submit needs submitit: pip install 'arc_suite[cluster]' ({error})") from None
     arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
@@ -113,7 +113,7 @@ def table(states: list[State], jobs: int, most: int | None = None) -> str:
         result = "-" if each.result is None else f"{each.result:.1f}"
         lines.append(f"{each.row.name:<{width}}  {each.word:<9} {steps:>19} {result:>8} {each.cpu / 60.0:>8.1f}")
     finished, failed = (sum(each.word == word for each in states) for word in ("finished", "failed"))
-    seconds = study_states.remaining(states, jobs)
+    seconds = watch.remaining(states, jobs)
     left = f", {failed} failed" if failed else ""
     if finished + failed < len(states):
         left += f", {'?' if seconds is None else duration(seconds)} to go"

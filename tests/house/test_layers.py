@@ -33,6 +33,7 @@ ROOMS = (
     ("tuning",),
     ("export",),  # to take away
     ("agents",),  # who learns
+    ("studies",),  # tables of runs
     ("cli",),  # programs
     ("doctor", "__main__"),  # that Python starts by name
 )
@@ -74,13 +75,9 @@ THIRD_PARTY = {
     "agents.on_policy": {"numpy", "jax"},
     "agents.proximal_policy": {"numpy", "jax", "optax"},
     "agents.rows": set(),
-    "agents.studies": set(),
-    "agents.cluster": {"submitit"},
-    "agents.study_states": {"numpy"},
-    "agents.study_runner": {"numpy", "gymnasium", "tqdm"},
-    "agents.study_results": {"numpy"},
-    "agents.study_report": {"numpy"},
-    "agents.study_strips": set(),
+    "studies": {"numpy"},
+    "studies.cluster": {"submitit"},
+    "studies.runner": {"numpy", "gymnasium", "tqdm"},
     "style.metrics": {"numpy"},
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},

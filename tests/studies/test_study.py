@@ -15,12 +15,13 @@ import pytest
 import tiny_studies
 
 from arc_suite import data, policies, registry, style
-from arc_suite.agents import run_folder, studies, study_results, study_runner, study_states
-from arc_suite.agents.studies import Row
-from arc_suite.agents.study_runner import METRICS
-from arc_suite.agents.study_states import State, watched
+from arc_suite.agents import run_folder
 from arc_suite.envs.dm import load
 from arc_suite.robots import generator
+from arc_suite.studies import results, runner, tables, watch
+from arc_suite.studies.runner import METRICS
+from arc_suite.studies.tables import Row
+from arc_suite.studies.watch import State, watched
 
 ROOT = pathlib.Path(__file__).parents[2]
 FIXTURES = ROOT / "tests" / "fixtures"
@@ -118,20 +119,20 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
 
     row, folder = tiny_studies.WITH_NUMPY.rows[0], tmp_path / "runs"
     before = (folder / row.name / "checkpoint.npz").stat().st_mtime_ns
-    states = study_runner.run([row], folder, tmp_path / "results", 1, lambda states: None)
+    states = runner.run([row], folder, tmp_path / "results", 1, lambda states: None)
     assert [each.word for each in states] == ["finished"]
     assert (folder / row.name / "checkpoint.npz").stat().st_mtime_ns == before
     assert states[0].step == row.steps
 
     with pytest.raises(ValueError, match=r"of another run, whose row.spread is 0.02, and not 0.3; write to another"):
-        study_runner.is_finished(row._replace(numbers={"spread": 0.3}), folder / row.name)
+        runner.is_finished(row._replace(numbers={"spread": 0.3}), folder / row.name)
 
     # Of another run nothing that was measured stays.
     published = tmp_path / "results" / row.name
     measured = (published / "style.csv").read_text()
     (published / "config.json").write_text("{}")
     (published / "style.csv").write_text(measured.replace(",0.", ",1."))
-    study_runner.publish(row, folder, tmp_path / "results")
+    runner.publish(row, folder, tmp_path / "results")
     assert (published / "style.csv").read_text() == measured
 
     # What is published of the policy's style is what the style room measures of it.
@@ -163,11 +164,11 @@ def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
 def test_prior_data_are_those_that_the_row_names(tmp_path, monkeypatch):
     """A dataset that somebody has collected more of is another."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
-    row = Row("tick", "sacfd", 100, task_kwargs=tiny_studies.SHORT, prior=studies.Prior(episodes=2))
-    assert study_runner.prepared([row], tmp_path / "runs", 1) == {row.name: "waiting"}
+    row = Row("tick", "sacfd", 100, task_kwargs=tiny_studies.SHORT, prior=tables.Prior(episodes=2))
+    assert runner.prepared([row], tmp_path / "runs", 1) == {row.name: "waiting"}
     data.collect(row.prior_id, row.prior_settings, 3)
     with pytest.raises(ValueError) as error:
-        study_runner.prepared([row], tmp_path / "runs", 1)
+        runner.prepared([row], tmp_path / "runs", 1)
     what = f"dataset {row.prior_id!r} has 3 episodes, and the study takes 2; delete it, to have it collected anew"
     assert str(error.value) == f"{row.name}: {what}"
 
@@ -182,52 +183,52 @@ def test_robots_of_others_and_unknown_ones(tmp_path, monkeypatch):
     assert row.body is body and row.name == "others.creature-walk-sac-0"
     for name in ("tik", "examples/spider.json"):
         with pytest.raises(ValueError, match=f"^unknown robot '{name}'"):
-            study_runner.run([row, Row(name, "sac", 100)], tmp_path / "runs", tmp_path, 1, print)
+            runner.run([row, Row(name, "sac", 100)], tmp_path / "runs", tmp_path, 1, print)
     assert not (tmp_path / "runs").exists()
 
 
 def test_phases_are_published(tmp_path):
     lines = ["step,phase_updates", "1000,0", "2000,300", "3000,0", "4000,75000"]
     (tmp_path / "training.csv").write_text("\n".join(lines) + "\n")
-    text = study_runner._phases(run_folder.table(tmp_path, "training"))
+    text = runner._phases(run_folder.table(tmp_path, "training"))
     assert text == "step,updates\n2000,300\n4000,75000\n"
 
 
 def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
     """It is not started twice, whoever makes it."""
     log = tmp_path / "a.log"
-    held = study_runner.claimed(log)
-    assert study_runner.claimed(log) is None
+    held = runner.claimed(log)
+    assert runner.claimed(log) is None
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, stdout=held)
     held.close()
-    assert study_runner.claimed(log) is None, "the process of the run holds it too"
+    assert runner.claimed(log) is None, "the process of the run holds it too"
     child.communicate(b"\n")
-    study_runner.claimed(log).close()
+    runner.claimed(log).close()
 
 
 def test_remaining_time():
     """By a run's own pace, that of its kind, or that of all."""
-    sac, sope = (studies.Row("tick", name, 1000) for name in ("sac", "sope"))
+    sac, sope = (tables.Row("tick", name, 1000) for name in ("sac", "sope"))
 
     def state(row, word, step, wall):
         return State(row, word, step, None, wall, wall)
 
-    assert study_states.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
+    assert watch.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
     begun = [state(sac, "finished", 1000, 100.0), state(sac, "running", 500, 100.0), state(sac, "waiting", 0, 0.0)]
-    assert study_states.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
-    assert study_states.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
+    assert watch.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
+    assert watch.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
 
 
 def test_how_runs_stand_is_shown_when_a_word_changes_and_now_and_then(tmp_path, monkeypatch):
     """And of a long study the tables of those runs alone are read that may have grown."""
-    rows = [studies.Row("tick", "sac", 1000, seed) for seed in range(3)]
+    rows = [tables.Row("tick", "sac", 1000, seed) for seed in range(3)]
     words = dict(zip((row.name for row in rows), ("finished", "running", "waiting"), strict=True))
     times = tmp_path / rows[1].name / "times.csv"
     times.parent.mkdir()
     read, shown, now = [], [], [0.0]
-    table = study_states.table
-    monkeypatch.setattr(study_states, "table", lambda *place: read.append(place[0].name) or table(*place))
-    monkeypatch.setattr(study_states.time, "monotonic", lambda: now[0])
+    table = watch.table
+    monkeypatch.setattr(watch, "table", lambda *place: read.append(place[0].name) or table(*place))
+    monkeypatch.setattr(watch.time, "monotonic", lambda: now[0])
     look = watched(rows, tmp_path, words, lambda states: shown.append([(each.word, each.step) for each in states]))
 
     look()
@@ -288,9 +289,9 @@ def test_errors_are_one_line(arguments, line, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("name", studies.STUDIES)
+@pytest.mark.parametrize("name", tables.STUDIES)
 def test_rows_of_the_table_are_runs(name):
-    study = studies.study(name)
+    study = tables.study(name)
     assert study.title
     for row in study.rows[:12]:
         run = row.run()
@@ -303,7 +304,7 @@ def test_rows_of_the_table_are_runs(name):
 def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
     """By submitit's executor that runs jobs here; a job that is broken off comes back as it was."""
     pytest.importorskip("submitit", reason="of the extra cluster: make check-agents")
-    from arc_suite.agents import cluster
+    from arc_suite.studies import cluster
 
     commands = []
     monkeypatch.setattr(cluster.subprocess, "run", lambda command, check: commands.append(command))
@@ -335,6 +336,6 @@ def test_without_submitit_it_says_what_to_install(tmp_path):
 )
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, task, presets):
     row = Row("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
-    study_runner.publish_all([row], tmp_path / "runs", tmp_path)
-    found = study_results.demonstrators(tmp_path)[row.place]
+    runner.publish_all([row], tmp_path / "runs", tmp_path)
+    found = results.demonstrators(tmp_path)[row.place]
     assert list(found) == presets and all(len(totals) == 10 for totals in found.values())

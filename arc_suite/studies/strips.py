@@ -4,8 +4,8 @@ import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from arc_suite.agents import studies
-from arc_suite.agents.study_results import STRIP, Result
+from arc_suite.studies import tables
+from arc_suite.studies.results import STRIP, Result
 
 _STRIPS = (
     "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle, to the nearest "
@@ -20,7 +20,7 @@ def paragraphs(name: str, groups: Mapping[str, Mapping[str, Sequence[Result]]], 
 
     Args:
         name: of the study.
-        groups: its results, see `study_results.grouped`.
+        groups: its results, see `results.grouped`.
         published: folder of its tables.
 
     Returns:
@@ -32,7 +32,7 @@ def paragraphs(name: str, groups: Mapping[str, Mapping[str, Sequence[Result]]], 
             rows = [each.row for each in seeds if (published / each.row.name / STRIP).exists()]
             for row in rows[:1]:
                 command = shlex.join(
-                    ["arc-suite", *row.page_arguments(Path("runs", studies.folder_name(name), row.name))]
+                    ["arc-suite", *row.page_arguments(Path("runs", tables.folder_name(name), row.name))]
                 )
                 found.append(f"**{place}: {kind}**, seed {row.seed}: `{command}`")
                 found.append(f"![{place}: {kind}]({row.name}/{STRIP})")

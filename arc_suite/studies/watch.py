@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.agents import run_folder
-from arc_suite.agents.studies import Row
+from arc_suite.studies.tables import Row
 
 _EVERY = 2.0  # s between two looks, where no word changes
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import evaluation, files
-from arc_suite.agents import studies, study_results, study_strips
-from arc_suite.agents.studies import Row, Study
-from arc_suite.agents.study_results import Result
+from arc_suite.studies import results, strips, tables
+from arc_suite.studies.results import Result
+from arc_suite.studies.tables import Row, Study
 
 REPORT, CURVES = "README.md", "curves.png"
 
@@ -127,10 +127,10 @@ def write(name: str, study: Study, published: Path) -> Path:
         ValueError: nothing is published, or a table is damaged; one line.
         OSError: something cannot be written; one line.
     """
-    found = study_results.results(study.rows, published)
+    found = results.results(study.rows, published)
     if not found:
         raise ValueError(f"{published}: holds no results of the study {name}")
-    groups, demonstrators = study_results.grouped(found), study_results.demonstrators(published)
+    groups, demonstrators = results.grouped(found), results.demonstrators(published)
     sections = {
         f"Study {name}": [_title(study, found), _reached(found)],
         "Curves": [f"![Returns over environment steps]({CURVES})"],
@@ -138,14 +138,14 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
         "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
-        "Style": [_STYLE, _style(groups), *study_strips.paragraphs(name, groups, published)],
+        "Style": [_STYLE, _style(groups), *strips.paragraphs(name, groups, published)],
         "What the paper says": [_CLAIMS, _claims(found)],
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
     with files.writing(published / REPORT) as temporary:
         temporary.write_text(_page(sections))
-    if studies.STUDIES.get(name) == study:
+    if tables.STUDIES.get(name) == study:
         with files.writing(published.parent / REPORT) as temporary:
             temporary.write_text(_page({"Leaderboard": [_LEADERBOARD, _leaderboard(published.parent)]}))
     return published / REPORT
@@ -246,7 +246,7 @@ def _finals(groups: Groups, demonstrators) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            row, values = seeds[0].row, study_results.scores(seeds)
+            row, values = seeds[0].row, results.scores(seeds)
             paper = str(PAPER[row.robot][row.algorithm]) if _is_papers(seeds[0]) else "-"
             reached = f"{min(each.steps[-1] for each in seeds):,}"
             lines.append((place, kind, reached, str(len(seeds)), _mean(values), _iqm(values), paper))
@@ -264,7 +264,7 @@ def _efficiency(groups: Groups) -> str:
             expert = _expert(seeds[0].row)
             cells = []
             for threshold in (expert, 3500.0):
-                steps, seconds = (np.inf, np.inf) if threshold is None else study_results.until(seeds, threshold)
+                steps, seconds = (np.inf, np.inf) if threshold is None else results.until(seeds, threshold)
                 cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
             area = np.mean([each.returns.mean() for each in seeds])
             lines.append((place, kind, *cells, f"{area:.1f}"))
@@ -278,7 +278,7 @@ def _improvements(groups: Groups) -> str:
     for x in names:
         cells = []
         for y in names:
-            found = None if x == y else study_results.improvement(groups, x, y)
+            found = None if x == y else results.improvement(groups, x, y)
             cells.append("-" if found is None else "{:.2f} [{:.2f}, {:.2f}]".format(found[0], *found[1]))
         lines.append((x, *cells))
     return _table(("more than", *names), lines)
@@ -337,14 +337,14 @@ def _verdict(figures: Mapping[str, float | None]) -> str:
 
 def _leaderboard(folder: Path) -> str:
     lines = []
-    for name, study in studies.STUDIES.items():
-        for kinds in study_results.grouped(study_results.results(study.rows, folder / name)).values():
+    for name, study in tables.STUDIES.items():
+        for kinds in results.grouped(results.results(study.rows, folder / name)).values():
             for seeds in kinds.values():
                 lines.append((name, seeds))
     lines.sort(key=lambda line: (line[1][0].row.place, -np.mean([each.final for each in line[1]])))
     cells = []
     for name, seeds in lines:
-        row, values = seeds[0].row, study_results.scores(seeds)
+        row, values = seeds[0].row, results.scores(seeds)
         figure = next(iter(seeds[0].progress))
         own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
         style = [_size(name, seeds) for name in ("gait_compliance", "heading_error", "torso_pitch")]

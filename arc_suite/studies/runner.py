@@ -20,15 +20,16 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import data, evaluation, files, policies, style
-from arc_suite.agents import run_folder, study_results
-from arc_suite.agents.studies import Row
-from arc_suite.agents.study_states import State, states, table, watched
+from arc_suite.agents import run_folder
 from arc_suite.agents.training import PRIOR_SHA256
 from arc_suite.cpg.demonstrator import presets_of, suited_preset
 from arc_suite.envs.dm import Environment, load
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import Policy, checkpoints, network
 from arc_suite.simulation.opengl import RenderingUnavailable
+from arc_suite.studies import results
+from arc_suite.studies.tables import Row
+from arc_suite.studies.watch import State, states, table, watched
 from arc_suite.style import strips
 
 PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
@@ -154,7 +155,7 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         OSError: something cannot be written; one line.
     """
     source, target = folder / row.name, published / row.name
-    steps = study_results.evaluated(table(source, "evaluations"))
+    steps = results.evaluated(table(source, "evaluations"))
     if not len(steps):
         return
     files.folder(target)
@@ -169,7 +170,7 @@ def publish(row: Row, folder: Path, published: Path) -> None:
         with files.writing(target / "phases.csv") as temporary:
             temporary.write_text(_phases(training))
     step = int(steps[-1])
-    measured, drawn = table(target, "style"), target / study_results.STRIP
+    measured, drawn = table(target, "style"), target / results.STRIP
     up_to_date = bool(measured) and measured["step"][-1] == step
     if not up_to_date:
         drawn.unlink(missing_ok=True)  # before the style is new: where it is, the strip is of the same policy
@@ -198,11 +199,11 @@ def publish_all(rows: Sequence[Row], folder: Path, published: Path) -> None:
     """
     for row in rows:
         publish(row, folder, published)
-    known = study_results.demonstrators(published)
+    known = results.demonstrators(published)
     places = {row.place: row for row in rows}
     if places.keys() <= known.keys() or not published.exists():
         return
-    with files.writing(published / study_results.DEMONSTRATORS) as temporary, temporary.open("w", newline="") as file:
+    with files.writing(published / results.DEMONSTRATORS) as temporary, temporary.open("w", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(("place", "preset", "seed", "return"))
         for place, presets in known.items():

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from arc_suite import evaluation
-from arc_suite.agents import studies, study_report, study_results
-from arc_suite.agents.studies import Row, Study
-from arc_suite.agents.study_report import PAPER
 from arc_suite.evaluation.protocol import EXPERT_RETURNS
+from arc_suite.studies import report, results, tables
+from arc_suite.studies.report import PAPER
+from arc_suite.studies.tables import Row, Study
 
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 STEPS = (1000, 2000)
@@ -40,7 +40,7 @@ def made(tmp_path):
     rows = tuple(Row(robot, name, 2000, seed) for robot in PAPER for name in PAPER[robot] for seed in (0, 1))
     for row in rows:
         final = float(PAPER[row.robot][row.algorithm])
-        start = 100.0 if row.algorithm in study_report.ONLINE else 300.0
+        start = 100.0 if row.algorithm in report.ONLINE else 300.0
         style = {"sac": 0.5, "sope": 0.9}.get(row.algorithm, 0.1)
         publish(tmp_path / "mine", row, constant(start, final + row.seed), style)
     text = "place,preset,seed,return\n" + "".join(f"queen, walk,medium,{s},2048.0\n" for s in range(10))
@@ -60,7 +60,7 @@ def cells(page, *starts):
 @pytest.mark.slow
 def test_report(made):
     study, folder = made
-    page = study_report.write("mine", study, folder).read_text()
+    page = report.write("mine", study, folder).read_text()
     assert (folder / "curves.png").stat().st_size > 10_000
     assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0"]
     # 3610 and 3611, each with 0 to 9 on top
@@ -74,27 +74,27 @@ def test_report(made):
     assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
     assert "As in the paper.\n" in page
     more = study._replace(rows=(*study.rows, Row("tick", "sac", 2000, seed=2)))
-    assert "As in the paper. Begun: 48 of 49 runs.\n" in study_report.write("more", more, folder).read_text()
+    assert "As in the paper. Begun: 48 of 49 runs.\n" in report.write("more", more, folder).read_text()
 
 
 def test_claims(made):
     """On the paper's own finals each sentence comes out as in its table; one does not hold there."""
     study, folder = made
-    page = study_report.write("mine", study, folder).read_text()
-    held = {claim.text: cells(page, claim.text)[1:] for claim in study_report.CLAIMS}
-    for claim in study_report.CLAIMS:
+    page = report.write("mine", study, folder).read_text()
+    held = {claim.text: cells(page, claim.text)[1:] for claim in report.CLAIMS}
+    for claim in report.CLAIMS:
         paper, there, ours, here = held[claim.text]
         if claim.in_paper:
             assert there == here
             assert re.findall(r"\w+ [+-]", paper) == re.findall(r"\w+ [+-]", ours)
         else:
             assert (paper, there) == ("-", "not measured")
-    assert [held[claim.text][3] for claim in study_report.CLAIMS] == [
+    assert [held[claim.text][3] for claim in report.CLAIMS] == [
         *("4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "3 of 4 robots"),
         *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
     ]
     assert "queen -300" in held["with prior data all end higher than without"][0]
-    least = min(PAPER["queen"][name] for name in study_report.ONLINE) - EXPERT_RETURNS["queen"]
+    least = min(PAPER["queen"][name] for name in report.ONLINE) - EXPERT_RETURNS["queen"]
     assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
 
 
@@ -103,18 +103,18 @@ def test_commands_name_the_folder_of_the_runs(made):
     """In which no colon stands."""
     study, folder = made
     (folder / study.rows[0].name / "strip.png").write_bytes(b"")
-    page = study_report.write("my_studies:MINE", study, folder).read_text()
+    page = report.write("my_studies:MINE", study, folder).read_text()
     assert f"--policy=runs/my_studies.MINE/{study.rows[0].name} " in page
 
 
 @pytest.mark.slow
 def test_phases_are_told_where_they_are_published(made):
     study, folder = made
-    assert "## Phases" not in study_report.write("mine", study, folder).read_text()
+    assert "## Phases" not in report.write("mine", study, folder).read_text()
     for row, lengths in zip(study.rows, ((300, 700), (1100,)), strict=False):
         lines = ["step,updates", *(f"{10_000 * place},{updates}" for place, updates in enumerate(lengths, 1))]
         (folder / row.name / "phases.csv").write_text("\n".join(lines) + "\n")
-    page = study_report.write("mine", study, folder).read_text()
+    page = report.write("mine", study, folder).read_text()
     first = study.rows[0]
     assert cells(page, first.place, first.algorithm, "3") == [first.place, first.algorithm, "3", "700", "300", "1,100"]
 
@@ -124,12 +124,12 @@ def test_claims_need_what_they_compare(made):
     """Short phases are told by the study's title; other tasks and missing algorithms are not compared."""
     study, folder = made
     few = study._replace(rows=tuple(row for row in study.rows if row.algorithm == "sac"))
-    page = study_report.write("few", few, folder).read_text()
-    assert cells(page, study_report.CLAIMS[0].text)[3:] == ["-", "not measured"]
-    found = study_results.results(few.rows, folder)
-    assert study_report._is_papers(found[0])
+    page = report.write("few", few, folder).read_text()
+    assert cells(page, report.CLAIMS[0].text)[3:] == ["-", "not measured"]
+    found = results.results(few.rows, folder)
+    assert report._is_papers(found[0])
     for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
-        assert not study_report._is_papers(found[0]._replace(row=found[0].row._replace(**other)))
+        assert not report._is_papers(found[0]._replace(row=found[0].row._replace(**other)))
 
 
 def test_unfinished_evaluations_do_not_count(tmp_path):
@@ -137,7 +137,7 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
     publish(tmp_path, row, constant(100.0, 200.0))
     with (tmp_path / row.name / "evaluations.csv").open("a") as file:
         file.write("3000,0,900.0,1000,0.3,0.9\n")
-    (result,) = study_results.results([row], tmp_path)
+    (result,) = results.results([row], tmp_path)
     assert result.steps.tolist() == [1000, 2000]
     assert result.final == 204.5
     assert result.progress["speed"].shape == (10,)
@@ -150,24 +150,24 @@ def test_runs_are_compared_where_both_have_been(tmp_path):
     publish(tmp_path, short, constant(500.0, 600.0))
     path = tmp_path / short.name / "evaluations.csv"
     path.write_text("\n".join(path.read_text().splitlines()[:11]) + "\n")
-    groups = study_results.grouped(study_results.results([long, short], tmp_path))
-    probability, interval = study_results.improvement(groups, "speq", "sac")
+    groups = results.grouped(results.results([long, short], tmp_path))
+    probability, interval = results.improvement(groups, "speq", "sac")
     assert probability == 1.0 and interval == (1.0, 1.0)
-    assert study_results.improvement(groups, "speq", "sope") is None
+    assert results.improvement(groups, "speq", "sope") is None
 
 
 def test_until(tmp_path):
     rows = Row("tick", "sac", 2000), Row("tick", "sac", 2000, 1)
     publish(tmp_path, rows[0], constant(100.0, 900.0))
     publish(tmp_path, rows[1], constant(500.0, 600.0))
-    found = study_results.results(rows, tmp_path)
-    assert study_results.until(found, 500.0) == (1500.0, 120.0)
-    assert study_results.until(found, 700.0) == (np.inf, np.inf)
+    found = results.results(rows, tmp_path)
+    assert results.until(found, 500.0) == (1500.0, 120.0)
+    assert results.until(found, 700.0) == (np.inf, np.inf)
 
 
 def test_nothing_published_is_one_line(tmp_path):
     with pytest.raises(ValueError, match=r"none: holds no results of the study mine$"):
-        study_report.write("mine", Study("none", (Row("tick", "sac", 10),)), tmp_path / "none")
+        report.write("mine", Study("none", (Row("tick", "sac", 10),)), tmp_path / "none")
 
 
 @pytest.mark.slow
@@ -175,10 +175,10 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
     """By the one command, and nobody has changed a number."""
     committed = pathlib.Path(__file__).parents[2] / "studies"
     shutil.copytree(committed, tmp_path / "studies")
-    names = [name for name in studies.STUDIES if (committed / name).exists()]
+    names = [name for name in tables.STUDIES if (committed / name).exists()]
     assert names
     for name in names:
-        study_report.write(name, studies.study(name), tmp_path / "studies" / name)
+        report.write(name, tables.study(name), tmp_path / "studies" / name)
     for path in (*(f"{name}/README.md" for name in names), "README.md"):
         assert (tmp_path / "studies" / path).read_text() == (committed / path).read_text(), path
 
@@ -186,5 +186,5 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
 def test_the_papers_table_has_every_robot_and_algorithm():
     assert PAPER.keys() == EXPERT_RETURNS.keys()
     for finals in PAPER.values():
-        assert set(finals) == {*study_report.ONLINE, *study_report.WITH_PRIOR}
+        assert set(finals) == {*report.ONLINE, *report.WITH_PRIOR}
     assert evaluation.EPISODES == 10

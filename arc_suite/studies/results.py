@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import evaluation
-from arc_suite.agents import run_folder, study_states
-from arc_suite.agents.studies import Row
+from arc_suite.agents import run_folder
+from arc_suite.studies import watch
+from arc_suite.studies.tables import Row
 
 DEMONSTRATORS = "demonstrators.csv"
 STRIP = "strip.png"  # of a run: frames of its latest policy, see `style.strips`
@@ -65,7 +66,7 @@ def _result(row: Row, folder: Path) -> Result:
     progress = {name: table[name][last] for name in table if name not in ("step", "seed", "return", "length")}
     cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
     metrics = {name: style[name] for name in style if name not in ("step", "seed")}
-    phases = study_states.table(folder, "phases").get("updates", np.empty(0))
+    phases = watch.table(folder, "phases").get("updates", np.empty(0))
     return Result(row, whole.astype(int), returns, progress, cpu, metrics, phases)
 
 

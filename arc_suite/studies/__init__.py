@@ -1,0 +1,1 @@
+"""Studies: tables of runs, from which curves and comparisons are made."""
