@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from arc_suite import checks
-from arc_suite.agents.rows import Cloning, Imitation, ProximalPolicy, SoftActorCritic
+from arc_suite.agents.hyperparameters import Cloning, Imitation, ProximalPolicy, SoftActorCritic
 
 
 class Algorithm(NamedTuple):
@@ -102,11 +102,11 @@ ALGORITHMS = {
         steps=500_000,
     ),
     "imitation": Algorithm(
-        "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
+        "arc_suite.agents.dagger", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
     ),
     # Its steps are updates.
     "cloning": Algorithm(
-        "arc_suite.agents.cloning", Cloning(), "behaviour cloning of a dataset", evaluate_every=2500, steps=5000
+        "arc_suite.agents.bc", Cloning(), "behaviour cloning of a dataset", evaluate_every=2500, steps=5000
     ),
 }
 

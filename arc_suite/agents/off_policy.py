@@ -16,9 +16,9 @@ import numpy as np
 
 from arc_suite.agents import networks, priors
 from arc_suite.agents import soft_actor_critic as sac
+from arc_suite.agents.hyperparameters import SoftActorCritic
 from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.replay import Fenced, Replay, Transitions
-from arc_suite.agents.rows import SoftActorCritic
 from arc_suite.agents.stopping import Patience
 
 SLICE = 1000  # environment steps

@@ -15,9 +15,9 @@ import numpy as np
 from arc_suite import policies
 from arc_suite.agents import networks, normaliser
 from arc_suite.agents import proximal_policy as ppo
+from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.learner import Diverged, Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
-from arc_suite.agents.rows import ProximalPolicy
 from arc_suite.policies import network
 from arc_suite.policies.network import Layer
 

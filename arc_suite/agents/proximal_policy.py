@@ -13,7 +13,7 @@ import numpy as np
 import optax
 
 from arc_suite.agents import networks
-from arc_suite.agents.rows import ProximalPolicy
+from arc_suite.agents.hyperparameters import ProximalPolicy
 
 ACTIVATION = "elu"
 _MOST_RATE, _LEAST_RATE = 1e-2, 1e-6  # of the policy

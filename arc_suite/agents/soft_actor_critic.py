@@ -20,8 +20,8 @@ import numpy as np
 import optax
 
 from arc_suite.agents import networks
+from arc_suite.agents.hyperparameters import SoftActorCritic
 from arc_suite.agents.replay import Transitions
-from arc_suite.agents.rows import SoftActorCritic
 from arc_suite.policies.network import Layer
 
 NUMBERS = ("hidden", "learning_rate", "discount", "averaging", "dropout")  # of a row, that an update depends on

@@ -8,7 +8,7 @@ import pytest
 
 from arc_suite.agents import algorithms
 from arc_suite.agents.algorithms import ALGORITHMS, Algorithm, algorithm
-from arc_suite.agents.rows import SoftActorCritic
+from arc_suite.agents.hyperparameters import SoftActorCritic
 
 PAPER = {
     # prior data, transitions of an update, the most updates of a phase, early stop, dropout

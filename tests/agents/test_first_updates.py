@@ -10,8 +10,8 @@ import jax.numpy as jnp
 
 from arc_suite.agents import algorithms, off_policy
 from arc_suite.agents import soft_actor_critic as sac
+from arc_suite.agents.hyperparameters import SoftActorCritic
 from arc_suite.agents.replay import Transitions
-from arc_suite.agents.rows import SoftActorCritic
 
 ROWS = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.row, SoftActorCritic)]
 STEPS = 3

@@ -14,8 +14,8 @@ import jax
 from arc_suite.agents import on_policy, run_folder
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.algorithms import ALGORITHMS
+from arc_suite.agents.hyperparameters import Imitation, ProximalPolicy
 from arc_suite.agents.learner import Stage
-from arc_suite.agents.rows import Imitation, ProximalPolicy
 from arc_suite.agents.training import Run, train
 from arc_suite.policies import network
 from arc_suite.robots import ROBOTS, generator

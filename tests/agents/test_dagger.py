@@ -8,10 +8,10 @@ from numpy.testing import assert_array_equal
 
 pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
-from arc_suite.agents import imitation, run_folder
+from arc_suite.agents import dagger, run_folder
 from arc_suite.agents.algorithms import ALGORITHMS
+from arc_suite.agents.hyperparameters import Imitation
 from arc_suite.agents.learner import Stage
-from arc_suite.agents.rows import Imitation
 from arc_suite.agents.training import Run, train
 from arc_suite.cpg import Demonstrator
 from arc_suite.policies import network
@@ -36,7 +36,7 @@ def learned(learner, steps):
 def test_it_goes_on_to_the_bit(tmp_path, robot, task):
     """The demonstrators of steer remember what they felt; episodes of 11 steps begin and end meanwhile."""
     given = stage(tmp_path, robot, task, time_limit=0.55)
-    whole, first, second = (imitation.begin(SMALL, given) for _ in range(3))
+    whole, first, second = (dagger.begin(SMALL, given) for _ in range(3))
     learned(whole, 240)
     learned(first, 80)
     arrays = {name: array.copy() for name, array in first.arrays().items()}
@@ -53,7 +53,7 @@ def test_it_goes_on_to_the_bit(tmp_path, robot, task):
 def test_where_positions_are_taken_they_are_what_is_imitated(tmp_path):
     """The labels are those for which motors that hold positions give the demonstrator's torques."""
     torques, positions = (
-        imitation.begin(SMALL, stage(tmp_path, steps=80, **settings)) for settings in ({}, {"actions": "position"})
+        dagger.begin(SMALL, stage(tmp_path, steps=80, **settings)) for settings in ({}, {"actions": "position"})
     )
     learned(torques, 80), learned(positions, 80)
     task, first = positions._environment.task, positions._observations[0]
@@ -66,28 +66,28 @@ def test_where_positions_are_taken_they_are_what_is_imitated(tmp_path):
 
 def test_what_it_says_comes_near_to_what_the_demonstrator_does(tmp_path):
     row = dataclasses.replace(SMALL, hidden=64, updates=60, last_updates=200)
-    figures = learned(imitation.begin(row, stage(tmp_path, steps=640)), 640)
+    figures = learned(dagger.begin(row, stage(tmp_path, steps=640)), 640)
     errors = [each["error"] for each in figures]
     assert errors[-1] < 0.3 * errors[0] < 0.03
 
 
 def test_a_run_too_short_to_learn_from_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"^steps: expected more than 16, as the first 2 control steps of an episode "):
-        imitation.begin(SMALL, stage(tmp_path, steps=16))
+        dagger.begin(SMALL, stage(tmp_path, steps=16))
 
 
 def test_any_number_of_updates_is_made(tmp_path):
     """Compiled for a number of updates at a time, into which not all fit."""
-    row = dataclasses.replace(SMALL, updates=imitation.CHUNK + 3, last_updates=7, round=15)
-    learner = imitation.begin(row, stage(tmp_path))
+    row = dataclasses.replace(SMALL, updates=dagger.CHUNK + 3, last_updates=7, round=15)
+    learner = dagger.begin(row, stage(tmp_path))
     learned(learner, 120)
-    assert int(learner.arrays()["state/moments/count"]) == imitation.CHUNK + 3
+    assert int(learner.arrays()["state/moments/count"]) == dagger.CHUNK + 3
     learned(learner, 240)
-    assert int(learner.arrays()["state/moments/count"]) == imitation.CHUNK + 3 + 7
+    assert int(learner.arrays()["state/moments/count"]) == dagger.CHUNK + 3 + 7
 
 
 def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path):
-    learner = imitation.begin(dataclasses.replace(SMALL, noise=0.0), stage(tmp_path))
+    learner = dagger.begin(dataclasses.replace(SMALL, noise=0.0), stage(tmp_path))
     environment, acted = learner._environment, []
     step = environment.step
     environment.step = lambda actions: acted.append(actions.copy()) or step(actions)
@@ -103,7 +103,7 @@ def test_half_of_the_rows_act_by_the_demonstrator_and_all_are_labelled(tmp_path)
 
 def test_an_unknown_demonstrator_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"^unknown preset 'tunde'; did you mean 'tuned'"):
-        imitation.begin(dataclasses.replace(SMALL, preset="tunde"), stage(tmp_path))
+        dagger.begin(dataclasses.replace(SMALL, preset="tunde"), stage(tmp_path))
 
 
 def test_a_run_of_any_body(tmp_path):

@@ -12,10 +12,10 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from arc_suite.agents import imitation, networks, priors
+from arc_suite.agents import dagger, networks, priors
+from arc_suite.agents.hyperparameters import Cloning
 from arc_suite.agents.learner import Stage, generator
 from arc_suite.agents.normaliser import Moments
-from arc_suite.agents.rows import Cloning
 from arc_suite.policies.network import Layer, forward
 
 SLICE = 500  # updates
@@ -49,7 +49,7 @@ class Cloner:
         self._data = priors.mapped(stage, task)
         sizes = (task.size, row.hidden, row.hidden, len(stage.body.joint_names))
         layers = networks.mlp(generator(stage.seed, "networks", 0), sizes, "orthogonal", gain=2**0.5)
-        self._state = jax.tree.map(jnp.asarray, imitation.State(layers, optax.scale_by_adam().init(layers)))
+        self._state = jax.tree.map(jnp.asarray, dagger.State(layers, optax.scale_by_adam().init(layers)))
         moments = Moments.none(task.size)
         for first in range(0, len(self._data), _ROWS):
             indices = np.arange(first, min(first + _ROWS, len(self._data)))
@@ -61,11 +61,11 @@ class Cloner:
         row, errors = self._row, []
         until = min(limit, (self.step // SLICE + 1) * SLICE)
         while self.step < until:
-            updates = min(imitation.CHUNK, until - self.step)
+            updates = min(dagger.CHUNK, until - self.step)
             random = generator(self._stage.seed, "update", self.step)
             batch = self._data.at(random.integers(len(self._data), size=updates * row.batch))
             rates = row.learning_rate * (1.0 - (self.step + np.arange(updates)) / self._stage.steps)
-            self._state, error = imitation.fit(
+            self._state, error = dagger.fit(
                 self._state,
                 forward([self._normaliser], batch.observations),
                 batch.actions,
@@ -78,7 +78,7 @@ class Cloner:
 
     def policy(self) -> tuple[Layer, ...]:
         """Return the layers of the network."""
-        return self._normaliser, *networks.exported(self._state.layers, imitation.ACTIVATION), Layer("clip")
+        return self._normaliser, *networks.exported(self._state.layers, dagger.ACTIVATION), Layer("clip")
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return all that it goes on from, beside the dataset."""

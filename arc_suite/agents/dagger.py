@@ -18,9 +18,9 @@ import optax
 
 from arc_suite import policies
 from arc_suite.agents import networks, normaliser
+from arc_suite.agents.hyperparameters import Imitation
 from arc_suite.agents.learner import Stage, environment_arrays, generator, restore_environment
 from arc_suite.agents.normaliser import Moments
-from arc_suite.agents.rows import Imitation
 from arc_suite.cpg.demonstrator import suited_preset
 from arc_suite.policies.network import Layer, forward
 
