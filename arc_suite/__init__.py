@@ -15,7 +15,7 @@ with versions.explained():
 
     from arc_suite import registration, registry
     from arc_suite.envs.dm import load
-    from arc_suite.envs.scene import symmetry
+    from arc_suite.envs.prepare import symmetry
     from arc_suite.registration import register
 
     registration.register_ids()

@@ -124,11 +124,8 @@ def register_ids() -> None:
                 entry_point="arc_suite.envs.gym:Env",
                 vector_entry_point="arc_suite.envs.vector:VectorEnv",
                 max_episode_steps=STEPS,
-                kwargs={"domain_name": importable("domain", domain_name), "task_name": importable("task", task_name)},
+                kwargs={
+                    "domain_name": registry.importable("domain", domain_name),
+                    "task_name": registry.importable("task", task_name),
+                },
             )
-
-
-def importable(kind: str, name: str) -> str:
-    """Return a name as another process can look it up: with the module that registers it, if there is one."""
-    module = MODULES.get((kind, name))
-    return name if module is None else f"{module}:{name}"

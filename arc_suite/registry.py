@@ -87,6 +87,12 @@ def imported(kind: str, name: str) -> str:
     return name
 
 
+def importable(kind: str, name: str) -> str:
+    """Return a name as another process can look it up: `module:name` where another package registered it."""
+    module = MODULES.get((kind, name))
+    return name if module is None else f"{module}:{name}"
+
+
 def env_id(domain_name: str, task: type[Task]) -> str:
     """Return Gymnasium's id of a robot's task."""
     return f"arc_suite/{domain_name}-{task.name}-v{task.version}"

@@ -19,7 +19,7 @@ from arc_suite import checks, files, models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics

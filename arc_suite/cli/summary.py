@@ -1,6 +1,6 @@
 """A body in a few figures."""
 
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body

@@ -15,10 +15,9 @@ from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, policies, registry, versions
 from arc_suite.cpg.demonstrator import presets_of
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
-from arc_suite.registration import importable
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
@@ -88,7 +87,8 @@ class Settings(NamedTuple):
             entry_point="arc_suite.envs.gym:Env",
             vector_entry_point="arc_suite.envs.vector:VectorEnv",
             max_episode_steps=self.steps,
-            kwargs={"domain_name": body_to_json(self.body), "task_name": importable("task", task.name)} | settings,
+            kwargs={"domain_name": body_to_json(self.body), "task_name": registry.importable("task", task.name)}
+            | settings,
         )
 
     def environment(self, rows: int, threads: int | None = None) -> VectorEnv:

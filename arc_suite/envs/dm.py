@@ -13,7 +13,7 @@ from dm_env import specs
 
 from arc_suite import checks
 from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.scene import checked_action, checked_command, prepared
+from arc_suite.envs.prepare import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms

@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from arc_suite import checks
 from arc_suite.envs import snapshots
 from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.scene import checked_action, checked_command, prepared
+from arc_suite.envs.prepare import checked_action, checked_command, prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch

@@ -11,7 +11,7 @@ import os
 import numpy as np
 
 from arc_suite import files
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.policies.network import EPSILON, Layer, Network
 from arc_suite.registry import body_of
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.cpg.law import felt
-from arc_suite.envs.scene import checked_action
+from arc_suite.envs.prepare import checked_action
 from arc_suite.tasks.modified import Modified
 
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_array_equal
 from tiers import tiers, turn
 
 import arc_suite
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch

@@ -13,7 +13,7 @@ import arc_suite
 from arc_suite import policies, rotations
 from arc_suite.arenas import terrain
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.model import compiled

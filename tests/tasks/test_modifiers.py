@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from tiers import never, tiers, turn
 
 import arc_suite
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import ROBOTS

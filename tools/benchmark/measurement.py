@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.scene import prepared
+from arc_suite.envs.prepare import prepared
 from benchmark import contestants, growth, ordinary
 from benchmark.contestants import Contestant
 

@@ -1,4 +1,4 @@
-"""Tasks made ready to run: a body, an arena and their compiled model, for whatever drives them."""
+"""Prepares tasks: a body, an arena and their compiled model, for any driver."""
 
 import math
 from collections.abc import Mapping

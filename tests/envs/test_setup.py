@@ -1,0 +1,107 @@
+"""One value for a body, a task and its settings."""
+
+import json
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+from arc_suite import registry
+from arc_suite.arenas import FLAT
+from arc_suite.envs.setup import Setup
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec_files import body_to_json
+
+QUEEN = ROBOTS["queen"]
+MADE = generator.generate(4, 2)
+
+
+def test_equal_content_is_equal():
+    setup = Setup.of("queen", "steer", {"time_limit": 2.0, "healthy_range": (0.2, 1.0)})
+    assert setup == Setup.of(QUEEN, "steer", {"healthy_range": [0.2, 1.0], "time_limit": 2.0})
+    assert len({setup, pickle.loads(pickle.dumps(setup)), Setup.of("queen", "steer"), Setup.of("tick", "steer")}) == 3
+    assert Setup.of("queen") == Setup(QUEEN)
+    setup.task_kwargs["time_limit"] = 9.0  # a copy
+    assert setup.task_kwargs["time_limit"] == 2.0
+
+
+def test_three_kinds_of_environment_play_the_same_episode():
+    setup = Setup.of("tick", "steer", {"time_limit": 0.5})
+    first = np.concatenate([block.ravel() for block in setup.load(seed=3).reset().observation.values()])
+    env, batch = setup.make(), setup.make_vec(2, seed=2, max_episode_steps=7)
+    assert env.spec.max_episode_steps == 1000
+    np.testing.assert_array_equal(env.reset(seed=3)[0], first.astype(np.float32))
+    np.testing.assert_array_equal(batch.reset()[0][1], first.astype(np.float32))
+    assert batch.task.step_limit == setup.definition.step_limit
+    for each in (env, batch):
+        each.close()
+
+
+@pytest.mark.parametrize("body", [QUEEN, MADE], ids=["robot", "body"])
+def test_files_hold_it(body):
+    setup = Setup.of(body, "rough", {"difficulty": 0.5})
+    assert Setup.from_dict(json.loads(json.dumps(setup.to_dict()))) == setup
+    assert setup.robot == ("queen" if body is QUEEN else body_to_json(MADE))
+    assert setup.env_id == f"arc_suite/{body.name}-rough-v0"
+    assert str(setup) == f'{body.name}, rough, {{"difficulty": 0.5}}'
+    spec = gymnasium.envs.registration.EnvSpec.from_json(setup.spec(50).to_json())
+    assert spec.max_episode_steps == 50
+    env = gymnasium.make(spec)
+    assert env.unwrapped.task.scene.body == body
+    env.close()
+
+
+def test_provenance_tells_what_episodes_depend_on():
+    told = Setup.of("queen").provenance()
+    assert json.loads(json.dumps(told)) == told
+    assert {"robot", "task", "task_kwargs", "task_version", "body_sha256", "model_sha256", "versions"} == told.keys()
+    for other in (
+        Setup.of("tick"),
+        Setup.of(QUEEN.replace(density=11.0)),
+        Setup.of("queen", "walk", {"arena": "bumps"}),
+    ):
+        assert other.provenance()["model_sha256"] != told["model_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("quen",), "unknown domain 'quen'"),
+        (("queen", "wlak"), "unknown task 'wlak'"),
+        (("queen", "walk", {"arena": "flta"}), "unknown arena 'flta'"),
+        (("queen", "walk", {"arena": FLAT}), "task_kwargs: expected values that JSON can hold"),
+        (("queen", "walk", {"random": 3}), "setting 'random': expected none"),
+        (("queen", "walk", [3]), "task_kwargs: expected a mapping"),
+    ],
+)
+def test_names_and_settings_are_checked_when_it_is_made(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        Setup.of(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"robot": "nobody"}, "unknown robot 'nobody'"),
+        ({"robot": "spider.json"}, "unknown robot 'spider.json'"),
+        ({"robot": "{}"}, "missing; a Body needs it"),
+        ({"robot": None}, "expected robot to be a str"),
+        ({"task": 3}, "expected task to be a str"),
+        ({"task_kwargs": []}, "expected task_kwargs to be a dict"),
+        ({"robot": "strolling:queen"}, "files import nothing; import 'strolling' first"),
+        ({"task": "strolling:walk"}, "files import nothing; import 'strolling' first"),
+        ({"task_kwargs": {"arena": "strolling:flat"}}, "files import nothing; import 'strolling' first"),
+    ],
+)
+def test_files_import_nothing_and_open_nothing(change, message):
+    with pytest.raises(ValueError, match=message) as error:
+        Setup.from_dict(Setup.of("queen").to_dict() | change)
+    assert "\n" not in str(error.value)
+
+
+def test_tasks_of_other_packages_are_told_with_their_module(monkeypatch):
+    monkeypatch.setitem(registry.MODULES, ("task", "steer"), __name__)
+    setup = Setup.of("queen", f"{__name__}:steer")
+    assert (setup.task, setup.kind.name) == (f"{__name__}:steer", "steer")
+    assert setup == Setup.of("queen", "steer") == Setup.from_dict(setup.to_dict())
