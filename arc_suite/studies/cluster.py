@@ -10,7 +10,7 @@ import submitit
 
 
 class Share(NamedTuple):
-    """A job: makes a share of a study, and comes back in the queue after a timeout or preemption to go on with it.
+    """A job: makes a share of a study; after a timeout or preemption it is queued again and resumes.
 
     Attributes:
         arguments: of `arc-suite`.
@@ -27,7 +27,7 @@ class Share(NamedTuple):
         subprocess.run([sys.executable, "-m", "arc_suite", *self.arguments], check=True)
 
     def checkpoint(self) -> submitit.helpers.DelayedSubmission:
-        """Return what is submitted in place of a job that was broken off: the same, as its folders hold the rest."""
+        """Return the job that is queued in place of an interrupted one: the same, as it resumes from its folders."""
         return submitit.helpers.DelayedSubmission(self)
 
 
@@ -37,11 +37,11 @@ def submit(
     """Submit an array of jobs.
 
     Args:
-        arguments: of `arc-suite` that make the study, to which each job adds its share.
+        arguments: of `arc-suite` that make the study; each job adds its share.
         shares: number of jobs, of one core each.
-        hours: after which a job is broken off and comes back.
-        logs: folder for what jobs print.
-        cluster: submitit's name of one; None for the one that is there.
+        hours: time limit of a job, which is queued again.
+        logs: folder of the jobs' output.
+        cluster: submitit's name of a cluster; None for the cluster of this machine.
         **parameters: others of submitit, such as `slurm_partition`.
     """
     executor = submitit.AutoExecutor(logs, cluster=cluster)

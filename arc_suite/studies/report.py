@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import evaluation, files
-from arc_suite.studies import results, strips, tables
-from arc_suite.studies.results import Result
-from arc_suite.studies.tables import Row, Study
+from arc_suite import checks, evaluation, files
+from arc_suite.agents import run_folder
+from arc_suite.studies import results, tables
+from arc_suite.studies.results import STRIP, Result
+from arc_suite.studies.tables import Run, Study
 
 REPORT, CURVES = "README.md", "curves.png"
 
@@ -127,7 +128,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         ValueError: nothing is published, or a table is damaged; one line.
         OSError: something cannot be written; one line.
     """
-    found = results.results(study.rows, published)
+    found = results.results(study.runs, published)
     if not found:
         raise ValueError(f"{published}: holds no results of the study {name}")
     groups, demonstrators = results.grouped(found), results.demonstrators(published)
@@ -138,7 +139,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
         "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
-        "Style": [_STYLE, _style(groups), *strips.paragraphs(name, groups, published)],
+        "Style": [_STYLE, _style(groups), *_strips(name, groups, published)],
         "What the paper says": [_CLAIMS, _claims(found)],
     }
     with files.writing(published / CURVES) as temporary:
@@ -173,6 +174,11 @@ _STYLE = (
     "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each. "
     "Heading and drift are told from the x axis, which is not the way where a command turns."
 )
+_STRIPS = (
+    "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle, to the nearest control "
+    "step: the fifth cycle, or the latest whole one before a fall. The camera moves along and keeps its direction; in "
+    "tasks with a command it looks straight ahead. The command line makes a page that plays the policy."
+)
 _CLAIMS = (
     "How far each sentence is from being false, in its own unit: above zero it holds. The paper's figure is from its "
     "final returns after 1,000,000 steps, where those tell. Ours are of finished runs alone, at the steps they have."
@@ -197,14 +203,15 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def _title(study: Study, found: Sequence[Result]) -> str:
     title = study.title[0].upper() + study.title[1:] + "."
-    return title if len(found) == len(study.rows) else f"{title} Begun: {len(found)} of {len(study.rows)} runs."
+    return title if len(found) == len(study.runs) else f"{title} Begun: {len(found)} of {len(study.runs)} runs."
 
 
 def _reached(found: Sequence[Result]) -> str:
     lines = []
     for each in found:
-        row, reached = each.row, f"{each.steps[-1]:,} of {each.row.steps:,}"
-        lines.append((row.place, row.kind, str(row.seed), reached, f"{each.cpu[-1] / 60.0:.1f}"))
+        run, configuration = each.run, each.run.configuration
+        reached = f"{each.steps[-1]:,} of {configuration.steps:,}"
+        lines.append((run.place, run.kind, str(configuration.seed), reached, f"{each.cpu[-1] / 60.0:.1f}"))
     return _table(("robot, task", "algorithm", "seed", "steps", "CPU min"), lines)
 
 
@@ -232,25 +239,31 @@ def _iqm(values: np.ndarray) -> str:
 
 
 def _is_papers(result: Result) -> bool:
-    """Return whether a run is one that the paper's table of final returns has."""
-    row = result.row
-    return row.task == "walk" and not row.task_kwargs and not row.label and row.algorithm in PAPER.get(row.robot, {})
+    """Return whether the paper's table of final returns has a run."""
+    setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
+    plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
+    return plain and algorithm in PAPER.get(setup.body.name, {})
 
 
-def _expert(row: Row) -> float | None:
-    """Return what the paper's demonstrator earns where a run learns; None where the paper does not tell."""
-    return None if row.task_kwargs else evaluation.expert_return(row.task, row.robot)
+def _expert(run: Run) -> float | None:
+    """Return the return of the paper's demonstrator in a run's place; None if the paper has none."""
+    setup = run.configuration.setup
+    return None if setup.task_kwargs else evaluation.expert_return(setup.kind.name, setup.body.name)
 
 
 def _finals(groups: Groups, demonstrators) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            row, values = seeds[0].row, results.scores(seeds)
-            paper = str(PAPER[row.robot][row.algorithm]) if _is_papers(seeds[0]) else "-"
+            run, values = seeds[0].run, results.scores(seeds)
+            paper = (
+                str(PAPER[run.configuration.setup.body.name][run.configuration.algorithm])
+                if _is_papers(seeds[0])
+                else "-"
+            )
             reached = f"{min(each.steps[-1] for each in seeds):,}"
             lines.append((place, kind, reached, str(len(seeds)), _mean(values), _iqm(values), paper))
-        expert = _expert(row)
+        expert = _expert(run)
         for preset, totals in demonstrators.get(place, {}).items():
             paper = f"{expert:.0f}" if preset == "medium" and expert else "-"
             lines.append((place, f"demonstrator {preset}", "-", "-", _mean(totals), _iqm(totals), paper))
@@ -261,7 +274,7 @@ def _efficiency(groups: Groups) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            expert = _expert(seeds[0].row)
+            expert = _expert(seeds[0].run)
             cells = []
             for threshold in (expert, 3500.0):
                 steps, seconds = (np.inf, np.inf) if threshold is None else results.until(seeds, threshold)
@@ -311,18 +324,45 @@ def _size(name: str, seeds: Sequence[Result]) -> str:
 
 
 def _claims(found: Sequence[Result]) -> str:
-    own = [each for each in found if _is_papers(each) and each.steps[-1] >= each.row.steps]
+    own = [each for each in found if _is_papers(each) and each.steps[-1] >= each.run.configuration.steps]
     lines = []
     for claim in CLAIMS:
 
         def measured(robot, name, claim=claim):
-            figures = [claim.figure(each) for each in own if (each.row.robot, each.row.algorithm) == (robot, name)]
+            figures = [claim.figure(each) for each in own if _robot_and_algorithm(each) == (robot, name)]
             return float(np.mean(figures)) if figures else None
 
         paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
         ours = {robot: claim.compared(robot, measured) for robot in PAPER}
         lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
     return _table(("sentence", "paper's figure", "holds there", "ours", "holds here"), lines)
+
+
+def _robot_and_algorithm(result: Result) -> tuple[str, str]:
+    return result.run.configuration.setup.body.name, result.run.configuration.algorithm
+
+
+def _strips(name: str, groups: Groups, published: Path) -> list[str]:
+    """Return the strips of a study as Markdown paragraphs: for each kind that of the first seed which has one."""
+    found = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            for run in [each.run for each in seeds if (published / each.run.name / STRIP).exists()][:1]:
+                setup, folder = run.configuration.setup, Path("runs", tables.folder_name(name), run.name)
+                command = ["arc-suite", "render", f"--robot={setup.body.name}", f"--task={setup.task}"]
+                command += [
+                    f"--policy={folder}",
+                    *map(_setting, setup.task_kwargs.items()),
+                    f"--output={run.name}.html",
+                ]
+                found.append(f"**{place}: {kind}**, seed {run.configuration.seed}: `{shlex.join(command)}`")
+                found.append(f"![{place}: {kind}]({run.name}/{STRIP})")
+    return [_STRIPS, *found] if found else []
+
+
+def _setting(item: tuple[str, object]) -> str:
+    name, value = item
+    return f"--set={name}={value if isinstance(value, str) else checks.json_text(name, value)}"
 
 
 def _leads(figures: Mapping[str, float | None]) -> str:
@@ -338,22 +378,22 @@ def _verdict(figures: Mapping[str, float | None]) -> str:
 def _leaderboard(folder: Path) -> str:
     lines = []
     for name, study in tables.STUDIES.items():
-        for kinds in results.grouped(results.results(study.rows, folder / name)).values():
+        for kinds in results.grouped(results.results(study.runs, folder / name)).values():
             for seeds in kinds.values():
                 lines.append((name, seeds))
-    lines.sort(key=lambda line: (line[1][0].row.place, -np.mean([each.final for each in line[1]])))
+    lines.sort(key=lambda line: (line[1][0].run.place, -np.mean([each.final for each in line[1]])))
     cells = []
     for name, seeds in lines:
-        row, values = seeds[0].row, results.scores(seeds)
+        run, values = seeds[0].run, results.scores(seeds)
         figure = next(iter(seeds[0].progress))
         own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
         style = [_size(name, seeds) for name in ("gait_compliance", "heading_error", "torso_pitch")]
-        command = shlex.join(["arc-suite", *row.arguments(Path("runs", name, row.name))])
-        steps = f"{min(each.steps[-1] for each in seeds):,} of {row.steps:,}"
+        command = f"arc-suite train --config studies/{name}/{run.name}/{run_folder.CONFIG}"
+        steps = f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}"
         cpu = f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}"
         result = f"{np.mean([each.final for each in seeds]):.1f}"
         link = f"[{name}]({name}/{REPORT})"
-        cells.append((row.place, row.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
+        cells.append((run.place, run.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
     heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "figure", "gait compliance")
     heads += ("heading error, rad", "torso pitch, rad")
     return _table((*heads, "steps", "CPU min", "study", "command of seed 0"), cells)

@@ -1,4 +1,4 @@
-"""Results of studies: what the published tables of their runs say, and figures over them."""
+"""Results of studies: the published tables of their runs, and statistics over them."""
 
 import csv
 from collections.abc import Mapping, Sequence
@@ -9,27 +9,26 @@ import numpy as np
 
 from arc_suite import evaluation
 from arc_suite.agents import run_folder
-from arc_suite.studies import watch
-from arc_suite.studies.tables import Row
+from arc_suite.studies.tables import Run
 
 DEMONSTRATORS = "demonstrators.csv"
 STRIP = "strip.png"  # of a run: frames of its latest policy, see `style.strips`
 
 
 class Result(NamedTuple):
-    """What a run has come to.
+    """Result of a run.
 
     Attributes:
-        row: that made it.
+        run: of the study.
         steps: (evaluations,) environment steps.
         returns: (evaluations, episodes)
-        progress: the task's figures in the latest evaluation by name, each (episodes,).
+        progress: the task's progress in the latest evaluation by name, each (episodes,).
         cpu: (evaluations,) s of the processor until then.
         style: metrics of style of the latest policy by name, each (episodes,).
-        phases: (phases,) updates of each stabilisation phase; none where they are not published.
+        phases: (phases,) updates of each stabilisation phase; empty if they are not published.
     """
 
-    row: Row
+    run: Run
     steps: np.ndarray
     returns: np.ndarray
     progress: dict[str, np.ndarray]
@@ -43,35 +42,46 @@ class Result(NamedTuple):
         return float(self.returns[-1].mean())
 
 
-def results(rows: Sequence[Row], published: Path) -> list[Result]:
-    """Return the results of those runs of a study of which something is published.
+def results(runs: Sequence[Run], published: Path) -> list[Result]:
+    """Return the results of those runs of a study that are published.
 
     Raises:
         ValueError: a damaged table; one line.
     """
-    return [_result(row, published / row.name) for row in rows if (published / row.name / "style.csv").exists()]
+    return [_result(run, published / run.name) for run in runs if (published / run.name / "style.csv").exists()]
 
 
-def evaluated(table: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the steps (evaluations,) of those evaluations in a table, maybe an empty one, that are whole."""
-    marks, counts = np.unique(table.get("step", ()), return_counts=True)
+def table(folder: Path, name: str) -> dict[str, np.ndarray]:
+    """Return a table of a run, as `run_folder.table` does; empty before its first line.
+
+    Raises:
+        ValueError: a damaged table; one line.
+    """
+    return run_folder.table(folder, name) if (folder / f"{name}.csv").exists() else {}
+
+
+def evaluated(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the steps (evaluations,) of the complete evaluations in a table."""
+    marks, counts = np.unique(evaluations.get("step", ()), return_counts=True)
     return marks[counts == evaluation.EPISODES]
 
 
-def _result(row: Row, folder: Path) -> Result:
-    table, times, style = (run_folder.table(folder, name) for name in ("evaluations", "times", "style"))
-    whole = evaluated(table)
-    returns = np.array([table["return"][table["step"] == step] for step in whole])
-    last = table["step"] == whole[-1]
-    progress = {name: table[name][last] for name in table if name not in ("step", "seed", "return", "length")}
+def _result(run: Run, folder: Path) -> Result:
+    evaluations, times, style = (run_folder.table(folder, name) for name in ("evaluations", "times", "style"))
+    whole = evaluated(evaluations)
+    returns = np.array([evaluations["return"][evaluations["step"] == step] for step in whole])
+    last = evaluations["step"] == whole[-1]
+    progress = {
+        name: evaluations[name][last] for name in evaluations if name not in ("step", "seed", "return", "length")
+    }
     cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
     metrics = {name: style[name] for name in style if name not in ("step", "seed")}
-    phases = watch.table(folder, "phases").get("updates", np.empty(0))
-    return Result(row, whole.astype(int), returns, progress, cpu, metrics, phases)
+    phases = table(folder, "phases").get("updates", np.empty(0))
+    return Result(run, whole.astype(int), returns, progress, cpu, metrics, phases)
 
 
 def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
-    """Return what demonstrators earn, by place (`Row.place`) and preset, each (episodes,)."""
+    """Return the returns of demonstrators, by place (`Run.place`) and preset, each (episodes,)."""
     found: dict[str, dict[str, list[float]]] = {}
     if (published / DEMONSTRATORS).exists():
         with (published / DEMONSTRATORS).open(newline="") as file:
@@ -84,20 +94,20 @@ def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
     """Return results by place and kind, each with all its seeds."""
     groups: dict[str, dict[str, list[Result]]] = {}
     for each in found:
-        groups.setdefault(each.row.place, {}).setdefault(each.row.kind, []).append(each)
+        groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
     return groups
 
 
 def scores(seeds: Sequence[Result]) -> np.ndarray:
-    """Return what stands for a kind of run: the mean return of each seed, (seeds,), or those of one seed's episodes."""
+    """Return the mean return of each seed, (seeds,), or of a single seed the returns of its episodes, (episodes,)."""
     return seeds[0].returns[-1] if len(seeds) == 1 else np.array([each.final for each in seeds])
 
 
 def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
-    """Return environment steps and seconds of the processor up to the first evaluation whose mean return is enough.
+    """Return environment steps and s of the processor up to a mean return of `threshold`.
 
     Returns:
-        Means over the seeds; infinite where one of them has not earned as much.
+        Means over the seeds; infinite if a seed has not reached it.
     """
     found = []
     for each in seeds:

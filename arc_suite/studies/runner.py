@@ -1,252 +1,203 @@
-"""Runs studies: each run is a process of `arc-suite train`, which goes on with whatever its folder holds.
+"""Makes the runs of a study on this machine, a process for each, and shows a table of them meanwhile."""
 
-The lock of a run is that of its log, which its process inherits: what a killed study has left behind goes on by
-itself, and no other study starts it a second time. Finished runs are published: their tables, a few kilobytes,
-the style of their policies, and a strip of frames go into a folder that is committed and that reports are made of.
-"""
-
-import contextlib
-import csv
-import json
+import math
+import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import data, evaluation, files, policies, style
+from arc_suite import data, files
 from arc_suite.agents import run_folder
-from arc_suite.agents.training import PRIOR_SHA256
-from arc_suite.cpg.demonstrator import presets_of, suited_preset
-from arc_suite.envs.dm import Environment, load
-from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import Policy, checkpoints, network
-from arc_suite.simulation.opengl import RenderingUnavailable
-from arc_suite.studies import results
-from arc_suite.studies.tables import Row
-from arc_suite.studies.watch import State, states, table, watched
-from arc_suite.style import strips
-
-PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
-
-# Metrics of `arc_suite.style` by which the final policies are compared.
-METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
-
-# Of demonstrators whose returns are published beside those of runs: in `walk`, and where there is a command. That which
-# suits the task stands with them.
-PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
+from arc_suite.agents.configuration import PRIOR_SHA256
+from arc_suite.studies import publication
+from arc_suite.studies.results import table
+from arc_suite.studies.tables import Run
 
 _PAUSE = 0.2  # s between two looks at the processes
+_EVERY = 2.0  # s between two tables without a change
+_WORDS = ("running", "elsewhere", "failed", "waiting", "finished")  # those first that change first
 
 
-def is_finished(row: Row, folder: Path) -> bool:
-    """Return whether the run in a folder is at its end.
+class State(NamedTuple):
+    """Progress of a run.
 
-    Raises:
-        ValueError: it is another run than the row's, or damaged; one line.
+    Attributes:
+        run: of the study.
+        word: one of `_WORDS`; `elsewhere` is in another process.
+        step: environment steps so far.
+        result: mean return of the latest evaluation; None before the first.
+        wall: s of wall clock so far.
+        cpu: s of the processor so far.
     """
-    if run_folder.progress_of(folder).get("evaluated", 0) < row.steps:
-        return False
-    run_folder.check(folder, json.loads(json.dumps(row.run().config())), left_out=("versions", PRIOR_SHA256))
-    return True
+
+    run: Run
+    word: str
+    step: int
+    result: float | None
+    wall: float
+    cpu: float
 
 
-def run(
-    rows: Sequence[Row],
-    folder: Path,
-    published: Path,
-    jobs: int,
-    shown: Callable[[list[State]], None],
-    progress: Callable = tqdm,
+def make(
+    runs: Sequence[Run], folder: Path, published: Path, jobs: int, show: Callable, progress: Callable = tqdm
 ) -> list[State]:
-    """Make the runs that are not finished, and publish them.
+    """Make and publish the runs that are not finished, and return the states of all; a log has why a run failed.
 
     Args:
-        rows: of the study.
-        folder: of the study, in which each run has one of its own.
-        published: folder for what is to be committed.
+        runs: of the study.
+        folder: of the study, with a folder and a log for each run.
+        published: folder of the results that are committed.
         jobs: runs at a time.
-        shown: called with the states of all runs, again and again.
-        progress: makes progress bars as `tqdm` does, of prior data that are collected first.
-
-    Returns:
-        The states of all runs at the end; a failed run has said why in its log, beside its folder.
+        show: called with the states of all runs again and again, see `shown`.
+        progress: makes a progress bar as `tqdm` does.
 
     Raises:
-        ValueError: a row that does not fit, or the folder of another run; one line.
-        OSError: something cannot be written; one line.
+        ValueError, OSError: as `prepare`, or a file cannot be written.
     """
-    words = prepared(rows, folder, jobs, progress)
-    look = watched(rows, folder, words, shown)
-    running: dict[str, tuple[Row, subprocess.Popen, IO]] = {}
+    words = prepare(runs, folder, jobs, progress)
+    running: dict[str, tuple[Run, subprocess.Popen, IO]] = {}
+    known, latest = {}, -math.inf
     try:
         while not {"waiting", "elsewhere", "running"}.isdisjoint(words.values()):
-            for row in rows:
-                if words[row.name] in ("waiting", "elsewhere") and len(running) < jobs:
-                    log = claimed(folder / f"{row.name}.log")
-                    words[row.name] = "running" if log else "elsewhere"
+            for run in runs:
+                if words[run.name] in ("waiting", "elsewhere") and len(running) < jobs:
+                    log = claim(folder / f"{run.name}.log")
+                    words[run.name] = "running" if log else "elsewhere"
                     if log:
-                        running[row.name] = row, _started(row, folder / row.name, log), log
-            for row, process, log in list(running.values()):
+                        running[run.name] = run, _process(run, folder / run.name, log), log
+            for run, process, log in list(running.values()):
                 if process.poll() is not None:
                     log.close()
-                    del running[row.name]
-                    words[row.name] = "failed" if process.returncode else "finished"
-                    publish(row, folder, published)
-            look()
+                    del running[run.name]
+                    words[run.name] = "failed" if process.returncode else "finished"
+                    publication.publish(run, folder, published)
+            if words != {name: state.word for name, state in known.items()} or time.monotonic() >= latest + _EVERY:
+                known, latest = states(runs, folder, words, known), time.monotonic()
+                show(list(known.values()))
             time.sleep(_PAUSE)
     finally:
         for _, process, _ in running.values():
             process.terminate()
         for _, process, _ in running.values():
             process.wait()
-    publish_all(rows, folder, published)  # those too that were finished before, or made elsewhere
-    return states(rows, folder, words)
+    publication.publish_all(runs, folder, published)  # also runs that were finished before, or elsewhere
+    return list(states(runs, folder, words).values())
 
 
-def prepared(rows: Sequence[Row], folder: Path, threads: int, progress: Callable = tqdm) -> dict[str, str]:
-    """Collect the prior data of the runs that are not finished, and return words of all by name, as in `State`.
+def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable = tqdm) -> dict[str, str]:
+    """Collect the prior data of the runs that are not finished, and return words of all runs by name.
 
     Raises:
-        ValueError: a row that does not fit, or the folder of another run; one line.
-        OSError: something cannot be written; one line.
+        ValueError: the folder of another run, or prior data that do not fit; one line.
+        OSError: a file cannot be written; one line.
     """
-    for row in rows:
-        _ = row.body  # before any run is made: it names files
     files.folder(folder)
-    words = {row.name: "finished" if is_finished(row, folder / row.name) else "waiting" for row in rows}
-    waiting = [row for row in rows if words[row.name] == "waiting"]
-    for row in {row.prior_id: row for row in waiting if row.prior is not None}.values():
-        # Other shares of the study begin at the same time, and want the same data.
-        wanted = row.prior_id, row.prior_settings, row.prior.episodes
-        data.collect(*wanted, threads=threads, progress=progress, wait=True)
-        found = len(data.open(row.prior_id))
-        if found != row.prior.episodes:
-            what = f"dataset {row.prior_id!r} has {found} episodes, and the study takes {row.prior.episodes}"
-            raise ValueError(f"{row.name}: {what}; delete it, to have it collected anew")
+    words = {run.name: "finished" if is_finished(run, folder / run.name) else "waiting" for run in runs}
+    with_prior = [run for run in runs if words[run.name] == "waiting" and run.prior is not None]
+    for run in {run.configuration.prior: run for run in with_prior}.values():
+        dataset, episodes = run.configuration.prior, run.prior.episodes
+        settings = run.prior.settings(run.configuration.setup)
+        data.collect(dataset, settings, episodes, threads=threads, progress=progress, wait=True)  # others may, too
+        if (found := len(data.open(dataset))) != episodes:
+            what = f"dataset {dataset!r} has {found} episodes, and the study takes {episodes}"
+            raise ValueError(f"{run.name}: {what}; delete it, to have it collected anew")
     return words
 
 
-def claimed(log: Path) -> IO | None:
-    """Return the open log of a run, locked; None where another process goes on with the run."""
+def is_finished(run: Run, folder: Path) -> bool:
+    """Return whether the run in a folder is finished.
+
+    Raises:
+        ValueError: it is another run, or damaged; one line.
+    """
+    if run_folder.is_begun(folder):
+        run_folder.check(folder, run.configuration.record(), left_out=("versions", PRIOR_SHA256))
+    return run_folder.progress_of(folder).get("evaluated", 0) >= run.configuration.steps
+
+
+def claim(log: Path) -> IO | None:
+    """Return the open log of a run, locked; None if another process makes the run."""
     file = log.open("ab")
-    if files.lock(file):
-        return file
-    file.close()
-    return None
+    return file if files.lock(file) else file.close()
 
 
-def publish(row: Row, folder: Path, published: Path) -> None:
-    """Copy the tables of a run that has been evaluated, and measure and draw the style of its latest policy.
-
-    What is there already of the same policy stays, and where there is no OpenGL, no strip is drawn.
-
-    Args:
-        row: of the run.
-        folder: of the study, in which the run has one.
-        published: folder in which the copies get one.
-
-    Raises:
-        OSError: something cannot be written; one line.
-    """
-    source, target = folder / row.name, published / row.name
-    steps = results.evaluated(table(source, "evaluations"))
-    if not len(steps):
-        return
-    files.folder(target)
-    config = target / run_folder.CONFIG
-    if config.exists() and config.read_text() != (source / run_folder.CONFIG).read_text():
-        (target / "style.csv").unlink(missing_ok=True)  # it was measured of another run
-    for name in PUBLISHED:
-        with files.writing(target / name) as temporary:
-            temporary.write_text((source / name).read_text())
-    training = table(source, "training")
-    if np.any(training.get("phase_updates", 0)):
-        with files.writing(target / "phases.csv") as temporary:
-            temporary.write_text(_phases(training))
-    step = int(steps[-1])
-    measured, drawn = table(target, "style"), target / results.STRIP
-    up_to_date = bool(measured) and measured["step"][-1] == step
-    if not up_to_date:
-        drawn.unlink(missing_ok=True)  # before the style is new: where it is, the strip is of the same policy
-    if not drawn.exists():
-        with contextlib.suppress(RenderingUnavailable), _played(row, source, step) as (environment, policy):
-            if (picture := strips.strip(environment, policy)) is not None:
-                with files.writing(drawn) as temporary:
-                    strips.write(temporary, picture)
-    if not up_to_date:
-        text = _style(row, source, step)  # long work, in which a kill is to leave no temporary file
-        with files.writing(target / "style.csv") as temporary:
-            temporary.write_text(text)
+def _process(run: Run, folder: Path, log: IO) -> subprocess.Popen:
+    config = files.folder(folder) / run_folder.CONFIG
+    if not run_folder.is_begun(folder):
+        with files.writing_json(config) as file:
+            file.update(run.configuration.to_dict())
+    command = [sys.executable, "-m", "arc_suite", "train", f"--config={config}", f"--output={folder}"]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
 
 
-def _phases(training: Mapping[str, np.ndarray]) -> str:
-    """Return a table of the updates of stabilisation phases, by the environment step that they follow."""
-    pairs = zip(training["step"].astype(int), training["phase_updates"].astype(int), strict=True)
-    return "\n".join(["step,updates", *(f"{step},{updates}" for step, updates in pairs if updates)]) + "\n"
-
-
-def publish_all(rows: Sequence[Row], folder: Path, published: Path) -> None:
-    """Publish all runs of a study that have been evaluated, and what demonstrators earn in their places.
-
-    Raises:
-        OSError: something cannot be written; one line.
-    """
-    for row in rows:
-        publish(row, folder, published)
-    known = results.demonstrators(published)
-    places = {row.place: row for row in rows}
-    if places.keys() <= known.keys() or not published.exists():
-        return
-    with files.writing(published / results.DEMONSTRATORS) as temporary, temporary.open("w", newline="") as file:
-        lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(("place", "preset", "seed", "return"))
-        for place, presets in known.items():
-            for preset, totals in presets.items():
-                lines.writerows((place, preset, seed, repr(float(total))) for seed, total in enumerate(totals))
-        for place, row in places.items():
-            if place not in known:
-                for preset, episodes in _demonstrated(row).items():
-                    lines.writerows((place, preset, seed, repr(each.total)) for seed, each in enumerate(episodes))
-
-
-def _demonstrated(row: Row) -> dict[str, list[evaluation.Episode]]:
-    """Return the episodes of the evaluation protocol by the demonstrators of a run's body, by preset."""
-    body, found = row.body, {}
-    rows = VectorEnv(body, row.task, evaluation.EPISODES, 1, AutoresetMode.DISABLED, task_kwargs=dict(row.task_kwargs))
-    with contextlib.closing(rows):
-        usual = COMMANDED if "command" in rows.task.blocks else PRESETS
-        for preset in dict.fromkeys((*usual, suited_preset(rows.task))):
-            if preset in presets_of(body):
-                policy = policies.policy("cpg", body, preset, evaluation.EPISODES, task=rows.task)
-                found[preset] = evaluation.episodes_in_rows(rows, policy)
+def states(
+    runs: Sequence[Run], folder: Path, words: Mapping[str, str], known: Mapping[str, State] = {}
+) -> dict[str, State]:
+    """Return the states of runs by name; tables that cannot have grown since the known ones are not read again."""
+    found = {}
+    for run in runs:
+        state, word = known.get(run.name), words[run.name]
+        if state is None or state.word != word or word in ("running", "elsewhere"):
+            times, evaluations = (table(folder / run.name, name) for name in ("times", "evaluations"))
+            step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
+            result = float(run_folder.latest_returns(evaluations).mean()) if evaluations else None
+            state = State(run, word, int(step), result, float(wall), float(cpu))
+        found[run.name] = state
     return found
 
 
-@contextlib.contextmanager
-def _played(row: Row, folder: Path, step: int) -> Iterator[tuple[Environment, Policy]]:
-    """Open the environment of a run, and its policy at a step; a later one may be there already."""
-    path = folder / checkpoints.FOLDER / str(step) / network.FILE
-    with contextlib.closing(load(row.body, row.task, row.task_kwargs)) as environment:
-        yield environment, policies.policy(path, row.body, task=environment.task.definition)
+def remaining(states: Sequence[State], jobs: int) -> float | None:
+    """Return the estimated s to the end, by the pace of a run, its kind, or all runs; None without any progress."""
+    paces: dict[str, list[float]] = {}
+    for each in states:
+        for name in (each.run.kind, "all") if each.step else ():
+            paces.setdefault(name, []).append(each.wall / each.step)
+    if not paces:
+        return None
+    left = [each for each in states if each.word not in ("finished", "failed")]
+    usual = {each.run.kind: np.mean(paces.get(each.run.kind, paces["all"])) for each in left}
+    pace = [each.wall / each.step if each.step else usual[each.run.kind] for each in left]
+    return sum(s * max(each.run.configuration.steps - each.step, 0) for s, each in zip(pace, left, strict=True)) / jobs
 
 
-def _style(row: Row, folder: Path, step: int) -> str:
-    """Return a table of the metrics of the episodes of the evaluation protocol."""
-    lines = []
-    with _played(row, folder, step) as (environment, policy):
-        for seed in range(evaluation.EPISODES):
-            measured = style.measure(style.record(environment, policy, seed))
-            figures = {name: measured[name].value for name in METRICS if name in measured}
-            lines.append(",".join(map(repr, (step, seed, *figures.values()))))
-    return "\n".join([",".join(("step", "seed", *figures)), *lines]) + "\n"
+def text(states: Sequence[State], jobs: int, most: int | None = None) -> str:
+    """Return a table of states, with at most `most` lines of runs, and the estimated time that is left."""
+    width = max(len(each.run.name) for each in states)
+    lines = [f"{'run':<{width}}  {'state':<9} {'steps':>19} {'return':>8} {'CPU min':>8}"]
+    for each in sorted(sorted(states, key=lambda each: _WORDS.index(each.word))[:most], key=states.index):
+        steps = f"{each.step:,} / {each.run.configuration.steps:,}"
+        result = "-" if each.result is None else f"{each.result:.1f}"
+        lines.append(f"{each.run.name:<{width}}  {each.word:<9} {steps:>19} {result:>8} {each.cpu / 60.0:>8.1f}")
+    finished, failed = (sum(each.word == word for each in states) for word in ("finished", "failed"))
+    left = f", {failed} failed" if failed else ""
+    if finished + failed < len(states):
+        seconds = remaining(states, jobs)
+        left += ", ? to go" if seconds is None else ", {} h {:02} min to go".format(*divmod(round(seconds / 60.0), 60))
+    return "\n".join([*lines, f"{finished} of {len(states)} finished{left}"])
 
 
-def _started(row: Row, folder: Path, log: IO) -> subprocess.Popen:
-    command = [sys.executable, "-m", "arc_suite", *row.arguments(folder)]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT)
+def shown(jobs: int) -> Callable[..., None]:
+    """Return a function that shows states: a table in its place on a terminal, elsewhere a line for each change."""
+    words, height = {}, 0
+
+    def show(states, whole=False):
+        nonlocal height
+        if sys.stdout.isatty():
+            over = f"\x1b[{height}A\x1b[J" if height else ""
+            page = text(states, jobs, None if whole else max(shutil.get_terminal_size().lines - 3, 1))
+            height = page.count("\n") + 1
+            return print(over + page, flush=True)
+        for each in states:
+            if words.get(each.run.name, "waiting") != each.word:
+                print(f"{each.run.name}: {each.word}", flush=True)
+            words[each.run.name] = each.word
+        if whole:
+            print(text(states, jobs))
+
+    return show

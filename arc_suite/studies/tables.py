@@ -1,150 +1,113 @@
-"""Studies: tables of runs, from which curves and comparisons are made."""
+"""Studies by name: tables of runs."""
 
 import collections
 import itertools
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from arc_suite import checks, registry
+from arc_suite import checks
 from arc_suite.agents import algorithms
-from arc_suite.agents.training import Run
+from arc_suite.agents.configuration import Configuration
 from arc_suite.data import Settings
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
-from arc_suite.robots.spec import Body
 
-_EPISODES = 1000  # of prior data, as the paper has them
+_EPISODES = 1000  # of prior data, as in the paper
 
 
 class Prior(NamedTuple):
-    """The prior data of a run: episodes of the body's demonstrator in the task of the run.
+    """Prior data: episodes of the body's demonstrator in the task of the run.
 
     Attributes:
         preset: of the demonstrator.
-        episodes: how many.
+        episodes: number of episodes.
     """
 
     preset: str = "medium"
     episodes: int = _EPISODES
 
+    def settings(self, setup: Setup) -> Settings:
+        """Return the settings of the dataset."""
+        return Settings(setup.body, "cpg", (self.preset,), task=setup.task, task_kwargs=setup.task_kwargs)
 
-class Row(NamedTuple):
-    """A run of a study; what it makes depends on nothing else.
+    def dataset_id(self, setup: Setup) -> str:
+        """Return the id of the dataset."""
+        whole = self.settings(setup).dataset_id()
+        few = f"-{self.episodes}episodes-v0"
+        return whole if self.episodes == _EPISODES else whole.removesuffix("-v0") + few
+
+
+class Run(NamedTuple):
+    """A run of a study; `run` makes it.
 
     Attributes:
-        robot: name of a robot, or `module:name`.
-        algorithm: name, or `module:attribute`; see `algorithms.algorithm`.
-        steps: environment steps.
-        seed: of everything random.
-        task: name of the task.
-        task_kwargs: its settings, as in `arc_suite.load`.
-        numbers: of the algorithm's row that are others than its own.
-        prior: None for none.
-        evaluate_every: environment steps between evaluations; None for what the algorithm says.
-        label: by which its kind is shown; empty for the algorithm.
+        configuration: of the training.
+        label: name of its kind in the report; empty for the algorithm.
+        prior: data that are collected before the run; None for none.
     """
 
-    robot: str
-    algorithm: str
-    steps: int
-    seed: int = 0
-    task: str = "walk"
-    task_kwargs: Mapping[str, Any] = {}
-    numbers: Mapping[str, Any] = {}
-    prior: Prior | None = None
-    evaluate_every: int | None = None
+    configuration: Configuration
     label: str = ""
+    prior: Prior | None = None
 
     @property
     def kind(self) -> str:
-        """What its runs with all seeds are called."""
-        return self.label or self.algorithm
+        """Name of this run and its other seeds."""
+        return self.label or self.configuration.algorithm
 
     @property
     def name(self) -> str:
-        """Of its folder."""
-        return f"{self.robot}-{registry.task_of(self.task).name}-{self.kind}-{self.seed}".replace(":", ".")
-
-    @property
-    def body(self) -> Body:
-        """The robot's, which may be `module:name` of one that another package has.
-
-        Raises:
-            ValueError: there is none; one line.
-        """
-        if ":" in self.robot:
-            return registry.body_of(self.robot)
-        return ROBOTS[checks.name(self.robot, ROBOTS, "robot")]
+        """Name of its folder."""
+        setup, seed = self.configuration.setup, self.configuration.seed
+        return folder_name(f"{setup.body.name}-{setup.kind.name}-{self.kind}-{seed}")
 
     @property
     def place(self) -> str:
-        """The robot and what it does, with the settings of the task."""
-        settings = f", {checks.json_text('task_kwargs', self.task_kwargs)}" if self.task_kwargs else ""
-        return f"{self.robot}, {registry.task_of(self.task).name}{settings}"
+        """Robot, task and settings, by which results are grouped."""
+        return str(self.configuration.setup)
 
-    @property
-    def prior_settings(self) -> Settings:
-        """The settings of its prior data."""
-        return Settings(self.body, "cpg", (self.prior.preset,), task=self.task, task_kwargs=self.task_kwargs)
 
-    @property
-    def prior_id(self) -> str | None:
-        """Id of the dataset of its prior data; None for none."""
-        if self.prior is None:
-            return None
-        whole = self.prior_settings.dataset_id()
-        few = f"-{self.prior.episodes}episodes-v0"
-        return whole if self.prior.episodes == _EPISODES else whole.removesuffix("-v0") + few
+def run(
+    robot: str,
+    algorithm: str,
+    steps: int,
+    seed: int = 0,
+    task: str = "walk",
+    task_kwargs: Mapping[str, Any] | None = None,
+    hyperparameters: Mapping[str, Any] | None = None,
+    prior: Prior | None = None,
+    evaluate_every: int | None = None,
+    label: str = "",
+) -> Run:
+    """Return a run.
 
-    def run(self) -> Run:
-        """Return the run for `training.train`.
+    Args:
+        robot: name of a robot, or `module:name`.
+        algorithm, steps, seed, hyperparameters, evaluate_every: see `Configuration.of`.
+        task: name of the task.
+        task_kwargs: its settings, as in `arc_suite.load`.
+        prior: prior data; None for none.
+        label: name of its kind in the report; empty for the algorithm.
 
-        Raises:
-            ValueError: no such robot, algorithm or number; one line.
-        """
-        definition = algorithms.algorithm(self.algorithm).with_row(dict(self.numbers))
-        places = self.task, self.task_kwargs, self.seed, self.steps, self.prior_id, self.evaluate_every
-        return Run(self.body, self.algorithm, definition, *places)
-
-    def arguments(self, folder: Path) -> list[str]:
-        """Return the arguments of `arc-suite` that make the run.
-
-        Args:
-            folder: of the run.
-        """
-        given = ["train", f"--robot={self.robot}", f"--task={self.task}", f"--algorithm={self.algorithm}"]
-        given += [f"--seed={self.seed}", f"--steps={self.steps}", f"--output={folder}", *self._settings()]
-        given += [f"--row={name}={_text(name, value)}" for name, value in self.numbers.items()]
-        given += [] if self.prior is None else [f"--prior={self.prior_id}"]
-        return given + ([] if self.evaluate_every is None else [f"--evaluate_every={self.evaluate_every}"])
-
-    def page_arguments(self, folder: Path) -> list[str]:
-        """Return the arguments of `arc-suite` that make a page which plays the run's policy.
-
-        Args:
-            folder: of the run.
-        """
-        given = ["render", f"--robot={self.robot}", f"--task={self.task}", f"--policy={folder}", *self._settings()]
-        return [*given, f"--output={self.name}.html"]
-
-    def _settings(self) -> list[str]:
-        return [f"--set={name}={_text(name, value)}" for name, value in self.task_kwargs.items()]
+    Raises:
+        ValueError: an unknown robot, task, algorithm or hyperparameter; one line.
+    """
+    setup = Setup.of(robot, task, task_kwargs)
+    dataset = None if prior is None else prior.dataset_id(setup)
+    configuration = Configuration.of(setup, algorithm, hyperparameters, seed, steps, evaluate_every, dataset)
+    return Run(configuration, label, prior)
 
 
 class Study(NamedTuple):
     """A study.
 
     Attributes:
-        title: what its figures are to be called, with all that makes them others than the paper's.
-        rows: its runs, those first that are wanted first.
+        title: of its report; names what is not as in the paper.
+        runs: the most urgent first.
     """
 
     title: str
-    rows: tuple[Row, ...]
-
-
-def _text(name: str, value: Any) -> str:
-    return value if isinstance(value, str) else checks.json_text(name, value)
+    runs: tuple[Run, ...]
 
 
 _SIX = ("sac", "sacfd", "speq", "speq_o2o", "sope_eo", "sope")
@@ -152,53 +115,56 @@ _PRIOR = ("sacfd", "speq_o2o", "sope")
 
 
 def _has_phases(algorithm: str) -> bool:
-    return algorithms.ALGORITHMS[algorithm].row.phase_updates > 0
+    return algorithms.ALGORITHMS[algorithm].hyperparameters.phase_updates > 0
 
 
 def six(
-    robots: Iterable[str], steps: int, seeds: int, prior: Prior, numbers: Mapping[str, Any] | None = None, **fields
-) -> tuple[Row, ...]:
-    """Return rows of the paper's six algorithms.
+    robots: Iterable[str], steps: int, seeds: int, prior: Prior, phases: Mapping[str, Any] | None = None, **fields
+) -> tuple[Run, ...]:
+    """Return runs of the paper's six algorithms, those of one seed before those of the next.
 
     Args:
         robots: names.
         steps: environment steps of every run.
-        seeds: how many; all runs of one seed come before those of the next.
+        seeds: number of seeds.
         prior: data of the algorithms that take any.
-        numbers: changed in the rows of those that have stabilisation phases.
-        **fields: others of every `Row`.
+        phases: hyperparameters of the algorithms that have stabilisation phases.
+        **fields: others of `run`.
     """
     return tuple(
-        Row(
+        run(
             robot,
             name,
             steps,
             seed,
             prior=prior if name in _PRIOR else None,
-            numbers=(numbers or {}) if _has_phases(name) else {},
+            hyperparameters=phases if _has_phases(name) else None,
             **fields,
         )
         for seed, robot, name in itertools.product(range(seeds), robots, _SIX)
     )
 
 
-# A tenth of the published phases, of how often they are judged, and of the patience with them.
+# A tenth of the published phases, of the interval of their checks, and of the patience.
 _SHORT = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
 
-# The paper's own study is `paper`: 3,000 hours of a core. The others are what fits fewer.
+# The paper's own study is `paper`: 3,000 hours of a core. The others fit fewer hours.
 STUDIES = {
     "paper": Study("the paper's six algorithms as published", six(ROBOTS, 1_000_000, 5, Prior())),
     "exact-tick": Study("phases as published, 100,000 steps", six(("tick",), 100_000, 1, Prior())),
-    # Those without phases, SAC and SACfD, are as published, and run on all four robots. Second seeds come last.
+    # SAC and SACfD have no phases: they are as published, and run on all four robots. Second seeds come last.
     "short": Study(
         "short phases: 7,500 updates in place of 75,000",
         tuple(
             sorted(
                 (
                     *six(("tick", "leaper"), 100_000, 2, Prior(), _SHORT),
-                    *(row for row in six(("queen", "bastion"), 100_000, 1, Prior()) if not _has_phases(row.algorithm)),
+                    *(
+                        run(robot, name, 100_000, prior=Prior() if name in _PRIOR else None)
+                        for robot, name in itertools.product(("queen", "bastion"), ("sac", "sacfd"))
+                    ),
                 ),
-                key=lambda row: row.seed,
+                key=lambda each: each.configuration.seed,
             )
         ),
     ),
@@ -207,46 +173,45 @@ STUDIES = {
         "the first 50,000 steps, short phases: 7,500 updates in place of 75,000, prior data of 100 episodes",
         six(("tick",), 50_000, 1, Prior(episodes=100), _SHORT, evaluate_every=5000),
     ),
-    # What demonstrators are good for that the paper did not have.
+    # Demonstrators that the paper did not have.
     "refined-prior": Study(
         "prior data of the demonstrators with refined numbers in place of medium, short phases: 7,500 updates",
         tuple(
-            row._replace(label=f"{row.algorithm}-refined")
-            for row in six(("tick",), 100_000, 1, Prior("refined"), _SHORT)
-            if row.prior is not None
+            each._replace(label=f"{each.kind}-refined")
+            for each in six(("tick",), 100_000, 1, Prior("refined"), _SHORT)
+            if each.prior is not None
         ),
     ),
-    # What learners make of tasks in which feedback pays.
     "tasks": Study(
-        "what learners make of tasks in which feedback pays; prior data are 100 episodes",
+        "learners in tasks in which feedback pays; prior data are 100 episodes",
         (
             *(
-                row
+                each
                 for task, preset in (("steer", "steered"), ("rough", "surefooted"))
-                for row in (
-                    Row("tick", "ppo", 1_000_000, task=task),
-                    Row("tick", "sac", 50_000, task=task, evaluate_every=5000),
-                    Row("tick", "sacfd", 50_000, task=task, evaluate_every=5000, prior=Prior(preset, 100)),
+                for each in (
+                    run("tick", "ppo", 1_000_000, task=task),
+                    run("tick", "sac", 50_000, task=task, evaluate_every=5000),
+                    run("tick", "sacfd", 50_000, task=task, evaluate_every=5000, prior=Prior(preset, 100)),
                 )
             ),
             *(
-                Row("tick", "imitation", 38_400, task=task, evaluate_every=38_400)
+                run("tick", "dagger", 38_400, task=task, evaluate_every=38_400)
                 for task in ("steer", "rough", "slopes", "stairs", "navigate")
             ),
-            # Whether a foot misses a trench is told by a few steps of an episode: it takes more of them.
-            Row("tick", "imitation", 153_600, task="gaps", evaluate_every=76_800),
-            # Noise falls over the length of a run; on rough ground that of a million steps is gone before it walks.
-            *(Row("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
+            # A foot misses a trench in a few steps of an episode alone: that takes more episodes.
+            run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
+            # The noise falls over the length of a run; with a million steps on rough ground it is gone too early.
+            *(run("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
         ),
     ),
     "beyond": Study(
-        "beyond the paper: imitation of the demonstrators, and PPO from nothing",
+        "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
         (
-            *(Row(robot, "imitation", 25_600) for robot in ROBOTS),
-            Row("queen", "imitation", 38_400, task="steer", evaluate_every=38_400),
-            Row("queen", "ppo", 2_000_000, task="steer"),
+            *(run(robot, "dagger", 25_600) for robot in ROBOTS),
+            run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
+            run("queen", "ppo", 2_000_000, task="steer"),
             *(
-                Row(robot, "ppo", 832_000 if robot == "tick" else 1_200_000, seed)
+                run(robot, "ppo", 832_000 if robot == "tick" else 1_200_000, seed)
                 for seed, robot in itertools.product(range(3), ROBOTS)
             ),
         ),
@@ -255,7 +220,7 @@ STUDIES = {
 
 
 def folder_name(name: str) -> str:
-    """Return what the folders of a study are called: its name, without the colon of `module:attribute`."""
+    """Return the name of a folder, without the colon of `module:attribute`."""
     return name.replace(":", ".")
 
 
@@ -263,19 +228,12 @@ def study(name: str) -> Study:
     """Return the study of a name, or of `module:attribute`, a `Study` on Python's path.
 
     Raises:
-        ValueError: there is none, or two of its rows have one name; one line.
+        ValueError: there is none, or two of its runs have one name; one line.
     """
-    found = _named(name)
-    for row, count in collections.Counter(row.name for row in found.rows).items():
-        if count > 1:
-            raise ValueError(f"study {name!r}: {count} rows are named {row}; a label tells them apart")
-    return found
-
-
-def _named(name: str) -> Study:
-    if ":" not in name:
-        return STUDIES[checks.name(name, STUDIES, "study")]
-    found = checks.imported(name, "study")
+    found = checks.imported(name, "study") if ":" in name else STUDIES[checks.name(name, STUDIES, "study")]
     if not isinstance(found, Study):
         raise ValueError(f"study {name!r}: expected a Study, got {type(found).__name__}")
+    for each, count in collections.Counter(each.name for each in found.runs).items():
+        if count > 1:
+            raise ValueError(f"study {name!r}: {count} runs are named {each}; a label tells them apart")
     return found

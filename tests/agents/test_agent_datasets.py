@@ -22,7 +22,7 @@ silent = functools.partial(tqdm, disable=True)
 def run(tmp_path_factory):
     """Folder of a run with checkpoints at 100, 200 and 300, of rising return."""
     folder = tmp_path_factory.mktemp("runs") / "climb"
-    train(tiny_studies.WITH_NUMPY.rows[0].run(), folder, progress=silent)
+    train(tiny_studies.WITH_NUMPY.runs[0].configuration, folder, progress=silent)
     return folder
 
 

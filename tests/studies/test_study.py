@@ -1,6 +1,8 @@
-"""Studies: eight tiny runs, killed twice, come out to the bit as an uninterrupted study does; times apart."""
+"""Studies: eight tiny runs, killed twice, are bit-exactly those of an uninterrupted study, apart from times."""
 
+import dataclasses
 import importlib.util
+import json
 import os
 import pathlib
 import signal
@@ -15,13 +17,14 @@ import pytest
 import tiny_studies
 
 from arc_suite import data, policies, registry, style
-from arc_suite.agents import run_folder
+from arc_suite.agents import configuration, run_folder
+from arc_suite.agents.configuration import Configuration
 from arc_suite.envs.dm import load
 from arc_suite.robots import generator
-from arc_suite.studies import results, runner, tables, watch
-from arc_suite.studies.runner import METRICS
-from arc_suite.studies.tables import Row
-from arc_suite.studies.watch import State, watched
+from arc_suite.studies import publication, results, runner, tables
+from arc_suite.studies.publication import METRICS
+from arc_suite.studies.runner import State
+from arc_suite.studies.tables import Prior, run
 
 ROOT = pathlib.Path(__file__).parents[2]
 FIXTURES = ROOT / "tests" / "fixtures"
@@ -107,7 +110,7 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     (tmp_path / "study").mkdir()
     command = ["-m", "arc_suite", "study", "tiny_studies:WITH_NUMPY", "--jobs=2"]
     places = [f"--runs={tmp_path / 'runs'}", f"--results={tmp_path / 'results'}"]
-    rows = [row.name for row in tiny_studies.WITH_NUMPY.rows]
+    names = [each.name for each in tiny_studies.WITH_NUMPY.runs]
     for shard, count in (("0/7", 2), ("1/7", 1)):
         done = subprocess.run(
             [sys.executable, *command, *places, f"--shard={shard}"], env=surroundings, capture_output=True, text=True
@@ -115,30 +118,32 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
         assert (done.returncode, done.stderr) == (0, "")
         assert done.stdout.endswith(f"{count} of {count} finished\n")
     made = sorted(path.name for path in (tmp_path / "runs").iterdir() if path.is_dir())
-    assert made == sorted([rows[0], rows[7], rows[1]])
+    assert made == sorted([names[0], names[7], names[1]])
 
-    row, folder = tiny_studies.WITH_NUMPY.rows[0], tmp_path / "runs"
-    before = (folder / row.name / "checkpoint.npz").stat().st_mtime_ns
-    states = runner.run([row], folder, tmp_path / "results", 1, lambda states: None)
+    first, folder = tiny_studies.WITH_NUMPY.runs[0], tmp_path / "runs"
+    assert configuration.read(folder / first.name / "config.json") == first.configuration
+    before = (folder / first.name / "checkpoint.npz").stat().st_mtime_ns
+    states = runner.make([first], folder, tmp_path / "results", 1, lambda states: None)
     assert [each.word for each in states] == ["finished"]
-    assert (folder / row.name / "checkpoint.npz").stat().st_mtime_ns == before
-    assert states[0].step == row.steps
+    assert (folder / first.name / "checkpoint.npz").stat().st_mtime_ns == before
+    assert states[0].step == 300
 
-    with pytest.raises(ValueError, match=r"of another run, whose row.spread is 0.02, and not 0.3; write to another"):
-        runner.is_finished(row._replace(numbers={"spread": 0.3}), folder / row.name)
+    other = tiny_studies.tiny("tiny_studies:CLIMB", 0, hyperparameters={"spread": 0.3})
+    with pytest.raises(ValueError, match=r"of another run, whose hyperparameters.spread is 0.02, and not 0.3; write "):
+        runner.is_finished(other, folder / first.name)
 
     # Of another run nothing that was measured stays.
-    published = tmp_path / "results" / row.name
+    published = tmp_path / "results" / first.name
     measured = (published / "style.csv").read_text()
     (published / "config.json").write_text("{}")
     (published / "style.csv").write_text(measured.replace(",0.", ",1."))
-    runner.publish(row, folder, tmp_path / "results")
+    publication.publish(first, folder, tmp_path / "results")
     assert (published / "style.csv").read_text() == measured
 
     # What is published of the policy's style is what the style room measures of it.
-    table = run_folder.table(tmp_path / "results" / row.name, "style")
-    environment = load("tick", "walk", row.task_kwargs)
-    policy = policies.policy(folder / row.name, "tick")
+    table = run_folder.table(published, "style")
+    environment = load("tick", "walk", tiny_studies.SHORT)
+    policy = policies.policy(folder / first.name, "tick")
     for seed in (0, 7):
         measured = style.measure(style.record(environment, policy, seed))
         for name in METRICS:
@@ -161,89 +166,78 @@ def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
 
 
 @pytest.mark.slow
-def test_prior_data_are_those_that_the_row_names(tmp_path, monkeypatch):
+def test_prior_data_are_those_of_the_study(tmp_path, monkeypatch):
     """A dataset that somebody has collected more of is another."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
-    row = Row("tick", "sacfd", 100, task_kwargs=tiny_studies.SHORT, prior=tables.Prior(episodes=2))
-    assert runner.prepared([row], tmp_path / "runs", 1) == {row.name: "waiting"}
-    data.collect(row.prior_id, row.prior_settings, 3)
+    each = run("tick", "sacfd", 100, task_kwargs=tiny_studies.SHORT, prior=Prior(episodes=2))
+    dataset = each.configuration.prior
+    assert runner.prepare([each], tmp_path / "runs", 1) == {each.name: "waiting"}
+    data.collect(dataset, each.prior.settings(each.configuration.setup), 3)
     with pytest.raises(ValueError) as error:
-        runner.prepared([row], tmp_path / "runs", 1)
-    what = f"dataset {row.prior_id!r} has 3 episodes, and the study takes 2; delete it, to have it collected anew"
-    assert str(error.value) == f"{row.name}: {what}"
+        runner.prepare([each], tmp_path / "runs", 1)
+    what = f"dataset {dataset!r} has 3 episodes, and the study takes 2; delete it, to have it collected anew"
+    assert str(error.value) == f"{each.name}: {what}"
 
 
-def test_robots_of_others_and_unknown_ones(tmp_path, monkeypatch):
-    """Are told of before any run is made."""
-    body = generator.generate(4, 2)
+def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
+    body = dataclasses.replace(generator.generate(4, 2), name="creature")
     monkeypatch.setitem(sys.modules, "others", types.ModuleType("others"))
     monkeypatch.setitem(registry.ROBOTS, "creature", body)
     monkeypatch.setitem(registry.MODULES, ("domain", "creature"), "others")
-    row = Row("others:creature", "sac", 100)
-    assert row.body is body and row.name == "others.creature-walk-sac-0"
-    for name in ("tik", "examples/spider.json"):
-        with pytest.raises(ValueError, match=f"^unknown robot '{name}'"):
-            runner.run([row, Row(name, "sac", 100)], tmp_path / "runs", tmp_path, 1, print)
-    assert not (tmp_path / "runs").exists()
+    each = run("others:creature", "sac", 100)
+    assert each.configuration.setup.body is body and each.name == "creature-walk-sac-0"
+    assert each.configuration.to_dict()["robot"] == "others:creature"
+    with pytest.raises(ValueError, match=r"^unknown domain 'tik'; did you mean 'tick'"):
+        run("tik", "sac", 100)
 
 
 def test_phases_are_published(tmp_path):
     lines = ["step,phase_updates", "1000,0", "2000,300", "3000,0", "4000,75000"]
     (tmp_path / "training.csv").write_text("\n".join(lines) + "\n")
-    text = runner._phases(run_folder.table(tmp_path, "training"))
+    text = publication._phases(run_folder.table(tmp_path, "training"))
     assert text == "step,updates\n2000,300\n4000,75000\n"
 
 
 def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
     """It is not started twice, whoever makes it."""
     log = tmp_path / "a.log"
-    held = runner.claimed(log)
-    assert runner.claimed(log) is None
+    held = runner.claim(log)
+    assert runner.claim(log) is None
     child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, stdout=held)
     held.close()
-    assert runner.claimed(log) is None, "the process of the run holds it too"
+    assert runner.claim(log) is None, "the process of the run holds it too"
     child.communicate(b"\n")
-    runner.claimed(log).close()
+    runner.claim(log).close()
 
 
 def test_remaining_time():
     """By a run's own pace, that of its kind, or that of all."""
-    sac, sope = (tables.Row("tick", name, 1000) for name in ("sac", "sope"))
+    sac, sope = (run("tick", name, 1000) for name in ("sac", "sope_eo"))
 
-    def state(row, word, step, wall):
-        return State(row, word, step, None, wall, wall)
+    def state(each, word, step, wall):
+        return State(each, word, step, None, wall, wall)
 
-    assert watch.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
+    assert runner.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
     begun = [state(sac, "finished", 1000, 100.0), state(sac, "running", 500, 100.0), state(sac, "waiting", 0, 0.0)]
-    assert watch.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
-    assert watch.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
+    assert runner.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
+    assert runner.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
 
 
-def test_how_runs_stand_is_shown_when_a_word_changes_and_now_and_then(tmp_path, monkeypatch):
-    """And of a long study the tables of those runs alone are read that may have grown."""
-    rows = [tables.Row("tick", "sac", 1000, seed) for seed in range(3)]
-    words = dict(zip((row.name for row in rows), ("finished", "running", "waiting"), strict=True))
-    times = tmp_path / rows[1].name / "times.csv"
-    times.parent.mkdir()
-    read, shown, now = [], [], [0.0]
-    table = watch.table
-    monkeypatch.setattr(watch, "table", lambda *place: read.append(place[0].name) or table(*place))
-    monkeypatch.setattr(watch.time, "monotonic", lambda: now[0])
-    look = watched(rows, tmp_path, words, lambda states: shown.append([(each.word, each.step) for each in states]))
-
-    look()
-    assert shown == [[("finished", 0), ("running", 0), ("waiting", 0)]] and set(read) == {row.name for row in rows}
+def test_tables_that_cannot_have_grown_are_not_read_again(tmp_path, monkeypatch):
+    runs = [run("tick", "sac", 1000, seed) for seed in range(3)]
+    names = [each.name for each in runs]
+    words = dict(zip(names, ("finished", "running", "waiting"), strict=True))
+    read, table = [], runner.table
+    monkeypatch.setattr(runner, "table", lambda *place: read.append(place[0].name) or table(*place))
+    known = runner.states(runs, tmp_path, words)
+    assert [(each.word, each.step) for each in known.values()] == [("finished", 0), ("running", 0), ("waiting", 0)]
     read.clear()
-    times.write_text("step,wall_seconds,cpu_seconds\n500,1.0,1.0\n")
-    now[0] = 1.9
-    look()
-    assert len(shown) == 1 and not read
-    now[0] = 2.0
-    look()
-    assert shown[1:] == [[("finished", 0), ("running", 500), ("waiting", 0)]] and set(read) == {rows[1].name}
-    words[rows[2].name] = "running"
-    look()
-    assert shown[2:] == [[("finished", 0), ("running", 500), ("running", 0)]]
+    (tmp_path / names[1]).mkdir()
+    (tmp_path / names[1] / "times.csv").write_text("step,wall_seconds,cpu_seconds\n500,1.0,1.0\n")
+    words[names[2]] = "running"
+    known = runner.states(runs, tmp_path, words, known)
+    assert [(each.word, each.step) for each in known.values()] == [("finished", 0), ("running", 500), ("running", 0)]
+    assert set(read) == set(names[1:])
 
 
 @pytest.mark.slow
@@ -278,7 +272,7 @@ def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
         ),
         (["first-steps", "--shard=6/7"], "arc-suite study: --shard=6/7: no run, as the study has 6"),
         (["arc_suite:load"], "arc-suite study: study 'arc_suite:load': expected a Study, got function"),
-        (["tiny_studies:TWICE"], "arc-suite study: study 'tiny_studies:TWICE': 2 rows are named tick-walk-sac-0; a "),
+        (["tiny_studies:TWICE"], "arc-suite study: study 'tiny_studies:TWICE': 2 runs are named tick-walk-sac-0; a "),
     ],
 )
 def test_errors_are_one_line(arguments, line, tmp_path):
@@ -290,15 +284,15 @@ def test_errors_are_one_line(arguments, line, tmp_path):
 
 
 @pytest.mark.parametrize("name", tables.STUDIES)
-def test_rows_of_the_table_are_runs(name):
+def test_runs_go_through_files(name):
+    """The configuration of a run is the one that `arc-suite train` reads."""
     study = tables.study(name)
     assert study.title
-    for row in study.rows[:12]:
-        run = row.run()
-        assert (run.prior is None) == (getattr(run.definition.row, "prior", "none") == "none")
-        arguments = row.arguments("folder")
-        assert f"--seed={row.seed}" in arguments
-        assert {f"--row={key}={value}" for key, value in row.numbers.items()} <= set(arguments)
+    for each in study.runs[:12]:
+        text = json.dumps(each.configuration.to_dict())
+        assert Configuration.from_dict(json.loads(text)) == each.configuration
+        takes_prior = getattr(each.configuration.hyperparameters, "prior", "none") != "none"
+        assert (each.configuration.prior is not None) == takes_prior
 
 
 def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
@@ -335,7 +329,7 @@ def test_without_submitit_it_says_what_to_install(tmp_path):
     ],
 )
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, task, presets):
-    row = Row("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
-    runner.publish_all([row], tmp_path / "runs", tmp_path)
-    found = results.demonstrators(tmp_path)[row.place]
+    each = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
+    publication.publish_all([each], tmp_path / "runs", tmp_path)
+    found = results.demonstrators(tmp_path)[each.place]
     assert list(found) == presets and all(len(totals) == 10 for totals in found.values())

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 
 from arc_suite import evaluation
+from arc_suite.agents import configuration
 from arc_suite.evaluation.protocol import EXPERT_RETURNS
 from arc_suite.studies import report, results, tables
 from arc_suite.studies.report import PAPER
-from arc_suite.studies.tables import Row, Study
+from arc_suite.studies.tables import Study, run
 
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 STEPS = (1000, 2000)
 
 
-def publish(folder, row, returns, style=0.1):
+def publish(folder, each, returns, style=0.1):
     """Tables of a run: returns are (evaluations, episodes)."""
-    path = folder / row.name
+    path = folder / each.name
     path.mkdir(parents=True)
     lines = ["step,seed,return,length,speed,gait_compliance"]
     for step, episodes in zip(STEPS, returns, strict=True):
@@ -37,15 +38,14 @@ def constant(*levels):
 @pytest.fixture
 def made(tmp_path):
     """A study as the paper's table of finals would have it, two seeds of everything, and its folder."""
-    rows = tuple(Row(robot, name, 2000, seed) for robot in PAPER for name in PAPER[robot] for seed in (0, 1))
-    for row in rows:
-        final = float(PAPER[row.robot][row.algorithm])
-        start = 100.0 if row.algorithm in report.ONLINE else 300.0
-        style = {"sac": 0.5, "sope": 0.9}.get(row.algorithm, 0.1)
-        publish(tmp_path / "mine", row, constant(start, final + row.seed), style)
+    keys = [(robot, name, seed) for robot in PAPER for name in PAPER[robot] for seed in (0, 1)]
+    runs = tuple(run(robot, name, 2000, seed) for robot, name, seed in keys)
+    for each, (robot, name, seed) in zip(runs, keys, strict=True):
+        start, style = 100.0 if name in report.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
+        publish(tmp_path / "mine", each, constant(start, float(PAPER[robot][name]) + seed), style)
     text = "place,preset,seed,return\n" + "".join(f"queen, walk,medium,{s},2048.0\n" for s in range(10))
     (tmp_path / "mine" / "demonstrators.csv").write_text(text.replace("queen, walk", '"queen, walk"'))
-    return Study("as in the paper", rows), tmp_path / "mine"
+    return Study("as in the paper", runs), tmp_path / "mine"
 
 
 def cells(page, *starts):
@@ -73,7 +73,7 @@ def test_report(made):
     assert cells(page, "bastion, walk", "sac", "0.500")[2:] == ["0.500"] * 6
     assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
     assert "As in the paper.\n" in page
-    more = study._replace(rows=(*study.rows, Row("tick", "sac", 2000, seed=2)))
+    more = study._replace(runs=(*study.runs, run("tick", "sac", 2000, seed=2)))
     assert "As in the paper. Begun: 48 of 49 runs.\n" in report.write("more", more, folder).read_text()
 
 
@@ -102,42 +102,43 @@ def test_claims(made):
 def test_commands_name_the_folder_of_the_runs(made):
     """In which no colon stands."""
     study, folder = made
-    (folder / study.rows[0].name / "strip.png").write_bytes(b"")
+    (folder / study.runs[0].name / "strip.png").write_bytes(b"")
     page = report.write("my_studies:MINE", study, folder).read_text()
-    assert f"--policy=runs/my_studies.MINE/{study.rows[0].name} " in page
+    assert f"--policy=runs/my_studies.MINE/{study.runs[0].name} " in page
 
 
 @pytest.mark.slow
 def test_phases_are_told_where_they_are_published(made):
     study, folder = made
     assert "## Phases" not in report.write("mine", study, folder).read_text()
-    for row, lengths in zip(study.rows, ((300, 700), (1100,)), strict=False):
+    for each, lengths in zip(study.runs, ((300, 700), (1100,)), strict=False):
         lines = ["step,updates", *(f"{10_000 * place},{updates}" for place, updates in enumerate(lengths, 1))]
-        (folder / row.name / "phases.csv").write_text("\n".join(lines) + "\n")
+        (folder / each.name / "phases.csv").write_text("\n".join(lines) + "\n")
     page = report.write("mine", study, folder).read_text()
-    first = study.rows[0]
-    assert cells(page, first.place, first.algorithm, "3") == [first.place, first.algorithm, "3", "700", "300", "1,100"]
+    first = study.runs[0]
+    assert cells(page, first.place, first.kind, "3") == [first.place, first.kind, "3", "700", "300", "1,100"]
 
 
 @pytest.mark.slow
 def test_claims_need_what_they_compare(made):
     """Short phases are told by the study's title; other tasks and missing algorithms are not compared."""
     study, folder = made
-    few = study._replace(rows=tuple(row for row in study.rows if row.algorithm == "sac"))
+    few = study._replace(runs=tuple(each for each in study.runs if each.kind == "sac"))
     page = report.write("few", few, folder).read_text()
     assert cells(page, report.CLAIMS[0].text)[3:] == ["-", "not measured"]
-    found = results.results(few.rows, folder)
+    found = results.results(few.runs, folder)
     assert report._is_papers(found[0])
+    usual = {"robot": "tick", "algorithm": "sac", "steps": 2000}
     for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
-        assert not report._is_papers(found[0]._replace(row=found[0].row._replace(**other)))
+        assert not report._is_papers(found[0]._replace(run=run(**usual | other)))
 
 
 def test_unfinished_evaluations_do_not_count(tmp_path):
-    row = Row("tick", "sac", 5000)
-    publish(tmp_path, row, constant(100.0, 200.0))
-    with (tmp_path / row.name / "evaluations.csv").open("a") as file:
+    each = run("tick", "sac", 5000)
+    publish(tmp_path, each, constant(100.0, 200.0))
+    with (tmp_path / each.name / "evaluations.csv").open("a") as file:
         file.write("3000,0,900.0,1000,0.3,0.9\n")
-    (result,) = results.results([row], tmp_path)
+    (result,) = results.results([each], tmp_path)
     assert result.steps.tolist() == [1000, 2000]
     assert result.final == 204.5
     assert result.progress["speed"].shape == (10,)
@@ -145,7 +146,7 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
 
 def test_runs_are_compared_where_both_have_been(tmp_path):
     """At the latest step that all have reached."""
-    long, short = Row("tick", "sac", 2000), Row("tick", "speq", 2000)
+    long, short = run("tick", "sac", 2000), run("tick", "speq", 2000)
     publish(tmp_path, long, constant(100.0, 900.0))
     publish(tmp_path, short, constant(500.0, 600.0))
     path = tmp_path / short.name / "evaluations.csv"
@@ -157,26 +158,37 @@ def test_runs_are_compared_where_both_have_been(tmp_path):
 
 
 def test_until(tmp_path):
-    rows = Row("tick", "sac", 2000), Row("tick", "sac", 2000, 1)
-    publish(tmp_path, rows[0], constant(100.0, 900.0))
-    publish(tmp_path, rows[1], constant(500.0, 600.0))
-    found = results.results(rows, tmp_path)
+    runs = run("tick", "sac", 2000), run("tick", "sac", 2000, 1)
+    publish(tmp_path, runs[0], constant(100.0, 900.0))
+    publish(tmp_path, runs[1], constant(500.0, 600.0))
+    found = results.results(runs, tmp_path)
     assert results.until(found, 500.0) == (1500.0, 120.0)
     assert results.until(found, 700.0) == (np.inf, np.inf)
 
 
 def test_nothing_published_is_one_line(tmp_path):
     with pytest.raises(ValueError, match=r"none: holds no results of the study mine$"):
-        report.write("mine", Study("none", (Row("tick", "sac", 10),)), tmp_path / "none")
+        report.write("mine", Study("none", (run("tick", "sac", 10),)), tmp_path / "none")
+
+
+COMMITTED = pathlib.Path(__file__).parents[2] / "studies"
+
+
+@pytest.mark.parametrize("path", sorted(COMMITTED.glob("*/*/config.json")), ids=lambda path: path.parent.name)
+def test_committed_configurations_are_those_of_the_studies(path):
+    """Today's code reads each, and trains the same run."""
+    study = tables.study(path.parts[-3])
+    (each,) = (each for each in study.runs if each.name == path.parts[-2])
+    assert configuration.read(path) == each.configuration
 
 
 @pytest.mark.slow
 def test_committed_reports_are_made_of_committed_tables(tmp_path):
     """By the one command, and nobody has changed a number."""
-    committed = pathlib.Path(__file__).parents[2] / "studies"
+    committed = COMMITTED
     shutil.copytree(committed, tmp_path / "studies")
     names = [name for name in tables.STUDIES if (committed / name).exists()]
-    assert names
+    assert len(names) == 6 and len(list(committed.glob("*/*/config.json"))) == 61
     for name in names:
         report.write(name, tables.study(name), tmp_path / "studies" / name)
     for path in (*(f"{name}/README.md" for name in names), "README.md"):
