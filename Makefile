@@ -138,7 +138,7 @@ check-agents: VENV := .venv-jax
 check-agents: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
-	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
+	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/studies tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

@@ -216,12 +216,12 @@ MUTANTS = (
     Mutant("the mouse pulls at nothing", "data.xfrc_applied[:] = forces", "data.xfrc_applied[:] = 0.0"),
     # Studies and datasets of agents.
     Mutant("medium agents are the best", "enough = MEDIUM * max(", "enough = max("),
-    Mutant("evaluations under way count", "whole = marks[counts == evaluation.EPISODES]", "whole = marks"),
+    Mutant("evaluations under way count", "marks[counts == evaluation.EPISODES]", "marks"),
     Mutant(
         "runs compared wherever they are", "int(np.flatnonzero(each.steps == max(common))[0]) + 1", "len(each.steps)"
     ),
     Mutant("a run made by two studies", "fcntl.flock(file, fcntl.LOCK_EX", "fcntl.flock(file, fcntl.LOCK_SH"),
-    Mutant("shares of a study overlap", "study.rows[part::parts]", "study.rows[part:]"),
+    Mutant("shares of a study overlap", "study.runs[part::parts]", "study.runs[part:]"),
 )
 
 

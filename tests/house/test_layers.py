@@ -33,6 +33,7 @@ ROOMS = (
     ("tuning",),
     ("export",),  # to take away
     ("agents",),  # who learns
+    ("studies",),  # tables of runs
     ("cli",),  # programs
     ("__main__",),  # that Python starts by name
 )
@@ -66,22 +67,17 @@ THIRD_PARTY = {
     "agents": {"numpy", "gymnasium", "tqdm"},
     "agents.networks": {"numpy", "jax"},
     "agents.plots": {"numpy", "matplotlib"},
-    "agents.calls": set(),
-    "agents.together": {"numpy", "jax"},
     "agents.off_policy": {"numpy", "jax"},
     "agents.soft_actor_critic": {"numpy", "jax", "optax"},
-    "agents.imitation": {"numpy", "jax", "optax"},
-    "agents.cloning": {"numpy", "jax", "optax"},
+    "agents.dagger": {"numpy", "jax", "optax"},
+    "agents.bc": {"numpy", "jax", "optax"},
     "agents.on_policy": {"numpy", "jax"},
     "agents.proximal_policy": {"numpy", "jax", "optax"},
-    "agents.rows": set(),
-    "agents.studies": set(),
-    "agents.cluster": {"submitit"},
-    "agents.study_states": {"numpy"},
-    "agents.study_runner": {"numpy", "gymnasium", "tqdm"},
-    "agents.study_results": {"numpy"},
-    "agents.study_report": {"numpy"},
-    "agents.study_strips": set(),
+    "agents.hyperparameters": set(),
+    "studies": {"numpy"},
+    "studies.cluster": {"submitit"},
+    "studies.publication": {"numpy", "gymnasium"},
+    "studies.runner": {"numpy", "tqdm"},
     "style.metrics": {"numpy"},
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},
