@@ -12,7 +12,7 @@
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics beside their oracles, in the environment of check-jax
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
-# make census  walks 500 random bodies and tells which do
+# make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
 # make soak    two million steps: memory, threads and files stay what they are
 # make fuzz    damages specs, tracks and datasets at random and reads them; minutes
@@ -25,14 +25,14 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check check-long lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench census obedience soak fuzz mutants golden clean
+.PHONY: demo test check check-long lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench survey obedience soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	mkdir -p out
-	$(PYTHON) tools/evaluate.py --robot queen --policy cpg --episodes 1
-	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.png
-	$(PYTHON) tools/render.py --robot queen --policy cpg --output out/queen.mp4
+	$(VENV)/bin/arc-suite evaluate --robot queen --policy cpg --episodes 1
+	$(VENV)/bin/arc-suite render --robot queen --policy cpg --output out/queen.png
+	$(VENV)/bin/arc-suite render --robot queen --policy cpg --output out/queen.mp4
 
 # Tests run in as many processes as there are cores; whoever has none left takes some from the others.
 PARALLEL := -n auto --dist worksteal
@@ -138,13 +138,13 @@ check-agents: VENV := .venv-jax
 check-agents: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
-	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
+	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/studies tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md
 
-census: $(INSTALLED)
-	$(PYTHON) tools/walk_census.py --count 500
+survey: $(INSTALLED)
+	$(VENV)/bin/arc-suite survey --count 500
 
 obedience: $(INSTALLED)
 	$(PYTHON) tests/obedience.py

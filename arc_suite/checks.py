@@ -1,4 +1,4 @@
-"""Checks of names, seeds and numbers, whose errors are one line with one wording."""
+"""Checks of names, seeds and numbers, with one wording of errors."""
 
 import difflib
 import json
@@ -45,7 +45,7 @@ def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
         valid: extensions there are, with their dots.
 
     Raises:
-        ValueError: it is none of them; one line.
+        ValueError: it is none of them.
     """
     return name(Path(path).suffix.lower(), valid, "extension")
 
@@ -54,7 +54,7 @@ def seed(value) -> int:
     """Return the seed as a Python integer.
 
     Raises:
-        ValueError: it is not an integer from 0 to 2**32 - 1; one line.
+        ValueError: it is not an integer from 0 to 2**32 - 1.
     """
     return integer("seed", value, 0, _LARGEST_SEED)
 
@@ -69,7 +69,7 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
         high: most that it may be; None for no bound.
 
     Raises:
-        ValueError: it is no integer, or out of range; one line.
+        ValueError: it is no integer, or out of range.
     """
     try:
         number = low - 1 if isinstance(value, bool) else operator.index(value)
@@ -91,7 +91,7 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
         high: most that it may be.
 
     Raises:
-        ValueError: it is no finite number, or out of range; one line.
+        ValueError: it is no finite number, or out of range.
     """
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if not real or not math.isfinite(value) or not low <= value <= high:
@@ -108,7 +108,7 @@ def boolean(what: str, value: Any) -> bool:
         value: True or False, of Python or NumPy.
 
     Raises:
-        ValueError: it is neither; one line.
+        ValueError: it is neither.
     """
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{what}: expected true or false, got {value!r}")
@@ -125,7 +125,7 @@ def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
         high: most that they may be.
 
     Raises:
-        ValueError: it is neither, or out of range; one line.
+        ValueError: it is neither, or out of range.
     """
     try:
         first, last = value if isinstance(value, tuple | list) else (value, value)
@@ -141,7 +141,7 @@ def array(what: str, value: Any, size: int) -> np.ndarray:
     """Return the value as (size,) floats; a single number stands for all of them.
 
     Raises:
-        ValueError: it is neither one finite number nor so many of them; one line.
+        ValueError: it is neither one finite number nor so many of them.
     """
     numbers = np.asarray(value)
     if numbers.dtype.kind not in "if" or numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
@@ -153,7 +153,7 @@ def mapping(what: str, value: Any) -> Mapping[str, Any]:
     """Return the value if it is a mapping, and an empty one for None.
 
     Raises:
-        ValueError: it is neither; one line.
+        ValueError: it is neither.
     """
     if value is None:
         return {}
@@ -166,7 +166,7 @@ def json_text(what: str, value: Any) -> str:
     """Return the value as JSON, with the keys of mappings in order.
 
     Raises:
-        ValueError: it holds something that JSON cannot; one line.
+        ValueError: it holds something that JSON cannot.
     """
     try:
         return json.dumps(value, sort_keys=True)
@@ -175,7 +175,7 @@ def json_text(what: str, value: Any) -> str:
 
 
 def quoted(value: Any) -> str:
-    """Return the beginning of a text that is not ours, of a file or another library's error, in one line."""
+    """Return the beginning of a foreign text, such as another library's error, without line breaks."""
     return " ".join(str(value).split())[:_LONGEST_QUOTE]
 
 
@@ -187,7 +187,7 @@ def imported(path: str, kind: str) -> Any:
         kind: of what is wanted, with which an error begins.
 
     Raises:
-        ValueError: there is none; one line.
+        ValueError: there is none.
     """
     try:
         return pkgutil.resolve_name(path)

@@ -15,7 +15,7 @@ def folder(path: str | os.PathLike) -> Path:
     """Make a folder where there is none, and return it.
 
     Raises:
-        OSError: it cannot be made; one line that names it.
+        OSError: it cannot be made.
     """
     path = Path(path)
     try:
@@ -40,7 +40,7 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         The path to write to.
 
     Raises:
-        OSError: the target cannot be written; one line that names it.
+        OSError: the target cannot be written.
     """
     target = Path(os.path.realpath(path))
     temporary = target.with_name(f".{target.stem[:32]}.{os.getpid()}{target.suffix}")
@@ -82,7 +82,7 @@ def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
         A dictionary to fill. NaN and infinities in it become null, as JSON has none.
 
     Raises:
-        OSError: the target cannot be written; one line that names it.
+        OSError: the target cannot be written.
     """
     report = {}
     with contextlib.nullcontext() if path is None else writing(path) as temporary:

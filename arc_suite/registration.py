@@ -5,26 +5,28 @@ from typing import Any
 
 import gymnasium
 
-from arc_suite import registry
+from arc_suite import checks, registry
 from arc_suite.arenas import ARENAS
-from arc_suite.cpg.demonstrator import ahead, pattern
-from arc_suite.cpg.presets import SPEEDS, TUNINGS, Preset
-from arc_suite.models.looks import LOOKS
-from arc_suite.models.looks.look import Look
+from arc_suite.cpg.presets import PRESETS
+from arc_suite.cpg.selection import law
+from arc_suite.envs.prepare import prepared
+from arc_suite.models.visuals import VISUALS
+from arc_suite.models.visuals.spec import Visuals
 from arc_suite.registry import MODULES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import TASKS, Task, walk
+from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.contract import STEPS
+from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
 
 
 def register(
     *,
     module: str | None = None,
     body: Body | None = None,
-    walk: Mapping[str, Any] | None = None,
-    tuning: Mapping[str, Preset] | None = None,
-    look: Look | None = None,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    presets: Mapping[str, Any] | None = None,
+    visuals: Visuals | None = None,
     tasks: Iterable[type[Task]] = (),
     arenas: Mapping[str, Any] | None = None,
 ) -> None:
@@ -37,17 +39,17 @@ def register(
         module: whose import makes this call, `__name__` there; processes that do not share this
             one's memory import it to know the names too. None where nobody else needs them.
         body: of the robot; its name becomes a domain.
-        walk: the robot's row of numbers in the task walk: keys and units as in `tasks.walk.SETTINGS`,
-            and any of `tasks.walk.COMMON`; noise that it does not set is fitted, and None has all
-            numbers fitted to the body.
-        tuning: presets of a demonstrator of the robot by name, slow, medium and fast among them; None
-            to have them fitted likewise.
-        look: decorations and colours; None for those that suit any body.
+        parameters: of the robot in tasks, by name of the task: for walk all keys of
+            `tasks.parameters.PARAMETERS["walk"]["queen"]`, in the same units; for other tasks those that differ from
+            walk's. Noise that walk does not set, and all parameters without walk's, are fitted to the body.
+        presets: of the robot's demonstrators by name: a `cpg.prescribed.Preset`, or parameters of
+            another law, see `cpg.selection.LAWS`; those that every body has are fitted where not given.
+        visuals: decorations and colours; None for those that suit any body.
         tasks: classes by the contract of `tasks.contract`, each with its name.
         arenas: functions by name, from a body to the `Arena` that suits it.
 
     Raises:
-        ValueError: a name that is taken, or a number or tuning that does not fit the body; one line,
+        ValueError: a name that is taken, or parameters or a preset that do not fit the body; one line,
             and nothing has been registered.
     """
     module = None if module == "__main__" else module
@@ -57,12 +59,12 @@ def register(
             if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
                 raise ValueError(f"{kind} {name!r} is already registered")
     if body is None:
-        if (walk, tuning, look) != (None, None, None):
-            raise ValueError("walk, tuning and look belong to a body, and none is given")
+        if (parameters, presets, visuals) != (None, None, None):
+            raise ValueError("parameters, presets and visuals belong to a body, and none is given")
         if not (tasks or arenas):
             raise ValueError("nothing to register: give a body, tasks or arenas")
     else:
-        _register_body(body, walk, tuning, look)
+        _register_body(body, parameters or {}, presets, visuals)
         MODULES["domain", body.name] = module
     TASKS.update(tasks)
     ARENAS.update(arenas)
@@ -79,36 +81,39 @@ def _task_name(task) -> str:
     return name
 
 
-def _register_body(body, row, tuning, look) -> None:
+def _register_body(body, parameters, presets, visuals) -> None:
     if not isinstance(body, Body):
         raise ValueError(f"body: expected a spec.Body, got {body!r}")
     if ROBOTS.get(body.name, body) != body:
         raise ValueError(f"robot {body.name!r} is already registered")
-    if row is not None:
-        _check_row(body, row)
-    if tuning is not None:
-        _check_tuning(body, tuning)
+    for task, given in parameters.items():
+        _check_parameters(body, checks.name(task, TASKS, "task of parameters"), given)
+    if presets is not None:
+        _check_presets(body, parameters.get("walk", {}), presets)
     ROBOTS[body.name] = body
-    for table, value in ((walk.SETTINGS, row), (TUNINGS, tuning), (LOOKS, look)):
+    for table, value in (
+        *((PARAMETERS.setdefault(task, {}), given) for task, given in parameters.items()),
+        (PRESETS, presets),
+        (VISUALS, visuals),
+    ):
         if value is not None:
             table[body.name] = value
 
 
-def _check_row(body: Body, row: Mapping[str, Any]) -> None:
-    needed = walk.SETTINGS["queen"].keys() - {"weights", *walk.SHARED_NOISE}
-    if missing := sorted(needed - row.keys()):
-        raise ValueError(f"walk: {body.name} has no {' and no '.join(missing)}")
-    walk.settings(body, row)
+def _check_parameters(body: Body, task: str, given: Mapping[str, Any]) -> None:
+    needed = PARAMETERS["walk"]["queen"].keys() - {"weights", *SHARED_NOISE}
+    if task == "walk" and (missing := sorted(needed - given.keys())):
+        raise ValueError(f"parameters of {task}: {body.name} has no {' and no '.join(missing)}")
+    TASKS[task].settings_for(body, given)
 
 
-def _check_tuning(body: Body, tuning: Mapping[str, Preset]) -> None:
-    if missing := [name for name in SPEEDS if name not in tuning]:
-        raise ValueError(f"tuning: {body.name} has no {' and no '.join(missing)}")
-    for name, preset in tuning.items():
+def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, Any]) -> None:
+    task, _ = prepared(body, "walk", walk)
+    for name, preset in presets.items():
         try:
-            pattern(body, preset), ahead(body, preset)
+            law(task, preset)
         except ValueError as error:
-            raise ValueError(f"tuning {name!r}: {error}") from None
+            raise ValueError(f"preset {name!r}: {error}") from None
 
 
 def register_ids() -> None:

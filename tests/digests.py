@@ -46,13 +46,13 @@ class Case(NamedTuple):
 _MODIFIED = {
     "kicks": {"kicks": 1.5},
     "weaker motors": {"motor_strength": (0.6, 1.0)},
-    "failing leg": {"limp": True},
+    "failing leg": {"actuator_failure": True},
     "friction": {"friction": (0.4, 1.1)},
     "mass": {"mass": (0.8, 1.3)},
     "noise": {"observation_noise": 1.0},
     "delay": {"delay": (0, 3)},
     "position actions": {"actions": "position"},
-    "fewer blocks": {"without": ("contact_forces",)},
+    "fewer blocks": {"exclude_blocks": ("contact_forces",)},
 }
 _SHORT = {"time_limit": 4.0}
 _SETTINGS = {

@@ -21,12 +21,12 @@ STEPS = 30
 # Fields of MjModel that decide the dynamics; exact.
 PREFIXES = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_pos", "body_quat", "body_parentid")
 PREFIXES += ("jnt_", "dof_armature", "dof_damping", "geom_", "actuator_gear", "actuator_ctrl", "qpos0")
-LOOKS = ("geom_rgba", "geom_group", "geom_matid")
+VISUALS = ("geom_rgba", "geom_group", "geom_matid")
 
 
 def compiled(model) -> dict[str, np.ndarray]:
     """The arrays of a compiled model that decide its dynamics."""
-    arrays = {name: getattr(model, name) for name in dir(model) if name.startswith(PREFIXES) and name not in LOOKS}
+    arrays = {name: getattr(model, name) for name in dir(model) if name.startswith(PREFIXES) and name not in VISUALS}
     arrays = {f"model/{name}": np.array(array) for name, array in arrays.items() if isinstance(array, np.ndarray)}
     options = ("timestep", "integrator", "solver", "cone", "iterations", "disableflags", "gravity")
     return arrays | {f"option/{name}": np.array(getattr(model.opt, name)) for name in options}

@@ -77,7 +77,7 @@ MUTANTS = (
     # Simulations.
     Mutant("no sensors, so no contact forces", "option.disableflags = flags\n", "pass\n"),
     Mutant("one substep too few", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
-    Mutant("one substep of rows too few", "simulations.step(rows, nstep - 1)", "simulations.step(rows, nstep - 2)"),
+    Mutant("one substep of rows too few", "simulations.step(mask, nstep - 1)", "simulations.step(mask, nstep - 2)"),
     Mutant("margin of a pair not summed", "model.geom_margin[both].sum()", "model.geom_margin[both].max()"),
     Mutant("friction of a pair not mixed", "friction.max(axis=0)", "friction[0]"),
     Mutant("Euler without damping", "        and model.dof_damping.any()\n", ""),
@@ -90,7 +90,7 @@ MUTANTS = (
     ),
     Mutant("fork unnoticed", "    global count\n    count += 1\n", "    global count\n    count += 0\n"),
     Mutant("batch destroyed in a forked child", "        forks.keep(self._simulations)\n", ""),
-    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos, marks)\n", ""),
+    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos, markers)\n", ""),
     Mutant("user's choice of OpenGL overwritten", '"MUJOCO_GL" not in os.environ and ', ""),
     # Tasks.
     Mutant(
@@ -133,7 +133,7 @@ MUTANTS = (
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
     # Modifiers.
-    Mutant("a leg limp from the start", "memory.elapsed >= LIMP_FROM", "memory.elapsed >= 0"),
+    Mutant("a leg limp from the start", "memory.elapsed >= FAILS_FROM", "memory.elapsed >= 0"),
     Mutant("kicks a step late", "% last + 1 == memory.kick_steps", "% last == memory.kick_steps"),
     Mutant("weak motors give all", "ctrl = memory.strength * inputs.ctrl", "ctrl = inputs.ctrl"),
     Mutant("actions not delayed", "memory, asked = _delayed(memory, action)", "memory, _ = _delayed(memory, action)"),
@@ -176,7 +176,7 @@ MUTANTS = (
     Mutant("two threads in one environment", "not lock.acquire(False)", "False"),
     # Demonstrators and policies.
     Mutant("sign of the sweep", "= -1.0 if leg.side", "= 1.0 if leg.side"),
-    Mutant("steered the wrong way", "copysign(STEERING, froude)", "copysign(STEERING, -froude)"),
+    Mutant("steered the wrong way", "copysign(STEERING, speed)", "copysign(STEERING, -speed)"),
     Mutant("damping has the wrong sign", "- damping * velocities", "+ damping * velocities"),
     Mutant("no crouch", "steps < self.settle", "steps < 0"),
     Mutant("a row walks by another's preset", "for value in values]", "for value in values[::-1]]"),
@@ -216,12 +216,12 @@ MUTANTS = (
     Mutant("the mouse pulls at nothing", "data.xfrc_applied[:] = forces", "data.xfrc_applied[:] = 0.0"),
     # Studies and datasets of agents.
     Mutant("medium agents are the best", "enough = MEDIUM * max(", "enough = max("),
-    Mutant("evaluations under way count", "whole = marks[counts == evaluation.EPISODES]", "whole = marks"),
+    Mutant("evaluations under way count", "marks[counts == evaluation.EPISODES]", "marks"),
     Mutant(
         "runs compared wherever they are", "int(np.flatnonzero(each.steps == max(common))[0]) + 1", "len(each.steps)"
     ),
     Mutant("a run made by two studies", "fcntl.flock(file, fcntl.LOCK_EX", "fcntl.flock(file, fcntl.LOCK_SH"),
-    Mutant("shares of a study overlap", "study.rows[part::parts]", "study.rows[part:]"),
+    Mutant("shares of a study overlap", "study.runs[part::parts]", "study.runs[part:]"),
 )
 
 

@@ -22,7 +22,7 @@ from arc_suite.robots import ROBOTS
 
 FLAGS = flags.FLAGS
 flags.DEFINE_list("robots", list(ROBOTS), "Whose walks.")
-flags.DEFINE_list("rows", ["1", "16", "64", "256", "1024"], "Numbers of rows of the vector environment.")
+flags.DEFINE_list("num_envs", ["1", "16", "64", "256", "1024"], "Numbers of environments of the vector environment.")
 flags.DEFINE_list("workers", None, "Numbers of processes of AsyncVectorEnv; 1, 2 and 4 for each thread by default.")
 flags.DEFINE_integer("rounds", 9, "How often everything is measured in turn.", lower_bound=1)
 flags.DEFINE_integer("steps", 60, "Control steps of one turn; a third of it where there are many rows.", lower_bound=1)
@@ -62,7 +62,7 @@ def main():
             print(tasks.measure(robot, max(threads), FLAGS.rounds), end="\n\n")
         return
     workers = numbers("workers") if FLAGS.workers else [factor * max(threads) for factor in (1, 2, 4)]
-    rows = numbers("rows")
+    rows = numbers("num_envs")
     document = FLAGS.document and report.document(FLAGS.document)
     for path in (FLAGS.json, FLAGS.plot):
         os.makedirs(os.path.dirname(path) or ".", exist_ok=True)

@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/build_model.py."""
-
-from arc_suite.cli import build_model, program
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(build_model.main)
+    main("build_model")

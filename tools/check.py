@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/check.py."""
-
-from arc_suite.cli import check, program
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(check.main)
+    main("check")

@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/collect.py."""
-
-from arc_suite.cli import collect, program
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(collect.main)
+    main("collect")

@@ -17,7 +17,7 @@ from absl import flags
 
 from arc_suite import checks, policies, rotations
 from arc_suite.cli import program
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 
@@ -43,7 +43,7 @@ MODIFIERS = [
 def modifiers(body) -> list[dict]:
     """Settings of the rows of a table: those of every body, and each leg of its left side limp."""
     legs = [index for index, leg in enumerate(body.legs) if leg.foot_position[1] > 0.0]
-    return [*MODIFIERS, *({"limp": leg} for leg in legs)]
+    return [*MODIFIERS, *({"actuator_failure": leg} for leg in legs)]
 
 
 def episodes(task: str, body, settings: dict, policy: str, preset: str, command=None) -> dict[str, np.ndarray]:
@@ -54,7 +54,7 @@ def episodes(task: str, body, settings: dict, policy: str, preset: str, command=
     seeds = range(FLAGS.seed, FLAGS.seed + count)
     with contextlib.closing(rows):
         observations, _ = rows.reset(seed=FLAGS.seed)
-        acting.begin(range(count), seeds)
+        acting.reset(range(count), seeds)
         if command is not None:
             rows.command("command", command)
         first, totals, rewards = rows.batch.data.qpos[:, :7].copy(), np.zeros(count), np.zeros(count)

@@ -11,7 +11,7 @@ for python in python3.11 python3.12 python3 none; do
 done
 if [ "$python" = none ]; then
     found=$(python3 -V 2>/dev/null || echo "no Python")
-    echo "arc_suite needs Python 3.11 or 3.12, found $found: install one, such as by 'uv python install 3.12', or see 'Python 3.13' in the README" >&2
+    echo "arc_suite needs Python 3.11 or 3.12, found $found: install one, such as by 'uv python install 3.12', or see 'Python 3.13' in docs/install.md" >&2
     exit 1
 fi
 if ! "$python" -c 'import ensurepip' 2>/dev/null; then

@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/evaluate.py."""
-
-from arc_suite.cli import evaluate, program
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(evaluate.main)
+    main("evaluate")

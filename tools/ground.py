@@ -15,7 +15,7 @@ from absl import flags
 from arc_suite import checks, evaluation, policies
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
 
@@ -36,7 +36,7 @@ def played(task: str, robot: str, preset: str, difficulty: float) -> list[evalua
     name, preset = ("zero", "medium") if preset == "zero" else ("cpg", preset)
     with contextlib.closing(rows):
         policy = policies.policy(name, robot, preset, FLAGS.episodes, task=rows.task)
-        return evaluation.episodes_in_rows(rows, policy, range(FLAGS.episodes))
+        return evaluation.episodes_in_batch(rows, policy, range(FLAGS.episodes))
 
 
 def cell(episodes: list[evaluation.Episode]) -> str:

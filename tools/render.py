@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/render.py."""
-
-from arc_suite.cli import program, render
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(render.main)
+    main("render")

@@ -11,7 +11,7 @@ from absl import flags
 import arc_suite
 from arc_suite import checks, evaluation, files, policies
 from arc_suite.cli import films, program
-from arc_suite.cpg.demonstrator import suited_preset
+from arc_suite.cpg import suited_preset
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 

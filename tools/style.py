@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/style.py."""
-
-from arc_suite.cli import program, style
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(style.main)
+    main("style")

@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/tune_cpg.py."""
-
-from arc_suite.cli import program, tune_cpg
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(tune_cpg.main)
+    main("tune_cpg")

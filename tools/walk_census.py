@@ -1,6 +1,4 @@
-"""Run arc_suite/cli/survey.py."""
-
-from arc_suite.cli import program, survey
+from arc_suite.cli.main import main
 
 if __name__ == "__main__":
-    program.run(survey.main)
+    main("survey")

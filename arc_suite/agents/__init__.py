@@ -1,26 +1,17 @@
-"""Agents: what learns a task, one command from nothing to a policy that every program takes.
+"""Agents: training of policies, one command from nothing to a policy that every program takes.
 
-An algorithm is a row of `algorithms.ALGORITHMS`: a module that learns, and numbers. The numbers are a
-frozen dataclass, whose fields `arc-suite train --row name=value` overrides. The module is imported
-when it is wanted, as it needs JAX, and has one function:
+An algorithm is an entry of `algorithms.ALGORITHMS`: a module that learns, and hyperparameters. Hyperparameters are a
+frozen dataclass, whose fields `arc-suite train --hp name=value` overrides. The module is imported when it is used,
+as it needs JAX, and has one function, a training script that reads from top to bottom:
 
-    begin(row, stage) -> Learner
+    learn(hp, context) -> Iterator[Slice]
 
-`stage` (a `learner.Stage`) says what is learned and makes environments. A `Learner` has
+`context` (a `learner.RunContext`) says what is learned and makes environments. Each `learner.Slice` has the
+environment steps so far, metrics for training.csv, the policy, and the arrays of a checkpoint. A slice ends at the
+latest where the next evaluation is due. `context.checkpoint` has the arrays of an earlier slice: learning resumes
+from them bit-exactly.
 
-    step                    environment steps that are done with; a run ends when they are enough
-    advance(limit)          learns a slice, seconds long, up to `limit` steps at most, and returns figures by
-                            name, a line of training.csv, or None where no line is due
-    policy()                the deterministic policy's layers, `policies.network.Layer`s
-    arrays()                everything that it goes on from, NumPy arrays by name: a checkpoint
-    restore(arrays)         goes on from there, to the same bits
-
-and, if it leaves the calls of its compiled functions to whoever drives it, so that those of many runs can be one
-program (`calls`, `together`),
-
-    calls(limit)            does what `advance` does, and yields each call, a `calls.Call`
-
-`training.train` does the rest: it evaluates, writes the folder of the run, and resumes. All that is
-random is drawn from generators seeded by the run's seed, a purpose and a count (`learner.generator`), so
-that nothing of it needs to be kept. Environments go on from `VectorEnv.snapshot()`.
+`training.train` does the rest: it evaluates, writes the folder of the run, and resumes. All random numbers come from
+generators seeded by the run's seed, a purpose and a count (`learner.generator`), so checkpoints need no random state.
+Environments resume from `VectorEnv.snapshot()`.
 """

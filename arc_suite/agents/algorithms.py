@@ -1,27 +1,28 @@
-"""Algorithms by name: rows of numbers over what learns. Nothing here needs JAX."""
+"""Algorithms by name: hyperparameters of learners. Nothing here needs JAX."""
 
 import dataclasses
 import importlib
+from collections.abc import Mapping
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from arc_suite import checks
-from arc_suite.agents.rows import Cloning, Imitation, ProximalPolicy, SoftActorCritic
+from arc_suite.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
 
 
 class Algorithm(NamedTuple):
     """An algorithm.
 
     Attributes:
-        learner: the module that learns, by its full name; see `arc_suite.agents`.
-        row: its numbers, a frozen dataclass.
-        summary: what it is, in a line.
-        evaluate_every: environment steps between evaluations.
-        steps: environment steps of a run, if it is not told otherwise.
+        learner: full name of the module that learns; see `arc_suite.agents`.
+        hyperparameters: a frozen dataclass.
+        summary: a line for people.
+        evaluate_every: environment steps between evaluations, by default.
+        steps: environment steps of a run, by default.
     """
 
     learner: str
-    row: Any
+    hyperparameters: Any
     summary: str
     evaluate_every: int = 10_000
     steps: int = 1_000_000
@@ -31,7 +32,7 @@ class Algorithm(NamedTuple):
         """The module that learns.
 
         Raises:
-            ValueError: something that it needs is not installed; one line.
+            ValueError: a package is not installed; one line.
         """
         try:
             return importlib.import_module(self.learner)
@@ -40,26 +41,28 @@ class Algorithm(NamedTuple):
                 raise ValueError(f"learner {self.learner}: {error}") from None
             raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
 
-    def with_row(self, changes: dict[str, Any]) -> "Algorithm":
-        """Return the algorithm with some numbers of its row changed.
+    def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Algorithm":
+        """Return the algorithm with some hyperparameters changed.
 
         Raises:
-            ValueError: no such number, or one of another kind; one line.
+            ValueError: no such hyperparameter, or a value of another type; one line.
         """
-        fields = {field.name: getattr(self.row, field.name) for field in dataclasses.fields(self.row)}
+        fields = dataclasses.asdict(self.hyperparameters)
         for name, value in changes.items():
-            kind = type(fields[checks.name(name, fields, "number of the row")])
+            kind = type(fields[checks.name(name, fields, "hyperparameter")])
             kinds = (int, float) if kind is float else kind
             if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
-                raise ValueError(f"row {name}: expected {kind.__name__} like {fields[name]!r}, got {value!r}")
-        return self._replace(row=dataclasses.replace(self.row, **changes))
+                raise ValueError(
+                    f"hyperparameter {name}: expected {kind.__name__} like {fields[name]!r}, got {value!r}"
+                )
+        return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changes))
 
 
 _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 _OFF_POLICY = "arc_suite.agents.off_policy"
 
-# The paper's six, as its published code runs them, and what goes beyond the paper: docs/agents.md.
+# The paper's six, as in its published code, and others: docs/agents.md.
 ALGORITHMS = {
     "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
     "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
@@ -67,46 +70,50 @@ ALGORITHMS = {
         _OFF_POLICY, dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"
     ),
     "sacfd": Algorithm(
-        _OFF_POLICY, dataclasses.replace(_SAC, prior="fenced"), "SAC with prior data in its buffer, never overwritten"
+        _OFF_POLICY,
+        dataclasses.replace(_SAC, prior="protected"),
+        "SAC with prior data in its buffer, never overwritten",
     ),
     "speq_o2o": Algorithm(
-        _OFF_POLICY, dataclasses.replace(_SPEQ, prior="beside"), "SPEQ with a batch of prior data in every update"
+        _OFF_POLICY,
+        dataclasses.replace(_SPEQ, prior="symmetric_sampling"),
+        "SPEQ with a batch of prior data in every update",
     ),
     "sope": Algorithm(
         _OFF_POLICY,
-        dataclasses.replace(_SPEQ, prior="beside", early_stop="published"),
+        dataclasses.replace(_SPEQ, prior="symmetric_sampling", early_stop="published"),
         "SPEQ-O2O with phases that stop early",
     ),
     # Beyond the paper: DroQ (Hiraoka et al., "Dropout Q-functions for doubly efficient reinforcement learning", 2022).
     "droq": Algorithm(
         _OFF_POLICY,
-        dataclasses.replace(_SAC, dropout=0.01, updates_per_step=20),
+        dataclasses.replace(_SAC, dropout=0.01, utd_ratio=20),
         "SAC with 20 updates of critics with dropout in every step",
     ),
     "ppo": Algorithm(
         "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
     ),
-    # Small steps about a policy that is good already: the noise of learning from nothing would undo it.
+    # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": Algorithm(
         "arc_suite.agents.on_policy",
         ProximalPolicy(
-            first_std=0.1,
-            last_std=0.04,
-            first_divergence=0.008,
-            last_divergence=0.004,
+            initial_std=0.1,
+            final_std=0.04,
+            initial_desired_kl=0.008,
+            final_desired_kl=0.004,
             policy_rate=1e-5,
-            warm_up=320,
+            value_warm_up=320,
         ),
-        "proximal policy optimisation from the policy of another run, --row start=FOLDER",
+        "proximal policy optimisation from the policy of another run, --hp start=FOLDER",
         evaluate_every=100_000,
         steps=500_000,
     ),
-    "imitation": Algorithm(
-        "arc_suite.agents.imitation", Imitation(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
+    "dagger": Algorithm(
+        "arc_suite.agents.dagger", DAgger(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
     ),
     # Its steps are updates.
-    "cloning": Algorithm(
-        "arc_suite.agents.cloning", Cloning(), "behaviour cloning of a dataset", evaluate_every=2500, steps=5000
+    "bc": Algorithm(
+        "arc_suite.agents.bc", BehaviourCloning(), "behaviour cloning of a dataset", evaluate_every=2500, steps=5000
     ),
 }
 

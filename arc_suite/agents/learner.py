@@ -1,111 +1,109 @@
-"""What a learner is given and what it has to be; see `arc_suite.agents`."""
+"""The interface of learners: what `learn` is given and what it yields; see `arc_suite.agents`."""
 
+import contextlib
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
+from arc_suite import checks
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.network import Layer
-from arc_suite.robots.spec import Body
 
-_SEEDS = 100_000  # of the environments of a run; those below are left for judging
+_SEEDS = 100_000  # of the environments of a run; those below are left for evaluation
 MOST_SEEDS = 40_000
-ENVIRONMENT = "environment/"  # with which names in `Learner.arrays` begin of what is not learnt, and may be NaN
+ENVIRONMENT = "environment/"  # prefix of the names in a checkpoint that are not learned, and may be NaN
 
 
 class Diverged(ValueError):
-    """Numbers of a learner are no longer finite."""
+    """A value of the learner is not finite."""
+
+    def __init__(self, what: str, step: int):
+        """Name the value and the environment step."""
+        super().__init__(f"the learner diverged: {what} at step {step}; the checkpoint before stays")
 
 
-class Stage(NamedTuple):
-    """What is learned, and where.
+class Damaged(ValueError):
+    """The checkpoint lacks something, or does not fit."""
+
+
+class RunContext(NamedTuple):
+    """The run that a learner learns in.
 
     Attributes:
-        body: what moves.
-        task: name of the task.
-        task_kwargs: its settings, as in `arc_suite.load`.
+        setup: body, task and settings.
         seed: of the run.
         steps: environment steps of the run.
+        evaluate_every: environment steps between evaluations.
         folder: of the run.
         prior: id of a dataset of prior data; None for none.
-        threads: on which rows are simulated; nothing depends on it but time.
-        resumed: whether `Learner.restore` follows, so that nothing need be read of where learning starts.
+        threads: of the simulation; results do not depend on it.
+        checkpoint: arrays of the latest `Slice` to resume from; None for a new run.
     """
 
-    body: Body
-    task: str
-    task_kwargs: Mapping[str, Any]
+    setup: Setup
     seed: int
     steps: int
+    evaluate_every: int
     folder: Path
     prior: str | None = None
     threads: int = 1
-    resumed: bool = False
+    checkpoint: Mapping[str, np.ndarray] | None = None
 
-    def environment(self, rows: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv:
-        """Return rows to learn in, seeded apart from those of evaluations and of other runs.
+    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv:
+        """Return environments to learn in, seeded apart from evaluation and from other runs.
 
         Their `reset()` begins the first episodes.
         """
-        settings = {**self.task_kwargs, "random": _SEEDS * (1 + self.seed)}
-        return VectorEnv(self.body, self.task, rows, self.threads, mode, task_kwargs=settings)
+        seed = _SEEDS * (1 + self.seed)
+        return self.setup.make_vec(num_envs, seed=seed, num_threads=self.threads, autoreset_mode=mode)
+
+    def next_evaluation(self, step: int) -> int:
+        """Return the environment step of the first evaluation after `step`."""
+        return min((step // self.evaluate_every + 1) * self.evaluate_every, self.steps)
 
 
-class Learner(Protocol):
-    """What learns, an object that goes from slice to slice.
-
-    One that has `calls` too, a generator that does what `advance` does and yields each call of a compiled function
-    (`arc_suite.agents.calls`), can learn beside others in one program.
+class Slice(NamedTuple):
+    """A slice of learning, seconds long.
 
     Attributes:
-        step: environment steps that are done with.
+        step: environment steps so far.
+        metrics: by name, always the same names: a line of training.csv; None for no line.
+        policy: layers of the deterministic policy, from the flat observation to actions in [-1, 1].
+        checkpoint: everything that learning resumes from, arrays by name.
     """
 
     step: int
+    metrics: Mapping[str, float] | None
+    policy: Sequence[Layer]
+    checkpoint: dict[str, np.ndarray]
 
-    def advance(self, limit: int) -> Mapping[str, float] | None:
-        """Learn a slice.
 
-        Args:
-            limit: where `step` may stand afterwards at most, or about there for learners of many rows.
-
-        Returns:
-            Figures by name, always the same names: a line of training.csv; None where no line is due.
-
-        Raises:
-            Diverged: numbers are no longer finite; one line.
-        """
-
-    def policy(self) -> Sequence[Layer]:
-        """Return the layers of the deterministic policy, from the flat observation to actions in [-1, 1]."""
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Return all that it goes on from, by name."""
-
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from what `arrays` has returned.
-
-        Raises:
-            KeyError, ValueError: something in it is missing or does not fit.
-        """
+@contextlib.contextmanager
+def restoring() -> Iterator[None]:
+    """Raise `Damaged` in place of the errors of a checkpoint that lacks something or does not fit."""
+    try:
+        yield
+    except (KeyError, ValueError) as error:
+        raise Damaged(checks.quoted(error)) from None
 
 
 def generator(seed: int, purpose: str, count: int) -> np.random.Generator:
-    """Return the generator of random numbers for one purpose of a run, such as its 1000th update."""
+    """Return the random generator of one purpose of a run, such as its 1000th update."""
     return np.random.default_rng((seed, zlib.crc32(purpose.encode()), count))
 
 
 def environment_arrays(environment: VectorEnv) -> dict[str, np.ndarray]:
-    """Return the snapshot of an environment, named as part of `Learner.arrays`."""
+    """Return the snapshot of an environment as part of a checkpoint."""
     return {f"{ENVIRONMENT}{name}": array for name, array in environment.snapshot().items()}
 
 
 def restore_environment(environment: VectorEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Let an environment go on from `environment_arrays`, and return its observations (rows, size)."""
+    """Restore an environment from `environment_arrays`, and return its observations (num_envs, size)."""
     snapshot = {name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)}
     environment.restore(snapshot)
     return snapshot["observation"]

@@ -1,7 +1,7 @@
 """Networks as plain pytrees of JAX: a network is a tuple of layers, a layer a dictionary of arrays.
 
 A layer has `weight` (inputs, outputs) and `bias` (outputs,), and `scale` and `offset` (outputs,) where a
-layer norm follows. Numbers are drawn by NumPy, so that they depend on a seed alone.
+layer norm follows. NumPy draws the weights, so they depend on a seed alone.
 """
 
 import math
@@ -71,7 +71,7 @@ def linear(layer: Mapping, x):
 
 
 def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dropout: float = 0.0):
-    """Return what hidden layers make of x (..., inputs): linear, dropout, layer norm if it has one, activation.
+    """Return the output of hidden layers for x (..., inputs): linear, dropout, layer norm if it has one, activation.
 
     Args:
         layers: of the network.
@@ -89,7 +89,7 @@ def hidden(layers: Sequence[Mapping], x, activation: str = "relu", kept=None, dr
 
 
 def dropped(x, kept, dropout: float):
-    """Return x with 0 where units are not kept, and the others scaled by what dropout takes away."""
+    """Return x with 0 where units are not kept, and the others divided by 1 - dropout."""
     return jnp.where(kept, x * (1.0 / (1.0 - dropout)), 0.0)
 
 

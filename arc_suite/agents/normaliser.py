@@ -1,4 +1,4 @@
-"""Running moments of observations, by which networks see numbers of like size."""
+"""Running mean and variance of observations, for normalised inputs of networks."""
 
 from collections.abc import Mapping
 from typing import NamedTuple, Self
@@ -9,7 +9,7 @@ from arc_suite.policies.network import Layer
 
 LIMIT = 5.0  # of a normalised number
 _NAME = "normaliser"
-_LEAST = 1e-3  # standard deviation, so that what hardly ever moves does not shout when it does
+_LEAST = 1e-3  # lower bound of the standard deviation, for near-constant inputs
 
 
 class Moments(NamedTuple):
@@ -44,19 +44,19 @@ class Moments(NamedTuple):
         )
 
     def layer(self) -> Layer:
-        """Return the layer that normalises by them."""
+        """Return the layer that normalises observations."""
         deviation = np.sqrt(self.squares / max(self.count, 1.0))
         factor = 1.0 / np.maximum(deviation, _LEAST) if self.count else np.ones_like(deviation)
         return Layer("normalise", tuple(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))
 
 
 def stored(layer: Layer) -> dict[str, np.ndarray]:
-    """Return the arrays of a layer that normalises, by name, as a learner stores them."""
+    """Return the arrays of a normalising layer by name: part of a checkpoint."""
     return {f"{_NAME}/{place}": array for place, array in enumerate(layer.arrays)}
 
 
 def restored(arrays: Mapping[str, np.ndarray]) -> Layer:
-    """Return the layer that was `stored`.
+    """Return the layer of the arrays that `stored` gave.
 
     Raises:
         KeyError: arrays of it are missing.

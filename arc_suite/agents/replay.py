@@ -1,9 +1,8 @@
-"""Transitions in files that are mapped into memory: the latest ones of a run, and prior data.
+"""Replay buffers in memory-mapped files: the latest transitions of a run, and prior data.
 
-An observation is stored once: the next one of a transition is that of the transition after it, but for
-those that end an episode, which lie in a file of their own. So a million transitions of Queen take 0.9 GB,
-which the system may write back and read again as it likes. Files are of full size from the start, so that a
-disk that is too small is found out at once.
+An observation is stored once, as the next one of a transition is the observation of the transition after it. Last
+observations of episodes are in a file of their own. A million transitions of Queen take 0.9 GB. Files have their
+full size from the start, so a disk that is too small is an error at the start.
 """
 
 import os
@@ -38,8 +37,8 @@ class Transitions(NamedTuple):
 class Replay:
     """The latest transitions of a stream of episodes, in files of a folder.
 
-    Nothing is overwritten that could be sampled `slack` transitions ago, so that a run goes on from
-    a checkpoint that is not older.
+    Transitions that could be sampled `slack` transitions ago are not overwritten, so a run can resume from a
+    checkpoint that is not older.
 
     Attributes:
         total: transitions added since the start.
@@ -47,7 +46,7 @@ class Replay:
     """
 
     def __init__(self, folder: Path, capacity: int, size: int, joints: int, slack: int = 0, mode: str = "r+"):
-        """Map the files, made if need be.
+        """Map the files, after making them where they are missing.
 
         Args:
             folder: of the files.
@@ -55,7 +54,7 @@ class Replay:
             size: of an observation.
             joints: of an action.
             slack: further transitions that are kept.
-            mode: "r+", or "r" for files that are there and are read alone.
+            mode: "r+", or "r" to only read existing files.
 
         Raises:
             OSError: the disk is full, or the like; one line.
@@ -71,7 +70,7 @@ class Replay:
         self.total = self.ends = 0
 
     def __len__(self) -> int:
-        """Return how many transitions can be sampled."""
+        """Return the number of transitions that can be sampled."""
         return min(self.total, self._capacity)
 
     def add(self, observation, action, reward: float, terminated: bool, next_observation, is_last: bool) -> None:
@@ -88,7 +87,7 @@ class Replay:
         self.total += 1
 
     def at(self, indices: np.ndarray) -> Transitions:
-        """Return copies of transitions by index, from the oldest that can be sampled on.
+        """Return copies of transitions by index; index 0 is the oldest.
 
         Args:
             indices: (batch,) from 0 to `len` - 1.
@@ -104,7 +103,7 @@ class Replay:
         return Transitions(*numbers, nexts)
 
     def restore(self, total: int, ends: int) -> None:
-        """Go on from where there were so many transitions, `slack` ago at most, and so many ends of episodes."""
+        """Resume with the given counters; at most `slack` later transitions may be on disk."""
         self.total, self.ends = total, ends
         self._make_room(ends)
 
@@ -130,19 +129,19 @@ class Replay:
         return np.memmap(path, dtype, self._mode, shape=shape)
 
 
-class Fenced:
-    """Two sources of transitions as one, the first of which is never overwritten."""
+class Protected:
+    """Two sources of transitions in one: prior data, which are never overwritten, and a buffer."""
 
     def __init__(self, first: Replay, second: Replay):
         """Take the sources."""
         self._first, self._second = first, second
 
     def __len__(self) -> int:
-        """Return how many transitions can be sampled."""
+        """Return the number of transitions that can be sampled."""
         return len(self._first) + len(self._second)
 
     def at(self, indices: np.ndarray) -> Transitions:
-        """Return copies of transitions by index, those of the first source before those of the second.
+        """Return copies of transitions by index; those of the first source come first.
 
         Args:
             indices: (batch,) from 0 to `len` - 1.

@@ -1,13 +1,13 @@
-"""The folder of a run: plain files, whole whatever happens, from which the same run goes on.
+"""The folder of a run: plain files, complete after a kill at any moment, from which the run resumes.
 
-    config.json         all that the run depends on
+    config.json         the configuration, with hashes and versions
     evaluations.csv     a line for each episode of each evaluation
-    training.csv        what the learner says of itself
+    training.csv        metrics of the learner
     times.csv           seconds, which are never the same twice
-    checkpoint.npz      what the learner goes on from, and how long the tables were then
+    checkpoint.npz      arrays of the learner, and the lengths of the tables
     policy.npz          the policy of the latest evaluation
 
-Tables only grow; on going on they are cut back to where they were at the checkpoint.
+Tables only grow; a run that resumes cuts them back to their lengths at the checkpoint.
 """
 
 import contextlib
@@ -26,8 +26,8 @@ from arc_suite import checks, files
 CONFIG, CHECKPOINT = "config.json", "checkpoint.npz"
 TABLES = ("evaluations", "training", "times")
 
-_PROGRESS = "progress"  # the text in a checkpoint that is not the learner's
-# What damage makes NumPy and zipfile raise.
+_PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
+# Errors of NumPy and zipfile for damaged files.
 _DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError)
 
 
@@ -37,11 +37,11 @@ class RunFolder:
     Attributes:
         path: of the folder.
         arrays: of the learner at the checkpoint; None before the first.
-        progress: what `save` was given beside them, plain values.
+        progress: plain values, given to `save` with the arrays.
     """
 
     def __init__(self, path: Path, arrays: dict[str, np.ndarray] | None, progress: dict[str, Any]):
-        """Take what was read, and cut the tables back."""
+        """Cut the tables back to the checkpoint."""
         self.path, self.arrays, self.progress = path, arrays, progress
         lengths = progress.get("tables", {})
         self._files = {name: (path / f"{name}.csv").open("ab", buffering=0) for name in TABLES}
@@ -55,18 +55,18 @@ class RunFolder:
             first = (path / f"{name}.csv").read_text().partition("\n")[0]
             self._columns[name] = first.split(",") if first else None
 
-    def append(self, table: str, row: Mapping[str, float]) -> None:
-        """Add a line to a table, whose first line names the columns.
+    def append(self, table: str, line: Mapping[str, float]) -> None:
+        """Add a line to a table; its first line names the columns.
 
         Raises:
             OSError: the disk is full, or the like.
         """
         if self._columns[table] is None:
-            self._columns[table] = list(row)
-            self._write(table, ",".join(row))
-        if list(row) != self._columns[table]:
-            raise ValueError(f"{self.path / table}.csv: expected columns {self._columns[table]}, got {list(row)}")
-        self._write(table, ",".join(_cell(value) for value in row.values()))
+            self._columns[table] = list(line)
+            self._write(table, ",".join(line))
+        if list(line) != self._columns[table]:
+            raise ValueError(f"{self.path / table}.csv: expected columns {self._columns[table]}, got {list(line)}")
+        self._write(table, ",".join(_cell(value) for value in line.values()))
 
     def save(self, arrays: Mapping[str, np.ndarray], progress: Mapping[str, Any]) -> None:
         """Replace the checkpoint.
@@ -97,17 +97,16 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
 
     Args:
         path: of the folder.
-        config: all that the run depends on, plain values.
+        config: record of the configuration, plain values.
 
     Raises:
-        ValueError: the folder belongs to another run, is none of a run, is damaged, or another process
-            writes to it; one line.
+        ValueError: the folder is of another run or of none, or damaged, or another process writes to it; one line.
         OSError: it cannot be read or written; one line.
     """
     path = files.folder(path)
     with contextlib.ExitStack() as stack:
         stack.enter_context(files.locked(path, f"{path}: another process goes on with this run"))
-        _check(path, json.loads(json.dumps(config)))
+        _configure(path, config)
         files.delete_unfinished(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
@@ -115,7 +114,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
 
 
 def config_of(path: str | os.PathLike) -> dict[str, Any]:
-    """Return the configuration of a run from its folder.
+    """Return the record of the configuration in a run's folder.
 
     Raises:
         ValueError: no folder of a run; one line.
@@ -130,7 +129,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
 
 
 def progress_of(path: str | os.PathLike) -> dict[str, Any]:
-    """Return what `RunFolder.save` was last given as progress; nothing where there is no checkpoint.
+    """Return the progress of the latest checkpoint; empty without a checkpoint.
 
     Raises:
         ValueError: the checkpoint is damaged; one line.
@@ -144,30 +143,30 @@ def latest_returns(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence[str] = ()) -> None:
-    """Compare a configuration with that of a folder.
+    """Compare a record with that of a folder.
 
     Args:
         path: of the folder.
-        config: all that the run depends on, plain values.
+        config: record of a configuration.
         left_out: names in it that may differ.
 
     Raises:
-        ValueError: the folder belongs to another run, or to none; one line.
+        ValueError: the folder is of another run, or of none; one line.
     """
-    for name, was, wanted in _differences(config_of(path), config):
+    for name, there, here in _differences(config_of(path), json.loads(json.dumps(config))):
         if name.partition(".")[0] not in left_out:
             raise ValueError(
-                f"{path}: of another run, whose {name} is {was!r}, and not {wanted!r}; write to another folder"
+                f"{path}: of another run, whose {name} is {there!r}, and not {here!r}; write to another folder"
             )
 
 
 def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
-    """Return a table of a run's folder: columns by name, none as long as there is no line.
+    """Return a table of a run's folder: columns by name, none before the first line.
 
-    Whatever of a line is being written is left out.
+    A line that is still being written is left out.
 
     Raises:
-        ValueError: the folder has no such table, or a damaged one; one line.
+        ValueError: no such table, or a damaged one; one line.
     """
     path = Path(path) / f"{name}.csv"
     try:
@@ -181,26 +180,30 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
         raise ValueError(f"{path}: no table of a run: {checks.quoted(error)}") from None
 
 
-def _check(path: Path, config: dict[str, Any]) -> None:
-    """Compare the configuration with the folder's, or write it where no run has begun."""
+def is_begun(path: str | os.PathLike) -> bool:
+    """Return whether the run of a folder has begun: it has a checkpoint, or a line in a table."""
+    tables = [Path(path) / f"{name}.csv" for name in TABLES]
+    return (Path(path) / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)
+
+
+def _configure(path: Path, config: Mapping[str, Any]) -> None:
+    """Compare the record with the folder's, or write it if no run has begun."""
     others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
     if others and CONFIG not in others:
         raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
-    tables = [path / f"{name}.csv" for name in TABLES]
-    if others and ((path / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)):
-        check(path, config)
-        return
+    if is_begun(path):
+        return check(path, config)
     with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused
         file.update(config)
 
 
-def _differences(was: Mapping, wanted: Mapping, above: str = "") -> Iterator[tuple[str, Any, Any]]:
-    for name in dict.fromkeys((*wanted, *was)):
-        here, there = wanted.get(name), was.get(name)
-        if isinstance(here, dict) and isinstance(there, dict):
-            yield from _differences(there, here, f"{above}{name}.")
-        elif here != there:
-            yield f"{above}{name}", there, here
+def _differences(there: Mapping, here: Mapping, above: str = "") -> Iterator[tuple[str, Any, Any]]:
+    for name in dict.fromkeys((*here, *there)):
+        one, other = there.get(name), here.get(name)
+        if isinstance(one, dict) and isinstance(other, dict):
+            yield from _differences(one, other, f"{above}{name}.")
+        elif one != other:
+            yield f"{above}{name}", one, other
 
 
 def _checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndarray] | None, dict[str, Any]]:

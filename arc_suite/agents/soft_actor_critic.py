@@ -1,13 +1,11 @@
 """Soft actor-critic (Haarnoja et al., 2018) as pure functions of plain pytrees.
 
-One update runs in this order, as in the published code of the ARC-RL paper: the target with the
-temperature of the update before and an action of the present policy; the gradient of the critics' loss;
-the policy's loss on the same observations with critics that have not moved yet, and its gradient; then
-the steps of temperature, critics and policy, and last the targets. The policy ascends the mean of the
-critics, not their minimum. Dropout, before the layer norm, is at work in the targets and in the policy's
-loss too.
+One update has the order of the published code of the ARC-RL paper. The target uses the temperature of the update
+before and an action of the present policy. Then come the gradients of the critics' loss, and of the policy's loss
+with the critics of before; the steps of temperature, critics and policy; last the targets. The policy ascends the
+mean of the critics, not their minimum. Dropout, before the layer norm, also acts in targets and policy loss.
 
-Noise and dropout masks are inputs, so that an update is a function of what it is given.
+Noise and dropout masks are inputs, so an update is a pure function.
 """
 
 import math
@@ -20,11 +18,10 @@ import numpy as np
 import optax
 
 from arc_suite.agents import networks
+from arc_suite.agents.hyperparameters import SoftActorCritic
 from arc_suite.agents.replay import Transitions
-from arc_suite.agents.rows import SoftActorCritic
 from arc_suite.policies.network import Layer
 
-NUMBERS = ("hidden", "learning_rate", "discount", "averaging", "dropout")  # of a row, that an update depends on
 CRITICS = 2
 HIDDEN_LAYERS = 2
 LOG_STD = (-20.0, 2.0)  # bounds of the logarithm of the policy's standard deviation
@@ -33,12 +30,18 @@ _TINY = 1e-6  # keeps the logarithm of the density finite where tanh saturates
 _LOG_TWO_PI = math.log(2.0 * math.pi)
 
 
+def core(hp: SoftActorCritic) -> SoftActorCritic:
+    """Return hyperparameters that differ only where updates do, so that compiled programs are shared."""
+    names = "hidden", "learning_rate", "discount", "tau", "dropout"
+    return SoftActorCritic(**{name: getattr(hp, name) for name in names})
+
+
 class State(NamedTuple):
     """What an update changes.
 
     Attributes:
         policy: `trunk`, the hidden layers; `mean` and `log_std`, layers of their own on top.
-        critics: networks of observation and action beside each other, to a value.
+        critics: networks of concatenated observation and action, to a value.
         targets: like the critics.
         log_alpha: logarithm of the temperature.
         moments: of Adam by what it moves: policy, critics, log_alpha.
@@ -52,13 +55,13 @@ class State(NamedTuple):
 
 
 class Noise(NamedTuple):
-    """What is random in an update.
+    """The random inputs of an update.
 
     Attributes:
         next_action: (batch, joints) standard normal, of the action in the target.
-        action: (batch, joints) likewise, of the action in the policy's loss; None where that is left out.
+        action: (batch, joints) standard normal, of the action in the policy's loss; None for critics alone.
         kept: (uses, critics, hidden layers, batch, hidden) booleans, the units that dropout keeps; uses are
-            the targets, the critics' loss and the policy's loss, if there is one; None without dropout.
+            targets, critics' loss and policy's loss, if there is one; None without dropout.
     """
 
     next_action: Any
@@ -66,36 +69,36 @@ class Noise(NamedTuple):
     kept: Any
 
 
-def begin(row: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> State:
-    """Draw the networks for observations of a size and actions of so many joints."""
-    hidden = [row.hidden] * HIDDEN_LAYERS
+def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> State:
+    """Draw the networks for observations (size,) and actions (joints,)."""
+    hidden = [hp.hidden] * HIDDEN_LAYERS
     *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True)
-    log_std = networks.layer(networks.xavier(random, row.hidden, joints))
+    log_std = networks.layer(networks.xavier(random, hp.hidden, joints))
     policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
     critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
-    adam, log_alpha = optimiser(row), np.zeros((), np.float32)
+    adam, log_alpha = optimiser(hp), np.zeros((), np.float32)
     moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
     return jax.tree.map(jnp.array, State(policy, critics, critics, log_alpha, moments))
 
 
-def optimiser(row: SoftActorCritic) -> optax.GradientTransformation:
+def optimiser(hp: SoftActorCritic) -> optax.GradientTransformation:
     """Return Adam, (0.9, 0.999), 1e-8."""
-    return optax.adam(row.learning_rate)
+    return optax.adam(hp.learning_rate)
 
 
-def noise(row: SoftActorCritic, random: np.random.Generator, batch: int, joints: int, with_policy: bool) -> Noise:
-    """Draw what is random in an update of a batch, with the policy's loss or of critics alone."""
+def noise(hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: int, with_policy: bool) -> Noise:
+    """Draw the random inputs of an update, with the policy's loss or of critics alone."""
     next_action = random.standard_normal((batch, joints), np.float32)
     action = random.standard_normal((batch, joints), np.float32) if with_policy else None
-    shape = (3 if with_policy else 2, CRITICS, HIDDEN_LAYERS, batch, row.hidden)
-    return Noise(next_action, action, kept(random, shape, row.dropout) if row.dropout else None)
+    shape = (3 if with_policy else 2, CRITICS, HIDDEN_LAYERS, batch, hp.hidden)
+    return Noise(next_action, action, kept(random, shape, hp.dropout) if hp.dropout else None)
 
 
 def kept(random: np.random.Generator, shape: tuple[int, ...], dropout: float) -> np.ndarray:
-    """Draw booleans of a shape, each False with the probability `dropout`, on its own.
+    """Draw independent booleans of a shape, each False with the probability `dropout`.
 
-    What is drawn are the gaps between those that are False, which have a geometric distribution: where
-    few units are dropped, that takes a fraction of the time.
+    It draws the gaps between dropped units, which have a geometric distribution: for small `dropout` that takes a
+    fraction of the time.
     """
     mask = np.ones(math.prod(shape), bool)
     expected, at = mask.size * dropout, -1
@@ -125,8 +128,8 @@ def sample(mean, log_std, noise):
 def values(critics, observations, actions, kept=None, dropout: float = 0.0):
     """Return the values of actions, (...) of each critic.
 
-    The first layer's products with observations and with actions are apart, so that those with
-    observations serve two losses and need no gradient of the inputs.
+    The first layer multiplies observations and actions apart, so the products with observations serve two losses
+    and need no gradient of the inputs.
     """
     size, results = observations.shape[-1], []
     for index, (first, *others, last) in enumerate(critics):
@@ -141,63 +144,61 @@ def values(critics, observations, actions, kept=None, dropout: float = 0.0):
     return results
 
 
-def targets(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise, following=None):
-    """Return what the critics are to say of a batch, (batch,); `following` as in `update`."""
-    following = distribution(state.policy, batch.next_observations) if following is None else following
-    action, density = sample(*following, noise.next_action)
+def targets(hp: SoftActorCritic, state: State, batch: Transitions, noise: Noise, next_actions=None):
+    """Return the targets of the critics, (batch,); `next_actions` as in `update`."""
+    next_actions = distribution(state.policy, batch.next_observations) if next_actions is None else next_actions
+    action, density = sample(*next_actions, noise.next_action)
     kept = None if noise.kept is None else noise.kept[0]
-    least = jnp.minimum(*values(state.targets, batch.next_observations, action, kept, row.dropout))
-    return batch.rewards + row.discount * batch.goes_on * (least - jnp.exp(state.log_alpha) * density)
+    least = jnp.minimum(*values(state.targets, batch.next_observations, action, kept, hp.dropout))
+    return batch.rewards + hp.discount * batch.goes_on * (least - jnp.exp(state.log_alpha) * density)
 
 
-def critics_loss(row: SoftActorCritic, critics, batch: Transitions, wanted, kept):
+def critics_loss(hp: SoftActorCritic, critics, batch: Transitions, target, kept):
     """Return the sum over the critics of the mean squared error, and the mean of their values."""
-    found = values(critics, batch.observations, batch.actions, kept, row.dropout)
-    return sum(jnp.mean((value - wanted) ** 2) for value in found), sum(found).mean() / CRITICS
+    found = values(critics, batch.observations, batch.actions, kept, hp.dropout)
+    return sum(jnp.mean((value - target) ** 2) for value in found), sum(found).mean() / CRITICS
 
 
-def policy_loss(row: SoftActorCritic, policy, state: State, observations, noise, kept):
-    """Return the mean of alpha log pi - mean of the critics, and the mean of log pi."""
+def policy_loss(hp: SoftActorCritic, policy, state: State, observations, noise, kept):
+    """Return the mean of alpha log pi minus the mean of the critics, and the mean of log pi."""
     action, density = sample(*distribution(policy, observations), noise)
-    value = sum(values(state.critics, observations, action, kept, row.dropout)) / CRITICS
+    value = sum(values(state.critics, observations, action, kept, hp.dropout)) / CRITICS
     return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
 
 
-def update(row: SoftActorCritic, state: State, batch: Transitions, noise: Noise, following=None) -> tuple[State, dict]:
-    """Return the state after one update, and its figures, scalars by name.
+def update(
+    hp: SoftActorCritic, state: State, batch: Transitions, noise: Noise, next_actions=None
+) -> tuple[State, dict]:
+    """Return the state after one update, and its metrics, scalars by name.
 
     Args:
-        row: numbers.
+        hp: hyperparameters.
         state: before.
         batch: transitions, with one leading axis.
-        noise: what is random; without `action`, critics alone learn.
-        following: the policy's `distribution` of the next observations, where it has been computed before.
+        noise: random inputs; without `action`, the critics alone learn.
+        next_actions: the policy's `distribution` at the next observations, if it is known; else None.
     """
     masks = (None, None, None) if noise.kept is None else noise.kept
-    wanted = targets(row, state, batch, noise, following)
+    target = targets(hp, state, batch, noise, next_actions)
     critic_gradient = jax.value_and_grad(critics_loss, argnums=1, has_aux=True)
-    (critic_loss, value), gradient = critic_gradient(row, state.critics, batch, wanted, masks[1])
-    critics, moments = _moved(row, "critics", state.critics, gradient, state.moments)
-    figures = {"critic_loss": critic_loss, "q": value}
+    (critic_loss, value), gradient = critic_gradient(hp, state.critics, batch, target, masks[1])
+    critics, moments = _stepped(hp, "critics", state.critics, gradient, state.moments)
+    metrics = {"critic_loss": critic_loss, "q": value}
     if noise.action is not None:
         policy_gradient = jax.value_and_grad(policy_loss, argnums=1, has_aux=True)
-        (loss, density), gradient = policy_gradient(
-            row, state.policy, state, batch.observations, noise.action, masks[2]
-        )
+        (loss, density), gradient = policy_gradient(hp, state.policy, state, batch.observations, noise.action, masks[2])
         joints = batch.actions.shape[-1]
-        log_alpha, moments = _moved(row, "log_alpha", state.log_alpha, joints - density, moments)
-        policy, moments = _moved(row, "policy", state.policy, gradient, moments)
+        log_alpha, moments = _stepped(hp, "log_alpha", state.log_alpha, joints - density, moments)
+        policy, moments = _stepped(hp, "policy", state.policy, gradient, moments)
         state = state._replace(policy=policy, log_alpha=log_alpha)
-        figures |= {"policy_loss": loss, "entropy": -density, "alpha": jnp.exp(log_alpha)}
-    averaged = jax.tree.map(
-        lambda target, critic: (1.0 - row.averaging) * target + row.averaging * critic, state.targets, critics
-    )
-    return state._replace(critics=critics, targets=averaged, moments=moments), figures
+        metrics |= {"policy_loss": loss, "entropy": -density, "alpha": jnp.exp(log_alpha)}
+    averaged = jax.tree.map(lambda target, critic: (1.0 - hp.tau) * target + hp.tau * critic, state.targets, critics)
+    return state._replace(critics=critics, targets=averaged, moments=moments), metrics
 
 
-def held_out_loss(row: SoftActorCritic, state: State, observations, noise, kept):
-    """Return the policy's loss on observations (batch, size): the signal that ends phases."""
-    return policy_loss(row, state.policy, state, observations, noise, kept)[0]
+def held_out_loss(hp: SoftActorCritic, state: State, observations, noise, kept):
+    """Return the policy's loss on observations (batch, size), which ends phases."""
+    return policy_loss(hp, state.policy, state, observations, noise, kept)[0]
 
 
 def exported(state: State) -> tuple[Layer, ...]:
@@ -205,7 +206,7 @@ def exported(state: State) -> tuple[Layer, ...]:
     return *networks.exported((*state.policy["trunk"], state.policy["mean"])), Layer("tanh")
 
 
-def _moved(row: SoftActorCritic, name: str, parameters, gradient, moments):
+def _stepped(hp: SoftActorCritic, name: str, parameters, gradient, moments):
     """Parameters after a step of Adam, and all moments."""
-    steps, moved = optimiser(row).update(gradient, moments[name])
+    steps, moved = optimiser(hp).update(gradient, moments[name])
     return optax.apply_updates(parameters, steps), {**moments, name: moved}

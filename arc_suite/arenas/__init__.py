@@ -1,4 +1,4 @@
-"""Where bodies move: name -> the arena that suits a body."""
+"""Arenas: name -> function from a body to its arena."""
 
 from arc_suite.arenas import bumps, terrain
 from arc_suite.arenas.arena import Arena

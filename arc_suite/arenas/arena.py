@@ -1,49 +1,45 @@
-"""The contract of an arena: what a place gives MuJoCo, and what it tells tasks of its ground."""
+"""The contract of an arena: geometry for MuJoCo, height of the ground for tasks."""
 
 import dataclasses
 from abc import ABC, abstractmethod
+from typing import ClassVar
 
 from dm_control import mjcf
 
 
 @dataclasses.dataclass(frozen=True)
 class Arena(ABC):
-    """A place where a body moves: a frozen value, so that models and pictures can be cached by it.
+    """The ground on which a body moves: a frozen value, the key of cached models and pictures.
 
-    The start is at the origin, x the way to go. Heights are functions of arrays with any leading
-    axes, of operators and methods alone or of the array's own namespace, so that one text serves
-    NumPy and JAX.
+    The start is at the origin, forward is x. Heights are functions of arrays with any leading axes.
+    They use operators, methods and the array's own namespace, so that one text serves NumPy and JAX.
+
+    Attributes:
+        is_level: whether the ground is the plane z = 0, which pushes out a foot that starts below it.
     """
+
+    is_level: ClassVar[bool] = False
 
     @abstractmethod
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the ground to a model that holds a body.
 
         Args:
-            root: the model; every geom of the ground is called `floor` or `floor_<something>`.
-            **contact: attributes of the ground's geoms: how it touches a body.
+            root: the model; every geom of the ground is named `floor` or `floor_<something>`.
+            **contact: contact attributes of the ground's geoms.
         """
 
     @abstractmethod
     def height(self, x, y):
         """Return the height of the ground (...) under points x (...) and y (...), m."""
 
-    def clearance(self, points):
-        """Return the heights (...) of points (..., 3) over the ground under them, m."""
-        return points[..., 2] - self.height(points[..., 0], points[..., 1])
-
     def torso_clearance(self, positions):
-        """Return the heights (...) of torsos at positions (..., 3) over the ground that counts for them, m."""
-        return self.clearance(positions)
-
-    @property
-    def is_level(self) -> bool:
-        """Return whether the ground is the plane z = 0, in which a foot that starts below it is pushed out."""
-        return False
+        """Return the heights (...) of torsos at positions (..., 3) over the ground near them, m."""
+        return positions[..., 2] - self.height(positions[..., 0], positions[..., 1])
 
     @property
     def lists_contacts(self) -> bool:
-        """Return whether a list of all pairs of geoms that may touch is faster than a search: where geoms are few.
+        """Return whether explicit pairs of all geoms are faster than a broad phase: true for few geoms.
 
         Planes and height fields are listed in any case.
         """

@@ -1,4 +1,4 @@
-"""Bumps: a field of gentle, rounded bumps, as MuJoCo's height field with its triangles."""
+"""Bumps: a height field of gentle, rounded bumps."""
 
 import dataclasses
 import functools
@@ -11,7 +11,7 @@ from arc_suite.arenas import field
 from arc_suite.arenas.arena import Arena
 from arc_suite.robots.spec import Body
 
-_CELL = 0.5  # of the standing height; feet sink into cells that are small beside them
+_CELL = 0.5  # of the standing height; feet sink into smaller cells
 _LENGTH, _WIDTH = 80.0, 40.0  # of the field, in standing heights: the way of 1000 steps, to either side
 _BASE = 2.0  # thickness of the ground below its lowest point, in standing heights
 _WAVE = 4.0  # from bump to bump, in standing heights
@@ -23,7 +23,7 @@ class Bumps(Arena):
     """Bumps on a field about the start; beyond its edge the ground goes on at the edge's height.
 
     Attributes:
-        unit: m, the standing height of the body for which it is made: all lengths are multiples of it.
+        unit: m, the standing height of the body; all lengths are multiples of it.
         highest: of the bumps, in units.
     """
 
@@ -35,7 +35,7 @@ class Bumps(Arena):
         field.add(root, self._shares, (*self._halves, self.highest * self.unit, _BASE * self.unit), **contact)
 
     def height(self, x, y):
-        """Return the height (...) of the triangles under points: those that MuJoCo's collisions meet, m."""
+        """Return the height (...) of MuJoCo's collision triangles under points, m."""
         shares, (half_x, half_y) = self._shares, self._halves
         rows, columns = shares.shape
         u = (x + half_x) / (2.0 * half_x) * (columns - 1)
@@ -49,7 +49,7 @@ class Bumps(Arena):
 
     @functools.cached_property
     def _shares(self) -> np.ndarray:
-        """Return the height of every node as a share of the highest, (rows, columns), in the precision MuJoCo keeps."""
+        """Return the height of every node as a share of the highest, (rows, columns), in single precision."""
         x = np.arange(-_LENGTH, _LENGTH + _CELL, _CELL)
         y = np.arange(-0.5 * _WIDTH, 0.5 * _WIDTH + _CELL, _CELL)
         turn = 2.0 * math.pi / _WAVE
@@ -59,5 +59,5 @@ class Bumps(Arena):
 
 
 def fitted(body: Body) -> Bumps:
-    """Return the bumps that suit a body's size."""
+    """Return bumps of the size of a body."""
     return Bumps(body.torso.standing_height)

@@ -1,11 +1,11 @@
-"""Height fields as MuJoCo has them: a grid of nodes, and in every cell two triangles."""
+"""MuJoCo's height fields: a grid of nodes, two triangles in every cell."""
 
 import numpy as np
 from dm_control import mjcf
 
 
 def shares(heights: np.ndarray) -> np.ndarray:
-    """Return heights (rows, columns) from 0 to 1 in the single precision that MuJoCo keeps, as doubles."""
+    """Return heights (rows, columns) from 0 to 1, rounded to MuJoCo's single precision, as doubles."""
     return heights.astype(np.float32).astype(float)
 
 
@@ -14,8 +14,8 @@ def add(root: mjcf.RootElement, nodes: np.ndarray, size, pos=(0.0, 0.0, 0.0), **
 
     Args:
         root: the model.
-        nodes: (rows, columns) from 0 to 1, both among them; rows along y, columns along x.
-        size: (4,) m: half of the length and width, height of what is 1, thickness of the ground below what is 0.
+        nodes: (rows, columns) from 0 to 1, with minimum 0 and maximum 1; rows along y, columns along x.
+        size: (4,) m: half of the length and width, height of the value 1, thickness of the ground below the value 0.
         pos: (3,) m, of its middle.
         **contact: attributes of the geom.
     """
@@ -26,12 +26,12 @@ def add(root: mjcf.RootElement, nodes: np.ndarray, size, pos=(0.0, 0.0, 0.0), **
 
 
 def height(nodes: np.ndarray, u, v):
-    """Return the height (...) of the triangles that MuJoCo's collisions meet, in units of the nodes.
+    """Return the height (...) of MuJoCo's collision triangles, in units of the nodes.
 
     Args:
         nodes: (rows, columns)
         u: (...) place along the columns, in cells; beyond the edge, the edge's height.
-        v: (...) along the rows, likewise.
+        v: (...) place along the rows, in cells; beyond the edge, the edge's height.
     """
     numpy = u.__array_namespace__()
     rows, columns = nodes.shape

@@ -1,6 +1,7 @@
 """Flat: an endless level floor."""
 
 import dataclasses
+from typing import ClassVar
 
 from dm_control import mjcf
 
@@ -11,6 +12,8 @@ from arc_suite.arenas.arena import Arena
 class Flat(Arena):
     """The plane z = 0."""
 
+    is_level: ClassVar[bool] = True
+
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the plane `floor`."""
         root.worldbody.add("geom", name="floor", type="plane", size=(0.0, 0.0, 1.0), conaffinity=1, **contact)
@@ -18,12 +21,3 @@ class Flat(Arena):
     def height(self, x, y):
         """Return 0 for every point."""
         return 0.0 * x
-
-    def clearance(self, points):
-        """Return z, whose bits no subtraction could change."""
-        return points[..., 2]
-
-    @property
-    def is_level(self) -> bool:
-        """Return True."""
-        return True

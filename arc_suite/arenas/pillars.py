@@ -1,7 +1,7 @@
-"""Pillars: a level floor on which round pillars stand, put up anew for every episode.
+"""Pillars: a level floor with round pillars, placed anew in every episode.
 
-They stand on a grid of square cells, one near the middle of each; goals are corners of the cells. So
-no pillar is ever near a goal, and between any two a body finds a way, wherever they are drawn.
+They stand on a grid of square cells, one near the middle of each; goals are corners of cells. So no
+pillar is near a goal, and a body fits between any two.
 """
 
 import dataclasses
@@ -42,7 +42,7 @@ class Pillars(Flat):
             pillar.add("geom", name=name, type="capsule", size=size, mass=0.0, conaffinity=1, **contact)
 
     def places(self, shifts: np.ndarray) -> np.ndarray:
-        """Return where pillars stand, their middles (COUNT, 3), m.
+        """Return the centres of the pillars (COUNT, 3), m.
 
         Args:
             shifts: (COUNT, 2) off the middle of each one's cell, from -1 to 1.

@@ -1,7 +1,7 @@
 """Terrain: lanes of rough ground, slopes, stairs and trenches side by side, each level where a body starts.
 
-Lanes lead along x. What is rough or slopes is one height field, whose cells are large beside feet;
-stairs and trenches are boxes, since feet sink into a height field that is steep.
+Lanes lead along x. Rough ground and slopes are one height field with cells larger than feet. Stairs and
+trenches are boxes, since feet sink into a steep height field.
 """
 
 import dataclasses
@@ -70,14 +70,13 @@ KINDS = (*FIELDS, *STEPS)
 class Terrain(Arena):
     """Lanes side by side; in the middle of lane i a body starts at `start(i)`.
 
-    Beside and beyond the lanes there is nothing but the plane below stairs and trenches; `height` goes
-    on there at the edge's.
+    Outside the lanes there is only the plane below stairs and trenches; `height` returns the edge's there.
 
     Attributes:
-        unit: m, the standing height of the body for which it is made: all lengths are multiples of it.
+        unit: m, the standing height of the body; all lengths are multiples of it.
         length: of the lanes ahead of the start, in units.
         lanes: kind and difficulty of each, by the order of `KINDS`.
-        seed: of what is random in them; a lane is the same beside any others.
+        seed: of the random ground; a lane does not depend on its neighbours.
     """
 
     unit: float
@@ -120,7 +119,7 @@ class Terrain(Arena):
                 yield size, middle + (0.0, self.start(lane), 0.0)
 
     def height(self, x, y):
-        """Return the height (...) of the ground under points, as collisions meet it, m."""
+        """Return the height (...) of the collision geometry under points, m."""
         numpy = x.__array_namespace__()
         along, across = x / self.unit + BACK, y / self.unit + (len(self.lanes) // 2 + 0.5) * WIDTH
         if not self._fields:
@@ -148,7 +147,7 @@ class Terrain(Arena):
 
     @property
     def lists_contacts(self) -> bool:
-        """Return whether all is one height field: boxes are many."""
+        """Return whether the ground is one height field: boxes are many."""
         return self._fields == len(self.lanes)
 
     @functools.cached_property
@@ -190,7 +189,7 @@ class Terrain(Arena):
     def _bottom(self) -> float:
         """Height of the plane below stairs and trenches, in units: their lowest, as a plane costs less than boxes.
 
-        Beside a height field it is below that, or feet would touch both.
+        With a height field it is below that, or feet would touch both.
         """
         return -_TRENCH if self._fields else self._profiles.min()
 
@@ -202,14 +201,14 @@ class Terrain(Arena):
 
 
 def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(DIFFICULTY,), seed: int = 0) -> Terrain:
-    """Return lanes that suit a body's size.
+    """Return lanes of the size of a body.
 
     Args:
         body: any.
         kinds: how many lanes of each difficulty, by kind of ground.
         length: of lanes ahead of the start, in standing heights.
         levels: difficulties, from 0 to 1.
-        seed: of what is random in the ground.
+        seed: of the random lanes.
 
     Returns:
         The lanes: by kind, in the order of `KINDS`, then by difficulty.
@@ -219,5 +218,5 @@ def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(
 
 
 def fitted(kind: str):
-    """Return the function that makes lanes of a kind suit a body."""
+    """Return the function from a body to lanes of a kind."""
     return lambda body: made(body, {kind: _LANES})

@@ -37,7 +37,7 @@ flags.DEFINE_enum(
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE)
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
-flags.DEFINE_bool("looks", False, "Add decorations, which weigh nothing and touch nothing.")
+flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
 flags.DEFINE_string(
     "output",
     None,
@@ -95,4 +95,4 @@ def _arena(body: Body) -> Arena:
 def _text(body: Body, arena: Arena) -> str:
     if FLAGS.json:
         return spec_files.body_to_json(body)
-    return models.assemble(body, arena, decorated=FLAGS.looks).to_xml_string()
+    return models.assemble(body, arena, decorated=FLAGS.visuals).to_xml_string()

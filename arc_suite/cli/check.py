@@ -1,19 +1,35 @@
-"""Tell what is wrong with a body in a spec file, and the value that would fit.
+"""Check a body in a spec file, or a task.
 
   arc-suite check examples/spider.json
+  arc-suite check --task crouching:crouch --robot tick
 
-Prints one line for each flaw: feet that hang in the air, legs that hold nothing up, none that can
-step. Exit status 1 if there is any.
+A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
+nothing up, none that can step. A task: a batch of environments must compute bit for bit what each computes
+alone, over 200 control steps; the line names the terms, metrics and blocks that differ. Exit status 1 if
+there is any flaw or difference.
 """
 
+from absl import flags
+
+from arc_suite.cli.flags import ROBOT_HELP
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import conformance
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec_files import load_body
 
+FLAGS = flags.FLAGS
+flags.DEFINE_string("task", None, "Task to check, module:name of one that another package has.")
+flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
+
 
 def main(spec: str | None = None) -> int:
-    """Print the flaws of the body in a spec file and return the exit status."""
-    if spec is None:
-        raise ValueError("expected a spec file; see --help")
+    """Print the flaws of the body in a spec file, or how a task differs, and return the exit status."""
+    if (spec is None) == (FLAGS.task is None):
+        raise ValueError("expected a spec file or --task; see --help")
+    return _check_body(spec) if FLAGS.task is None else _check_task()
+
+
+def _check_body(spec: str) -> int:
     body = load_body(spec)
     found = flaws(body)
     for flaw in found:
@@ -21,3 +37,11 @@ def main(spec: str | None = None) -> int:
     if not found:
         print(f"{spec}: {body.name} stands and can take steps")
     return int(bool(found))
+
+
+def _check_task() -> int:
+    setup = Setup.of(FLAGS.robot, FLAGS.task)
+    found = conformance.difference(setup)
+    same = f"a batch of environments equals each of them alone over {conformance.STEPS} steps"
+    print(f"{setup}: {same}" if found is None else f"{setup}: a batch of environments differs from one alone: {found}")
+    return int(found is not None)

@@ -49,7 +49,7 @@ flags.DEFINE_boolean("overwrite", False, "Replace a dataset of that id, once the
 flags.DEFINE_string("author", None, "Who has made the dataset, for its metadata.")
 flags.DEFINE_string("code_permalink", None, "Where the code lies that made the dataset, for its metadata.")
 flags.DEFINE_string("verify", None, "Replay the dataset of this id instead.")
-flags.DEFINE_integer("rows", 64, "Episodes at a time; the data do not depend on it.", lower_bound=1)
+flags.DEFINE_integer("num_envs", 64, "Episodes at a time; the data do not depend on it.", lower_bound=1)
 flags.DEFINE_integer("threads", None, "Threads to simulate on; the data do not depend on it. [default: all]", 1)
 
 
@@ -64,7 +64,7 @@ def main() -> None:
         setup = next(iter(asked.values()))
         body = setup.body if _ROBOT.present or made_body() else None
         task = setup.task if FLAGS["task"].present else None
-        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress, task)
+        count = data.verify(FLAGS.verify, body, FLAGS.num_envs, FLAGS.threads, progress, task)
         print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")
         return
     if FLAGS.id is not None and len(asked) > 1:
@@ -79,7 +79,7 @@ def main() -> None:
             dataset_id,
             settings,
             FLAGS.episodes,
-            FLAGS.rows,
+            FLAGS.num_envs,
             FLAGS.threads,
             FLAGS.overwrite,
             progress,

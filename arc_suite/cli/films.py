@@ -106,7 +106,8 @@ def captioned(picture: np.ndarray, text: str) -> np.ndarray:
 
 
 def grid(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
-    """Return pictures of one size side by side, row by row; they must fill the last row."""
+    """Return pictures of one size side by side, row by row; black fills the last row."""
+    pictures = [*pictures, *(-len(pictures) % columns * [np.zeros_like(pictures[0])])]
     rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
     return np.concatenate(rows, axis=0)
 

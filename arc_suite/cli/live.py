@@ -1,4 +1,4 @@
-"""A live view: episodes in a window in real time, which keys steer and the mouse disturbs."""
+"""A live view: episodes in a window in real time; keys set the command, the mouse pulls at the body."""
 
 import queue
 import time
@@ -8,8 +8,9 @@ import glfw
 import mujoco
 import numpy as np
 
-from arc_suite.marks import Mark
-from arc_suite.simulation.pictures import Decorated, geom_of
+from arc_suite.envs.window import Window
+from arc_suite.markers import Marker
+from arc_suite.simulation.pictures import Decorated
 
 _PRESS = 0.25  # of the body's own speed, by which an arrow changes the command
 _ARROWS = {
@@ -18,17 +19,18 @@ _ARROWS = {
     glfw.KEY_LEFT: (0.0, 0.0, _PRESS),
     glfw.KEY_RIGHT: (0.0, 0.0, -_PRESS),
 }
-_ENDS = ("start", "end")  # of a mark
-_LONGEST = 0.5  # s that a picture may stand for: a machine that is slower shows slow motion
+_ENDS = ("start", "end")  # of a debug marker
+_PICTURE = 1.0 / 60.0  # s
+_LONGEST = 0.5  # s of simulated time for one picture; a slower machine shows slow motion
 
 
 class Live:
-    """An episode after another, which keys steer and the mouse disturbs; and its picture.
+    """Episodes one after another, and their pose in pictures.
 
     Attributes:
         paused: whether time stands still.
-        wanted: (3,) the command that arrows have set; None before the first, and in a task that takes none.
-        shown: the decorated body, for a window.
+        wanted: (3,) command set by the arrow keys; None before the first, and in a task without a command.
+        shown: the decorated body of the window.
     """
 
     def __init__(self, environment, act: Callable):
@@ -47,13 +49,13 @@ class Live:
         self.restart()
 
     def restart(self) -> None:
-        """Start the next episode; what arrows have set still holds."""
+        """Start the next episode, with the command that the arrow keys have set."""
         self._timestep, self._earned, self._steps = self._environment.reset(), 0.0, 0
         self._command()
-        self._before, self._marks = self._qpos(), 2 * (self._asked(),)
+        self._before, self._markers = self._qpos(), 2 * (self._asked(),)
 
     def press(self, key: int) -> None:
-        """Do what a key, of GLFW's numbers, asks for."""
+        """Pause, restart or set the command by a key, one of GLFW's numbers."""
         if key == glfw.KEY_SPACE:
             self.paused = not self.paused
         elif key == glfw.KEY_BACKSPACE:
@@ -77,10 +79,10 @@ class Live:
         self._timestep = self._environment.step(self._act(self._timestep))
         self._earned += self._timestep.reward
         self._steps += 1
-        self._marks = self._marks[1], self._asked()
+        self._markers = self._markers[1], self._asked()
 
     def pose(self, share: float) -> None:
-        """Let the picture show what is a share of the latest control step after its start, 0 to 1."""
+        """Pose the picture at a share, 0 to 1, of the latest control step."""
         model, data = self.shown.model.ptr, self.shown.data.ptr
         way, now = np.empty(model.nv), self._before.copy()
         mujoco.mj_differentiatePos(model, way, 1.0, self._before, self._qpos())
@@ -89,76 +91,56 @@ class Live:
         data.mocap_pos[:] = self._environment.physics.data.mocap_pos
         mujoco.mj_forward(model, data)
 
-    def marks(self, share: float) -> list[Mark]:
-        """Return what the task asks for, a share of the latest control step after its start, 0 to 1."""
-        before, now = self._marks
-        if [mark._replace(start=0, end=0) for mark in before] != [mark._replace(start=0, end=0) for mark in now]:
+    def markers(self, share: float) -> list[Marker]:
+        """Return the task's debug markers at a share, 0 to 1, of the latest control step."""
+        before, now = self._markers
+        if [each._replace(start=0, end=0) for each in before] != [each._replace(start=0, end=0) for each in now]:
             return now
         return [
-            mark._replace(**{end: (1.0 - share) * getattr(old, end) + share * getattr(mark, end) for end in _ENDS})
-            for old, mark in zip(before, now, strict=True)
+            new._replace(**{end: (1.0 - share) * getattr(old, end) + share * getattr(new, end) for end in _ENDS})
+            for old, new in zip(before, now, strict=True)
         ]
 
     def text(self) -> str:
         """Return a line about the episode."""
         told = [f"return {self._earned:.0f} in {self._steps * self.control_timestep:.1f} s"]
         if self.wanted is not None:
-            told.append("ahead {:+.2f}, turn {:+.2f}".format(*self.wanted[[0, 2]]))
+            told.append("forward {:+.2f}, turn {:+.2f}".format(*self.wanted[[0, 2]]))
         return ", ".join(told + ["paused"] * self.paused)
 
     def _command(self) -> None:
         if self.wanted is not None:
             self._environment.command("command", self.wanted)
 
-    def _asked(self) -> list[Mark]:
-        return self._environment.task.marks(self._environment.physics)
+    def _asked(self) -> list[Marker]:
+        return self._environment.task.markers(self._environment.physics)
 
     def _qpos(self) -> np.ndarray:
         return self._environment.physics.data.qpos.copy()
 
 
-def play(
-    window, live: Live, keys: queue.SimpleQueue, rate: float = 60.0, clock=time.perf_counter, sleep=time.sleep
-) -> None:
+def play(window: Window, live: Live, keys: queue.SimpleQueue) -> None:
     """Show an episode after another in real time, until the window is closed.
 
     A picture lies between the poses at the start and at the end of a control step.
 
     Args:
-        window: of `mujoco.viewer.launch_passive`, of the model that is shown.
-        live: what is shown.
+        window: on `live.shown`.
+        live: the episodes.
         keys: those that were pressed, in their order.
-        rate: pictures a second.
-        clock: tells the time, s.
-        sleep: waits for some time, s.
     """
-    pause, last, ahead = 1.0 / rate, clock(), 0.0
-    while window.is_running():
-        now = clock()
+    last, ahead = time.monotonic(), 0.0
+    while window.is_open:
         while not keys.empty():
             live.press(keys.get())
+        now = time.monotonic()
         if not live.paused:
             ahead += min(now - last, _LONGEST)
         last = now
-        with window.lock():
-            while ahead >= live.control_timestep:
-                live.pose(1.0)  # a pull ends where the body has come to, however seldom it is shown
-                live.step(pulls(live.shown, window.perturb))
-                ahead -= live.control_timestep
-            live.pose(ahead / live.control_timestep)
-            marks = live.marks(ahead / live.control_timestep)
-            window.user_scn.ngeom = len(marks)
-            for mark, geom in zip(marks, window.user_scn.geoms, strict=False):
-                geom_of(mark, geom)
-        window.set_texts((None, mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, live.text(), None))
-        window.sync()
-        sleep(max(0.0, pause - (clock() - now)))
-
-
-def pulls(shown: Decorated, perturb: mujoco.MjvPerturb) -> np.ndarray:
-    """Return the forces and torques (bodies, 6) with which the mouse pulls at what is shown."""
-    model, data = shown.model.ptr, shown.data.ptr
-    data.xfrc_applied[:] = 0.0
-    if perturb.active and perturb.select > 0:
-        mujoco.mjv_applyPerturbForce(model, data, perturb)
-    return data.xfrc_applied.copy()
+        while ahead >= live.control_timestep:
+            live.pose(1.0)  # a pull ends where the body has come to, however seldom it is shown
+            live.step(window.pulls())
+            ahead -= live.control_timestep
+        share = ahead / live.control_timestep
+        live.pose(share)
+        window.show(_PICTURE, live.markers(share), live.text())

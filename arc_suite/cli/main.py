@@ -33,9 +33,13 @@ arc-suite PROGRAM [flags]
 arc-suite PROGRAM --help shows the flags of a program, arc-suite --version the version."""
 
 
-def main() -> None:
-    """Run the program that the first argument names, with the other arguments as its flags."""
-    first, *others = sys.argv[1:] or ["--help"]
+def main(*given: str) -> None:
+    """Run the program of the first argument, with the other arguments as its flags.
+
+    Args:
+        *given: arguments before those of the command line.
+    """
+    first, *others = [*given, *sys.argv[1:]] or ["--help"]
     if first in PROGRAMS:
         # Imported here and alone: a program defines its flags when it is imported, and some define the same.
         module = importlib.import_module(f"arc_suite.cli.{first}")

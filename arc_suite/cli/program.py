@@ -5,7 +5,6 @@ import functools
 import inspect
 import io
 import os
-import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -53,7 +52,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
     def work():
         _, *rest = flags.FLAGS([script, *arguments])
         if _HELP.value:
-            return print(_help(sys.modules[main.__module__], name is None))
+            return print(_help(sys.modules[main.__module__]))
         if _VERSION.value:
             return print(VERSION)
         places = len(inspect.signature(main).parameters)
@@ -95,17 +94,14 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     sys.exit(status)
 
 
-def _help(module: ModuleType, is_script: bool) -> str:
-    """Return a program's docstring and flags; examples call the script, if it is one that runs the program."""
-    text = module.__doc__.strip()
-    if is_script:
-        text = re.sub(rf"\barc-suite {module.__name__.rpartition('.')[2]}\b", f"python {sys.argv[0]}", text)
+def _help(module: ModuleType) -> str:
+    """Return a program's docstring and flags."""
     shown = flags.FlagValues()
     for name, defined in flags.FLAGS.flags_by_module_dict().items():
         if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):
             for flag in defined:
                 shown[flag.name] = flag
-    return f"{text}\n\nFlags:\n{shown.get_help(include_special_flags=False)}"
+    return f"{module.__doc__.strip()}\n\nFlags:\n{shown.get_help(include_special_flags=False)}"
 
 
 class _Output:

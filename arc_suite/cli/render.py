@@ -26,7 +26,7 @@ from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, ta
 from arc_suite.cli.program import progress
 from arc_suite.export import pages
 from arc_suite.models.builder import CAMERAS
-from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
+from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.policies import HELP, PRESET_HELP, Policy, alone, policy
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".html": 400}

@@ -1,94 +1,67 @@
 """Make the runs of a study, or write its report.
 
-A study is a table of runs: robots, tasks, algorithms, seeds, steps. What is finished is skipped, what was broken
-off goes on; each run is a process of one thread. The tables of finished runs are copied into a folder that is small
-enough to be committed, and the report is made of that folder alone.
+A study is a table of runs: robots, tasks, algorithms, seeds, steps. Each run is a process of one thread. Finished
+runs are skipped, and the others resume. Results of finished runs are copied into a folder that is small enough to be
+committed, and the report is made from that folder alone.
 
   arc-suite study first-steps
   arc-suite study first-steps --report
   arc-suite study paper --jobs 8 --shard 3/16
   arc-suite study paper --submit 16 --hours 24
-  arc-suite study paper --together 10
   arc-suite study my_studies:MINE
 """
 
-import shutil
 import sys
-from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from absl import flags
 
-from arc_suite.agents import studies, study_report, study_runner, study_states
-from arc_suite.agents.studies import Row
-from arc_suite.agents.study_states import State
-from arc_suite.cli.program import progress, use_one_thread
+from arc_suite.cli.program import progress
 from arc_suite.envs.vector import usable_cores
+from arc_suite.studies import publication, report, runner, tables
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
-flags.DEFINE_integer(
-    "together",
-    None,
-    "Runs at a time in this process, those that learn alike in one program: for a GPU, in place of --jobs.",
-    lower_bound=1,
-)
-flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth, from the ith on, which counts from 0.")
+flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth from the ith on; i counts from 0.")
 flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
-flags.DEFINE_float("hours", 24.0, "Of a job; it comes back until its share is done.", lower_bound=0.1)
+flags.DEFINE_float(
+    "hours", 24.0, "Time limit of a job; it is queued again until its share is finished.", lower_bound=0.1
+)
 flags.DEFINE_string("partition", None, "Of the cluster. [default: the cluster's]")
 flags.DEFINE_bool("report", False, "Write the report in place of making runs.")
 flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
 flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
 
-# Of runs, those first whose lines change.
-_WORDS = ("running", "elsewhere", "failed", "waiting", "finished")
-
 
 def main(name: str | None = None) -> int:
-    """Make the runs, or write the report; the exit status tells whether all runs are finished."""
+    """Make the runs, or write the report; the exit status is 0 if all runs are finished."""
     if name is None:
-        raise ValueError(f"expected a study: {', '.join(studies.STUDIES)}, or module:attribute; see --help")
-    study = studies.study(name)
+        raise ValueError(f"expected a study: {', '.join(tables.STUDIES)}, or module:attribute; see --help")
+    study = tables.study(name)
     part, parts = shard(FLAGS.shard)
-    rows = study.rows[part::parts]
-    if not rows:
-        raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.rows)}")
-    folder = Path(FLAGS.runs or Path("runs", studies.folder_name(name)))
-    results = Path(FLAGS.results or Path("studies", studies.folder_name(name)))
+    runs = study.runs[part::parts]
+    if not runs:
+        raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.runs)}")
+    folder = Path(FLAGS.runs or Path("runs", tables.folder_name(name)))
+    results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
     if FLAGS.report:
-        study_runner.publish_all(rows, folder, results)
-        print(study_report.write(name, study, results))
+        publication.publish_all(runs, folder, results)
+        print(report.write(name, study, results))
         return 0
-    if (FLAGS.together, FLAGS.jobs, FLAGS.submit).count(None) < 2:
-        raise ValueError("--together, --jobs, --submit: one process, several, or a cluster; give one of them")
+    if FLAGS.jobs is not None and FLAGS.submit is not None:
+        raise ValueError("--jobs, --submit: this machine, or a cluster; give one of them")
     if FLAGS.submit is not None:
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
-        return submit(name, min(FLAGS.submit, len(rows)), folder, results)
-    width = FLAGS.together or FLAGS.jobs or usable_cores()
-    run, jobs = (study_runner.run, width) if FLAGS.together is None else together(rows, width)
-    show = shown(jobs)
-    states = run(rows, folder, results, width, show, progress)
+        return submit(name, min(FLAGS.submit, len(runs)), folder, results)
+    jobs = FLAGS.jobs or usable_cores()
+    show = runner.shown(jobs)
+    states = runner.make(runs, folder, results, jobs, show, progress)
     show(states, whole=True)
-    failed = [each.row.name for each in states if each.word == "failed"]
+    failed = [each.run.name for each in states if each.word == "failed"]
     for each in failed:
         print(f"{folder / each}.log: {last_line(folder / f'{each}.log')}", file=sys.stderr)
     return 1 if failed else 0
-
-
-def together(rows: Sequence[Row], width: int) -> tuple[Callable, float]:
-    """Return what makes runs side by side in this process, and how many it makes at a time.
-
-    Raises:
-        ValueError: JAX is not installed; one line.
-    """
-    use_one_thread()
-    try:
-        from arc_suite.agents import study_together
-    except ImportError as error:
-        raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
-    return study_together.run, len(rows) / len(list(study_together.groups(rows, width)))
 
 
 def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
@@ -98,7 +71,7 @@ def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
         ValueError: submitit is not installed; one line.
     """
     try:
-        from arc_suite.agents import cluster
+        from arc_suite.studies import cluster
     except ImportError as error:
         raise ValueError(f"--submit needs submitit: pip install 'arc_suite[cluster]' ({error})") from None
     arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
@@ -118,60 +91,6 @@ def shard(text: str) -> tuple[int, int]:
     if not (part.isdecimal() and parts.isdecimal() and int(part) < int(parts)):
         raise ValueError(f"--shard={text}: expected i/n with i from 0 to n - 1, such as 0/4")
     return int(part), int(parts)
-
-
-def table(states: list[State], jobs: float, most: int | None = None) -> str:
-    """Return as text how the runs stand, and how long they still take.
-
-    Args:
-        states: of the runs.
-        jobs: runs at a time.
-        most: lines of runs, of those first that change; None for all.
-    """
-    width = max(len(each.row.name) for each in states)
-    lines = [f"{'run':<{width}}  {'state':<9} {'steps':>19} {'return':>8} {'CPU min':>8}"]
-    chosen = sorted(states, key=lambda each: _WORDS.index(each.word))[:most]
-    for each in sorted(chosen, key=states.index):
-        steps = f"{each.step:,} / {each.row.steps:,}"
-        result = "-" if each.result is None else f"{each.result:.1f}"
-        lines.append(f"{each.row.name:<{width}}  {each.word:<9} {steps:>19} {result:>8} {each.cpu / 60.0:>8.1f}")
-    finished, failed = (sum(each.word == word for each in states) for word in ("finished", "failed"))
-    seconds = study_states.remaining(states, jobs)
-    left = f", {failed} failed" if failed else ""
-    if finished + failed < len(states):
-        left += f", {'?' if seconds is None else duration(seconds)} to go"
-    return "\n".join([*lines, f"{finished} of {len(states)} finished{left}"])
-
-
-def duration(seconds: float) -> str:
-    """Return a duration as hours and minutes."""
-    hours, minutes = divmod(round(seconds / 60.0), 60)
-    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min"
-
-
-def shown(jobs: float) -> Callable[..., None]:
-    """Return what shows states: on a terminal a table in its place, elsewhere a line for each change.
-
-    With `whole`, at the end, it shows the table of all runs; before that, as many as the terminal has lines for.
-    """
-    words, height = {}, 0
-
-    def on_terminal(states, whole=False):
-        nonlocal height
-        over = f"\x1b[{height}A\x1b[J" if height else ""
-        text = table(states, jobs, None if whole else max(shutil.get_terminal_size().lines - 3, 1))
-        print(over + text, flush=True)
-        height = text.count("\n") + 1
-
-    def as_lines(states, whole=False):
-        for each in states:
-            if words.get(each.row.name, "waiting") != each.word:
-                print(f"{each.row.name}: {each.word}", flush=True)
-            words[each.row.name] = each.word
-        if whole:
-            print(table(states, jobs))
-
-    return on_terminal if sys.stdout.isatty() else as_lines
 
 
 def last_line(log: Path) -> str:

@@ -56,10 +56,11 @@ def main() -> None:
     """Run the survey and print it."""
     name, settings = task()
     settings = {"time_limit": FLAGS.seconds} | settings
+    settings |= {"duty_factor": 0.6, "phase_offsets": 0.0} if FLAGS.in_phase else {}
     trials = []
     for seed in range(FLAGS.first, FLAGS.first + FLAGS.count):
         setup = Setup.of(generator.random_body(seed, FLAGS.legs, FLAGS.links), name, settings)
-        trials.append(survey.Trial(setup, seed, FLAGS.froude, FLAGS.in_phase))
+        trials.append(survey.Trial(setup, seed, FLAGS.froude))
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
             checks.extension(FLAGS.picture, [".png"])

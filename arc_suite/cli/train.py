@@ -1,15 +1,15 @@
-"""Train a policy, from nothing to a folder that every program takes.
+"""Train a policy: from nothing to a folder that every program takes as `--policy`.
 
-Killed at any moment, the same command goes on, to the same bits. The folder holds tables of returns
-and losses, a checkpoint, the policy, and a picture of its returns, which grows while it learns;
-`--policy FOLDER` has it walk in every program.
+Killed at any moment, the same command resumes, bit-exactly. The folder holds tables of returns and losses, a
+checkpoint, the policy, and a picture of its returns, drawn anew after each evaluation.
 
   arc-suite train --robot tick --algorithm sac --steps 200000
   arc-suite train --robot tick --algorithm ppo --minutes 10
-  arc-suite train --robot queen --task steer --algorithm imitation
-  arc-suite train --robot queen --task steer --algorithm finetune --row start=runs/queen-steer-imitation-0
+  arc-suite train --robot queen --task steer --algorithm dagger
+  arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
-  arc-suite train --spec examples/spider.json --algorithm speq --row phase_updates=7500
+  arc-suite train --spec examples/spider.json --algorithm speq --hp phase_updates=7500
+  arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite evaluate --robot tick --policy runs/tick-walk-sac-0
 """
 
@@ -21,8 +21,9 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import evaluation, files
-from arc_suite.agents import algorithms, run_folder
-from arc_suite.agents.training import Run, train
+from arc_suite.agents import algorithms, configuration, run_folder
+from arc_suite.agents.configuration import Configuration
+from arc_suite.agents.training import train
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, named_values, only_body, task
 from arc_suite.cli.program import progress, use_one_thread
 from arc_suite.envs.setup import Setup
@@ -37,58 +38,77 @@ flags.DEFINE_string(
     "sac",
     f"One of {', '.join(algorithms.ALGORITHMS)}, or module:attribute, an Algorithm on Python's path.",
 )
-flags.DEFINE_multi_string("row", [], "Number of the algorithm's row, name=value; repeat it for several.")
+flags.DEFINE_multi_string("hp", [], "Hyperparameter of the algorithm, name=value; repeat it for several.")
 flags.DEFINE_integer("seed", 0, "Seed of the run.", lower_bound=0)
 flags.DEFINE_integer("steps", None, "Environment steps. [default: the algorithm's]", lower_bound=1)
 flags.DEFINE_string("prior", None, "Id of a dataset of prior data, for algorithms that take any.")
 flags.DEFINE_integer("evaluate_every", None, "Steps between evaluations. [default: the algorithm's]", lower_bound=1)
-flags.DEFINE_float("minutes", None, "Stop after so many minutes; the same command goes on.", lower_bound=0.0)
-flags.DEFINE_integer("threads", 1, "Threads to simulate on; the run does not depend on it.", lower_bound=1)
-flags.DEFINE_bool("tensorboard", False, "Write figures for TensorBoard too, into the folder of the run.")
+flags.DEFINE_string("config", None, "JSON file with the configuration of the run, in place of all flags above.")
+flags.DEFINE_float("minutes", None, "Stop after so many minutes; the same command resumes.", lower_bound=0.0)
+flags.DEFINE_integer("threads", 1, "Threads of the simulation; results do not depend on it.", lower_bound=1)
+flags.DEFINE_bool("tensorboard", False, "Write metrics for TensorBoard too, into the folder of the run.")
 flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TASK-ALGORITHM-SEED]", short_name="o")
+
+# Flags that make up the configuration.
+_OF_THE_RUN = ("robot", "spec", "legs", "links", "task", "set", "algorithm", "hp", "seed", "steps", "prior")
 
 
 def main() -> None:
-    """Train, and print what the policy earns at the end."""
+    """Train, and print the return at the end."""
     use_one_thread()
-    definition = algorithms.algorithm(FLAGS.algorithm).with_row(named_values("row", FLAGS.row))
-    body = only_body(_ROBOT)
-    steps = FLAGS.steps or definition.steps
-    run = Run(body, FLAGS.algorithm, definition, *task(), FLAGS.seed, steps, FLAGS.prior, FLAGS.evaluate_every)
-    folder = Path(FLAGS.output or run.folder())
+    run = configured()
+    folder = Path(FLAGS.output or Path("runs", run.name))
     with contextlib.ExitStack() as stack:
         listeners = [picture(run, folder), *([stack.enter_context(events(folder))] if FLAGS.tensorboard else [])]
 
-        def told(step, figures):
+        def on_metrics(step, metrics):
             for listener in listeners:
-                listener(step, figures)
+                listener(step, metrics)
 
+        limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
         try:
-            finished = train(run, folder, minutes=FLAGS.minutes, threads=FLAGS.threads, progress=progress, told=told)
+            finished = train(run, folder, **limits, progress=progress, on_metrics=on_metrics)
         except KeyboardInterrupt:
-            raise KeyboardInterrupt(f"interrupted; the same command goes on with {folder}") from None
+            raise KeyboardInterrupt(f"interrupted; the same command resumes {folder}") from None
     if finished and importlib.util.find_spec("onnx"):
         onnx_file.save(folder / "policy.onnx", network.load(folder))
-    print(f"{folder}: {earned(folder) if finished else 'stopped; the same command goes on'}")
+    print(f"{folder}: {earned(folder) if finished else 'stopped; the same command resumes it'}")
+
+
+def configured() -> Configuration:
+    """Return the configuration that the flags give.
+
+    Raises:
+        ValueError: a flag that does not fit; one line.
+        OSError: a file that cannot be read; one line.
+    """
+    if FLAGS.config is not None:
+        for name in (*_OF_THE_RUN, "evaluate_every"):
+            if FLAGS[name].present:
+                raise ValueError(f"--{name}: expected none with --config, which has the whole configuration")
+        return configuration.read(Path(FLAGS.config))
+    hyperparameters = named_values("hp", FLAGS.hp)
+    run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior
+    return Configuration.of(Setup.of(only_body(_ROBOT), *task()), FLAGS.algorithm, hyperparameters, *run)
 
 
 def earned(folder: Path) -> str:
-    """Return what the policy of a finished run earns, in words."""
+    """Return the result of a finished run, for people."""
     returns = run_folder.latest_returns(run_folder.table(folder, "evaluations"))
     return f"finished, return {returns.mean():.1f} +- {returns.std():.1f}"
 
 
-def picture(run: Run, folder: Path) -> Callable:
-    """Return what draws the returns anew after each evaluation; nothing without matplotlib."""
+def picture(run: Configuration, folder: Path) -> Callable:
+    """Return a listener that draws the returns anew after each evaluation, if matplotlib is installed."""
     if not importlib.util.find_spec("matplotlib"):
-        return lambda step, figures: None
+        return lambda step, metrics: None
     from arc_suite.agents import plots
 
-    expert = evaluation.expert_return(Setup.of(run.body, run.task, run.task_kwargs))
+    expert = evaluation.expert_return(run.setup)
     lines = {} if expert is None else {"the paper's demonstrator": expert}
 
-    def draw(step, figures):
-        if "return" in figures:
+    def draw(step, metrics):
+        if "return" in metrics:
             figure = plots.returns(run_folder.table(folder, "evaluations"), folder.name, lines)
             with files.writing(folder / "curve.png") as temporary:
                 figure.savefig(temporary)
@@ -98,7 +118,7 @@ def picture(run: Run, folder: Path) -> Callable:
 
 @contextlib.contextmanager
 def events(folder: Path) -> Iterator[Callable]:
-    """Yield what writes figures for TensorBoard.
+    """Yield a listener that writes metrics for TensorBoard.
 
     Raises:
         ValueError: tensorboardX is not installed; one line.
@@ -109,10 +129,10 @@ def events(folder: Path) -> Iterator[Callable]:
         raise ValueError(f"--tensorboard needs tensorboardX: pip install 'arc_suite[tensorboard]' ({error})") from None
     writers = []
 
-    def write(step, figures):
-        if not writers:  # what was written after the checkpoint from which the run goes on is purged
+    def write(step, metrics):
+        if not writers:  # purges what was written after the checkpoint
             writers.append(SummaryWriter(str(folder / "tensorboard"), purge_step=step))
-        for name, value in figures.items():
+        for name, value in metrics.items():
             writers[0].add_scalar(name, value, step)
 
     try:

@@ -16,7 +16,8 @@ from absl import flags
 from arc_suite import checks, evaluation, files, versions
 from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import progress
-from arc_suite.cpg.presets import TUNINGS, Preset
+from arc_suite.cpg.prescribed import Preset
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tuning import Evaluator, Journal, Search
@@ -26,7 +27,7 @@ from arc_suite.tuning.space import SPACES
 
 FLAGS = flags.FLAGS
 define_task()
-flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
+flags.DEFINE_string("robot", "queen", f"One of {', '.join(PRESETS)}.")
 flags.DEFINE_string(
     "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
 )
@@ -75,7 +76,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
 
 def evaluate(setup: Setup, preset: Preset) -> dict:
     """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
-    there = TUNINGS[FLAGS.robot]
+    there = PRESETS[FLAGS.robot]
     presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.space].preset, "medium")}
     score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
     return {
@@ -94,7 +95,7 @@ def violations(metrics: dict) -> list[str]:
 
 def main() -> None:
     """Search, evaluate, print and write."""
-    checks.name(FLAGS.robot, TUNINGS, "robot")
+    checks.name(FLAGS.robot, PRESETS, "robot")
     setup = Setup.of(FLAGS.robot, *task())
     checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:

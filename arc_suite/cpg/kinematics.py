@@ -66,7 +66,7 @@ class Legs(NamedTuple):
 
     def by_leg(self, values) -> np.ndarray:
         """Return values (..., joints) as (..., legs, links), 0 where a link is fixed."""
-        return np.where(self.moves, values[..., self.joints], 0.0)
+        return values.__array_namespace__().where(self.moves, values[..., self.joints], 0.0)
 
     def by_joint(self, values) -> np.ndarray:
         """Return values (..., legs, links) as (..., joints)."""
@@ -78,13 +78,13 @@ class Legs(NamedTuple):
         Args:
             angles: (..., legs, links) rad.
         """
-        frame, place, joints = self.turns, self.mounts, []
+        numpy, frame, place, joints = angles.__array_namespace__(), self.turns, self.mounts, []
         for link in range(angles.shape[-1]):
             joints.append(((frame @ self.axes[:, link, :, None])[..., 0], place))
             frame = frame @ _rotations(self.axes[:, link], angles[..., link])
             place = place + (frame @ self.ends[:, link, :, None])[..., 0]
         sole = place - self.radii[:, None] * (0.0, 0.0, 1.0)
-        return sole, np.stack([np.cross(axis, sole - anchor) for axis, anchor in joints], axis=-1)
+        return sole, numpy.stack([numpy.cross(axis, sole - anchor) for axis, anchor in joints], axis=-1)
 
     def reached(self, angles, goals, weights, damping: float, steps: int) -> np.ndarray:
         """Return the angles (..., legs, links), by damped least squares from given ones, that bring soles near goals.
@@ -96,13 +96,14 @@ class Legs(NamedTuple):
             damping: m.
             steps: of the search.
         """
+        numpy = goals.__array_namespace__()
         for _ in range(steps):
             place, jacobian = self.soles(angles)
             missing, weighed = weights @ (goals - place)[..., None], weights @ jacobian
             change = _least(weighed, missing, damping)
             # Joints at their bounds must not hold the others up.
             bound = (angles <= self.low) & (change < 0.0) | (angles >= self.high) & (change > 0.0)
-            change = _least(np.where(bound[..., None, :], 0.0, weighed), missing, damping)
+            change = _least(numpy.where(bound[..., None, :], 0.0, weighed), missing, damping)
             angles = (angles + change).clip(self.low, self.high)
         return angles
 
@@ -120,49 +121,52 @@ class Legs(NamedTuple):
 
 def _least(jacobian, missing, damping: float) -> np.ndarray:
     """The least changes of angles (..., n), with damping, that make up for what is missing (..., 3, 1)."""
-    across = np.swapaxes(jacobian, -1, -2)
-    return (across @ np.linalg.solve(jacobian @ across + damping**2 * np.eye(3), missing))[..., 0]
+    across, numpy = jacobian.swapaxes(-1, -2), jacobian.__array_namespace__()
+    return (across @ numpy.linalg.solve(jacobian @ across + damping**2 * np.eye(3), missing))[..., 0]
 
 
 def _rotations(axes, angles) -> np.ndarray:
     """Rotations (..., 3, 3) by angles (...) about unit axes (..., 3), after Rodrigues; none about an axis of 0."""
     cross = sum(axes[..., i, None, None] * _CROSS[i] for i in range(3))
-    sine, cosine = np.sin(angles)[..., None, None], np.cos(angles)[..., None, None]
+    numpy = angles.__array_namespace__()
+    sine, cosine = numpy.sin(angles)[..., None, None], numpy.cos(angles)[..., None, None]
     return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
 
 
-def flows(motion, places) -> np.ndarray:
-    """Return velocities (rows, places, 2) of places (..., places, 2 or 3) of a body that moves as (rows, 3).
+def flows(motion, places):
+    """Return velocities (environments, places, 2) of places (..., places, 2 or 3) of a body in motion.
 
     Args:
-        motion: forward, left and turning, m/s and rad/s.
+        motion: (environments, 3) forward, left and turning, m/s and rad/s.
         places: m from the centre of turning.
     """
     forward, left, turning = (motion[:, i : i + 1] for i in range(3))
-    return np.stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
+    stack = motion.__array_namespace__().stack
+    return stack([forward - turning * places[..., 1], left + turning * places[..., 0]], axis=-1)
 
 
-def rises(vertical, places) -> np.ndarray:
-    """Return how much higher (rows, places), m, places of the torso are than they would be were it level.
+def rises(vertical, places):
+    """Return by how much the torso's tilt raises places of it, (environments, places), m.
 
     Args:
-        vertical: (rows, 3) the world's, in the torso's frame.
+        vertical: (environments, 3) the world's, in the torso's frame.
         places: (places, 2 or 3) m from the centre.
     """
     return vertical[:, :1] * places[:, 0] + vertical[:, 1:2] * places[:, 1]
 
 
-def weights(ways, across: float) -> np.ndarray:
-    """Return weights (..., 3, 3) of what is missing along ways (..., 2), across them, and in height.
+def weights(paths, across: float, level: float = 1.0):
+    """Return weights (..., 3, 3) of an error along paths (..., 2), across them, and in height.
 
     Args:
-        ways: of feet, whatever their length.
-        across: how much it matters, beside its way and its height, that a foot slips across its way.
+        paths: of feet, of any length.
+        across: weight of the error across the path, against that along it.
+        level: weight of the error in height.
     """
-    length = np.hypot(ways[..., 0], ways[..., 1])[..., None]
-    along = np.where(length > 1e-9, ways / np.maximum(length, 1e-9), (1.0, 0.0))
-    found = np.zeros((*along.shape[:-1], 3, 3))
-    found[..., 0, :2] = along
-    found[..., 1, 0], found[..., 1, 1] = -across * along[..., 1], across * along[..., 0]
-    found[..., 2, 2] = 1.0
-    return found
+    numpy = paths.__array_namespace__()
+    length = numpy.hypot(paths[..., 0], paths[..., 1])[..., None]
+    along = numpy.where(length > 1e-9, paths / numpy.maximum(length, 1e-9), np.array((1.0, 0.0)))
+    x, y = along[..., 0], along[..., 1]
+    zero, height = numpy.zeros_like(x), numpy.full_like(x, level)
+    rows = (x, y, zero), (-across * y, across * x, zero), (zero, zero, height)
+    return numpy.stack([numpy.stack(row, axis=-1) for row in rows], axis=-2)

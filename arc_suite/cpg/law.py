@@ -1,11 +1,15 @@
-"""The one law of all demonstrators (the paper's Section 5), as pure functions of arrays.
+"""The published law of all demonstrators (the paper's Section 5), as pure functions of arrays of NumPy or JAX.
 
 A leg's hip sweeps linearly, back in stance and forth in swing; its other joints add a half-sine
 bell to their centre. A PD loop turns the distance to these targets into torques. Beyond the paper,
-a preset may add torques ahead of any error: harmonics of the leg's phase, and steering by yaw.
+a preset may add feedforward torques: harmonics of the leg's phase, and steering by yaw.
+
+A law of a demonstrator is a pure function `(state, observation) -> (state, actions)`. Its attribute
+`reads` names the blocks of the observation that it needs, float64 arrays (environments, size). Its
+state is a NamedTuple of arrays with a leading axis of environments, as `initial(count)` returns it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -33,18 +37,19 @@ class Pattern(NamedTuple):
     swing: np.ndarray
 
 
-def joint_targets(pattern: Pattern, time) -> np.ndarray:
-    """Return the joint angles (..., joints) wanted at a time (...) in s, in rad."""
+def joint_targets(pattern: Pattern, time):
+    """Return the target angles (..., joints) at a time (...) in s, in rad."""
+    numpy = time.__array_namespace__()
     cycle = (pattern.frequency * time[..., None] + pattern.offset) % 1.0
     duty = pattern.duty_factor
     in_stance = cycle < duty
-    progress = np.where(in_stance, cycle / duty, (cycle - duty) / (1.0 - duty))
-    sweep = np.where(in_stance, 1.0 - 2.0 * progress, 2.0 * progress - 1.0)
-    bend = np.where(in_stance, pattern.stance, pattern.swing)
-    return pattern.centre + pattern.sweep * sweep + bend * np.sin(np.pi * progress)
+    progress = numpy.where(in_stance, cycle / duty, (cycle - duty) / (1.0 - duty))
+    sweep = numpy.where(in_stance, 1.0 - 2.0 * progress, 2.0 * progress - 1.0)
+    bend = numpy.where(in_stance, pattern.stance, pattern.swing)
+    return pattern.centre + pattern.sweep * sweep + bend * numpy.sin(np.pi * progress)
 
 
-def torques(targets, angles, velocities, stiffness, damping, ahead=0.0) -> np.ndarray:
+def torques(targets, angles, velocities, stiffness, damping, feedforward=0.0):
     """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s).
 
     Args:
@@ -53,12 +58,12 @@ def torques(targets, angles, velocities, stiffness, damping, ahead=0.0) -> np.nd
         velocities: (..., joints) rad/s.
         stiffness: action per rad.
         damping: action per rad/s.
-        ahead: (..., joints) actions that are added, whatever the error is.
+        feedforward: (..., joints) actions that are added, whatever the error is.
     """
-    return (stiffness * (targets - angles) - damping * velocities + ahead).clip(-1.0, 1.0)
+    return (stiffness * (targets - angles) - damping * velocities + feedforward).clip(-1.0, 1.0)
 
 
-class Ahead(NamedTuple):
+class Feedforward(NamedTuple):
     """Actions that a preset adds whatever the error is, per joint.
 
     Attributes:
@@ -71,56 +76,87 @@ class Ahead(NamedTuple):
     sines: np.ndarray
     steering: np.ndarray
 
-    def __call__(self, pattern: Pattern, time, yaw) -> np.ndarray:
+    def __call__(self, pattern: Pattern, time, yaw):
         """Return the actions (..., joints) at a time (...) in s, with the torso turned by a yaw (...), rad."""
+        numpy = yaw.__array_namespace__()
         phase = 2.0 * np.pi * (pattern.frequency * time[..., None] + pattern.offset)
         multiples = phase[..., None] * np.arange(1, 1 + self.cosines.shape[-1])
-        waves = (self.cosines * np.cos(multiples) + self.sines * np.sin(multiples)).sum(axis=-1)
-        return waves + self.steering * yaw[..., None] * np.cos(phase)
+        waves = (self.cosines * numpy.cos(multiples) + self.sines * numpy.sin(multiples)).sum(axis=-1)
+        return waves + self.steering * yaw[..., None] * numpy.cos(phase)
 
 
-def felt(
-    observation: Mapping[str, np.ndarray], joints: int, parts: int | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what a demonstrator feels of named blocks: the torso's quaternion, joint angles and joint velocities.
+class Clock(NamedTuple):
+    """The state of a law with a clock of its own.
+
+    Attributes:
+        steps: (environments,) control steps since the start of the episode.
+    """
+
+    steps: np.ndarray
+
+
+class Clocked:
+    """A law with a clock of its own."""
+
+    reads = ("posture", "velocities")
+
+    def __init__(self, control: Callable):
+        """Take a function of control steps (...), quaternion (..., 4), joint angles and velocities (..., joints)."""
+        self.control = control
+
+    def initial(self, count: int) -> Clock:
+        """Return the state at the start of episodes in a number of environments."""
+        return Clock(np.zeros(count, int))
+
+    def __call__(self, state: Clock, observation: Mapping) -> tuple:
+        """Return the next state and the actions (environments, joints)."""
+        return Clock(state.steps + 1), self.control(state.steps, *proprioception(observation))
+
+
+def restarted(state, initial, mask):
+    """Return a state, an array or a NamedTuple of states, that is `initial` where a mask (environments,) holds."""
+    if isinstance(state, tuple):
+        return type(state)(*(restarted(*fields, mask) for fields in zip(state, initial, strict=True)))
+    return mask.__array_namespace__().where(mask.reshape(-1, *[1] * (state.ndim - 1)), initial, state)
+
+
+def proprioception(observation: Mapping) -> tuple:
+    """Return the torso's quaternion (..., 4), joint angles and joint velocities (..., joints) of named blocks."""
+    posture, velocities = observation["posture"], observation["velocities"]
+    return posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
+
+
+# A task that has a block, which an error names.
+_EXAMPLES = {"scan": "rough", "goal": "navigate", "ranges": "navigate"}
+
+
+def checked(observation, names: Iterable[str], joints: int, parts: int | None = None) -> dict[str, np.ndarray]:
+    """Return blocks of an observation as float64.
 
     Args:
         observation: blocks by name, each (..., size).
+        names: of the blocks; `posture` and `velocities` among them.
         joints: of the body.
         parts: rigid bodies of the body, to compare with contact forces where those are observed; None to
             compare nothing.
 
     Raises:
-        ValueError: not named blocks, or those of a body with another number of joints or parts; one line.
+        ValueError: not named blocks, one is missing, or those of a body with another number of joints or
+            parts; one line.
     """
     if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
         raise ValueError(
             "observation: expected blocks posture and velocities by name, as `split` of a task gives them, "
             f"got {type(observation).__name__}"
         )
-    posture, velocities = (np.asarray(observation[name], dtype=float) for name in ("posture", "velocities"))
-    quaternion, angles, speeds = posture[..., 1:5], posture[..., 5:], velocities[..., 6:]
-    if (angles.shape[-1], speeds.shape[-1]) != (joints, joints):
-        found = f"{angles.shape[-1]} angles and {speeds.shape[-1]} velocities"
+    sizes = np.shape(observation["posture"])[-1] - 5, np.shape(observation["velocities"])[-1] - 6
+    if sizes != (joints, joints):
+        found = f"{sizes[0]} angles and {sizes[1]} velocities"
         raise ValueError(f"observation: expected those of {joints} joints, got {found}")
     forces = np.shape(observation.get("contact_forces"))
     if parts is not None and forces and forces[-1] != 6 * parts:
         raise ValueError(f"observation: expected contact forces of {parts} rigid bodies, got {forces[-1] / 6:g}")
-    return quaternion, angles, speeds
-
-
-def blocks(observation: Mapping[str, np.ndarray], task: str, *names: str) -> tuple[np.ndarray, ...]:
-    """Return named blocks of an observation, (..., size) float64 each.
-
-    Args:
-        observation: blocks by name, each (..., size).
-        task: one that has them, which an error names.
-        names: of the blocks.
-
-    Raises:
-        ValueError: one of them is missing; one line.
-    """
     for name in names:
         if name not in observation:
-            raise ValueError(f"observation: expected a block {name}, as the task {task} has")
-    return tuple(np.asarray(observation[name], dtype=float) for name in names)
+            raise ValueError(f"observation: expected a block {name}, as the task {_EXAMPLES.get(name, 'steer')} has")
+    return {name: np.asarray(observation[name], dtype=float) for name in names}

@@ -1,65 +1,24 @@
-"""The demonstrators' numbers, by robot and preset."""
+"""The demonstrators' parameters, by robot and preset."""
 
 import functools
-from collections.abc import Mapping
-from typing import NamedTuple
 
+from arc_suite.cpg.balancing import BalancingParameters
+from arc_suite.cpg.planner import PlanningParameters
+from arc_suite.cpg.prescribed import Bend, Preset
+from arc_suite.cpg.sighted import SightedParameters
+from arc_suite.cpg.steering import SteeringParameters
 from arc_suite.robots.gaits import TRIPOD, TROT
 
-# An angle in degrees for all legs, or one for each rank: front, (middle,) rear.
-ByRank = float | tuple[float, ...]
+
+def _commanded(sighted: SightedParameters, **build) -> dict:
+    """Presets of a body that follow a command, given the parameters of steering that depend on its build."""
+    steered = SteeringParameters(**build)
+    surefooted = steered._replace(lift=0.45, gain=(2.0, 2.0, 1.0), integral=0.6, attitude=0.3)
+    return {"steered": steered, "surefooted": surefooted, "sighted": sighted, "planned": PlanningParameters(steered)}
 
 
-class Bend(NamedTuple):
-    """How far a joint departs from its centre in mid-stance and in mid-swing, degrees."""
-
-    stance: ByRank
-    swing: ByRank
-
-
-class Preset(NamedTuple):
-    """One way to walk.
-
-    Attributes:
-        stiffness: action per rad of error (kp).
-        damping: action per rad/s (kd).
-        settle: first control steps, in which the robot crouches.
-        ramp: control steps over which the stiffness grows linearly to its full value.
-        ramp_start: share of the stiffness at the first step.
-        frequency: of the cycle, Hz.
-        duty_factor: share of the cycle spent in stance.
-        phase_offsets: of the legs, cycles.
-        sweep: half of the hip's sweep, degrees.
-        centre: angles about which joints move, degrees, by joint; a hip's is positive forwards and
-            0 if it is not there.
-        bends: of the other joints, by name.
-        crouch: angles held while settling, as `centre`; None for the centre. Legs drawn up catch a
-            robot that a reset with its feet in the ground has thrown.
-        torques: actions that are added whatever the error is, by joint and for each rank: amplitudes of
-            the cosines of the leg's phase and its multiples, then of their sines; a hip's positive
-            forwards. None for none.
-        steering: action of the hips per rad of yaw, times the cosine of the leg's phase; the same sign
-            left and right, so that a negative one turns back to where the robot started.
-    """
-
-    stiffness: float
-    damping: float
-    settle: int
-    ramp: float
-    ramp_start: float
-    frequency: float
-    duty_factor: float
-    phase_offsets: tuple[float, ...]
-    sweep: ByRank
-    centre: Mapping[str, ByRank]
-    bends: Mapping[str, Bend]
-    crouch: Mapping[str, ByRank] | None = None
-    torques: Mapping[str, tuple[tuple[float, ...], ...]] | None = None
-    steering: float = 0.0
-
-
-SPEEDS = ("slow", "medium", "fast")  # the published ones
-PRESETS = (*SPEEDS, "tuned", "refined", "steered", "surefooted", "sighted", "planned", "balanced")
+# Of bodies and robots without presets of their own of these names; a number is a speed as a share of sqrt(g h).
+DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_commanded(SightedParameters())}
 
 _hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=TRIPOD)
 _queen = functools.partial(
@@ -79,7 +38,7 @@ _leaper = functools.partial(
     centre={"knee": 0, "ankle": 0},
 )
 
-TUNINGS = {
+PRESETS = {
     "queen": {
         "slow": _queen(
             duty_factor=0.65,
@@ -286,4 +245,22 @@ _REFINEMENTS = {
     },
 }
 for _robot, _added in _REFINEMENTS.items():
-    TUNINGS[_robot]["refined"] = TUNINGS[_robot]["tuned"]._replace(**_added)
+    PRESETS[_robot]["refined"] = PRESETS[_robot]["tuned"]._replace(**_added)
+
+# Leads, and what differs from other bodies, were found by search and by trying.
+PRESETS["queen"] |= _commanded(SightedParameters(ride=0.93), lead=0.12)
+PRESETS["bastion"] |= _commanded(SightedParameters(lift=0.35, lead=0.06, longer=0.0), lead=0.08)
+PRESETS["tick"] |= _commanded(SightedParameters(trust=0.5), lead=0.1)
+PRESETS["leaper"] |= _commanded(SightedParameters(), share=0.03, level=1.0, sweep=0.8, unload=0.0, lead=0.04)
+PRESETS["leaper"]["balanced"] = BalancingParameters(
+    feet=((0.59, 0.9, -0.62), (-0.55, 0.64, -0.64)),
+    lift=0.32,
+    gain=(0.5, 0.3, 0.5),
+    integral=0.5,
+    most=1.2,
+    shorter=0.06,
+    lead=0.06,
+    attitude=0.3,
+    lean=0.5,
+    capture=0.45,
+)

@@ -1,42 +1,38 @@
-"""The demonstrator that sees: feet step along paths in space, and land where the scanned ground carries them.
+"""The demonstrator `sighted`: feet step along paths in space, and land where the scanned ground carries them.
 
-In stance a foot moves against the velocity that is asked for; in swing it goes to where it is to
-land, shifted along its way to the nearest foothold. Joint angles follow by inverse kinematics of the
-legs, since the shifts are too long for the directions of joints by which the other demonstrators walk.
+In stance a foot moves against the requested velocity; in swing it goes to its foothold, shifted along
+its path to the nearest ground. Joint angles follow by inverse kinematics of the legs, since the shifts
+are too long for the directions of joints by which the law of `steering` walks.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg import footholds
-from arc_suite.cpg.following import Following, phase
+from arc_suite.cpg.commanded import Commanded, Request
 from arc_suite.cpg.kinematics import Legs, flows, rises, weights
-from arc_suite.cpg.law import blocks, felt, torques
-from arc_suite.models.sizing import control_timestep, position_gains, sized
-from arc_suite.models.standing import standing
-from arc_suite.robots.spec import Body
-from arc_suite.tasks import walk
-from arc_suite.tasks.fitting import reach, velocity_units
-from arc_suite.tasks.ground import SCAN
+from arc_suite.tasks.contract import Task
+from arc_suite.tasks.fitting import reach
+from arc_suite.tasks.sensors import SCAN
 
 
-class Tread(NamedTuple):
+class SightedParameters(NamedTuple):
     """How a demonstrator that sees walks.
 
     Attributes:
         lift: of a foot in mid-swing, in standing heights.
         ride: height of the torso, in standing heights: lower than one, for feet to reach further.
-        gain: of the motion's shortfall, forward, left and turning.
+        gain: of the motion's error, forward, left and turning.
         integral: of the same, a cycle of the gait.
-        most: that is asked for, in units of the command.
+        most: largest request, in units of the command.
         attitude: how far a foot is pushed down, as a share of how far the torso's tilt sinks its place.
         lead: of all legs over the gait's clock, cycles.
         longer: swing than the gait prescribes, cycles, since feet follow late.
-        trust: from 0 to 1, in the velocity that is asked for against the measured one, whose mean comes
-            late, in foreseeing where the torso is when a foot lands.
+        trust: from 0 to 1, in the requested velocity against the measured one, whose mean comes late,
+            in the prediction of where the torso is when a foot lands.
     """
 
     lift: float = 0.3
@@ -50,27 +46,23 @@ class Tread(NamedTuple):
     trust: float = 1.0
 
 
-# Of bodies that do not walk as all others; found by trying.
-TREADS = {"queen": Tread(ride=0.93), "bastion": Tread(lift=0.35, lead=0.06, longer=0.0), "tick": Tread(trust=0.5)}
-
-
 _SCANS = 6  # that are remembered
 _EARLY = 1.0  # control steps before landing, at which a foot is to be over its foothold
 _HELD = 0.1  # cycles before landing, in which its foothold is no longer changed
-_ACROSS = 0.3  # how much it matters, beside its way and its height, that a foot does not slip across its way
+_ACROSS = 0.3  # weight of a foot's slip across its path against its motion along it
 _DAMPING = 0.02  # of inverse kinematics, in standing heights
 _STEPS = 2  # of it in a control step
 
 
-class _State(NamedTuple):
-    """What is remembered of rows.
+class Plan(NamedTuple):
+    """The law's own state.
 
     Attributes:
-        feet: (rows, legs, 3) planned places of the soles, m.
-        angles: (rows, legs, links) planned for them, rad.
-        shifts: (rows, legs) of where feet land, m.
-        heights: (rows, scans, points) the latest scans, in standing heights; -inf before there were any.
-        moved: (rows, scans, 2) way of the torso since, m.
+        feet: (environments, legs, 3) planned places of the soles, m.
+        angles: (environments, legs, links) planned for them, rad.
+        shifts: (environments, legs) of where feet land, m.
+        heights: (environments, scans, points) the latest scans, in standing heights; -inf before there were any.
+        moved: (environments, scans, 2) displacement of the torso since, m.
     """
 
     feet: np.ndarray
@@ -80,108 +72,96 @@ class _State(NamedTuple):
     moved: np.ndarray
 
 
-class Sighted:
-    """Follows the block `command` as `Steered` does, over ground that the block `scan` shows, in rows of a batch."""
+class Sighted(Commanded):
+    """Follows a command over ground that the block `scan` shows.
 
-    def __init__(self, body: Body, tread: Tread):
-        """Fit the law to a body.
+    Attributes:
+        legs: their kinematics.
+        places: (legs, 3) of the soles at ease, m.
+    """
 
-        Args:
-            body: any body.
-            tread: how it walks.
-        """
-        body, self._parts = sized(body), len(body.part_names)
-        parameters, pose = walk.settings(body, {}).parameters, standing(body)
-        self._tread, self._height, self._legs = tread, pose.height, Legs.of(body)
-        self._step = control_timestep(body)
-        self._cycles = parameters.gait_frequency * self._step  # a control step
-        self._stance = parameters.duty_factor / parameters.gait_frequency  # s
-        self._duty = parameters.duty_factor - tread.longer
-        self._offsets = np.array(parameters.phase_offsets) / (2.0 * np.pi) + tread.lead
-        self._units = velocity_units(body, parameters.target_velocity)
-        self._reach = reach(body)
-        self._stiffness, self._damping = position_gains(body, pose.inertias)
-        self._following = Following(tread.gain, tread.integral, self._cycles)
-        soles = np.where((True, True, False), pose.soles, -tread.ride * pose.height)
-        angles = self._legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), _DAMPING * tread.ride * pose.height)
-        self._places = self._legs.soles(angles)[0]
+    reads = (*Commanded.reads, "scan")
+
+    def __init__(self, task: Task, parameters: SightedParameters):
+        """Fit the law to a task; see `Commanded`."""
+        super().__init__(task, parameters)
+        self.duty_factor -= parameters.longer
+        self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.pose.height
+        soles = np.where((True, True, False), self.pose.soles, -ride)
+        angles = self.legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), _DAMPING * ride)
+        self.places = self.legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
-        self._first = _State(self._places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
-        self._state = None
+        self._first = Plan(self.places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
 
-    def begin(self, rows: Sequence[int]) -> None:
-        """Start episodes in some rows, given by their indices."""
-        self._following.begin(rows)
-        if self._state is not None:
-            for field, first in zip(self._state, self._first, strict=True):
-                field[rows] = first
+    def initial_plan(self, count: int) -> Plan:
+        """Return feet at ease, and nothing seen."""
+        return Plan(*(np.tile(first, (count, *[1] * first.ndim)) for first in self._first))
 
-    def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
-        quaternion, angles, velocities = felt(observation, len(self._stiffness), self._parts)
-        commanded, clock, motion = blocks(observation, "steer", "command", "gait_clock", "velocities")
-        (scan,) = blocks(observation, "rough", "scan")
-        rows = len(angles)
-        if self._state is None or len(self._state.feet) != rows:
-            self._state = _State(*(np.tile(first, (rows, *[1] * first.ndim)) for first in self._first))
-        self._remember(scan, motion[:, :2])
-        asked, size = self._following.asked(clock, commanded)
-        asked = size * asked.clip(-self._tread.most, self._tread.most) * self._units
-        cycle = (phase(clock)[:, None] + self._offsets + self._cycles) % 1.0  # at the next control step
-        trust = self._tread.trust
-        foreseen = trust * asked + (1.0 - trust) * commanded[:, 3:] * self._units
-        feet = self._planned(cycle, asked, foreseen, size, quaternion)
-        aims = weights(flows(asked, feet), _ACROSS)
-        planned = self._legs.reached(self._state.angles, feet, aims, _DAMPING * self._height, _STEPS)
-        targets, ahead = self._legs.by_joint(self._state.angles), self._legs.by_joint(planned)
-        self._state.feet[:], self._state.angles[:] = feet, planned
-        speeds = (ahead - targets) / self._step
-        return torques(targets, angles, velocities - speeds, self._stiffness, self._damping)
+    def planned(self, plan: Plan, request: Request, observation: Mapping) -> tuple:
+        """Return the next plan, target angles (environments, joints), rad, and their change; see `Commanded`."""
+        p, height = self.parameters, self.pose.height
+        plan = self._looked(plan, observation["scan"], observation["velocities"][:, :2])
+        motion = request.size * request.motion.clip(-p.most, p.most) * self.units
+        cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0  # in the next control step
+        predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
+        feet, shifts = self._next_feet(plan, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
+        aims = weights(flows(motion, feet), _ACROSS)
+        angles = self.legs.reached(plan.angles, feet, aims, _DAMPING * height, _STEPS)
+        targets = self.legs.by_joint(plan.angles)
+        change = self.legs.by_joint(angles) - targets
+        return plan._replace(feet=feet, angles=angles, shifts=shifts), targets, change
 
-    def _remember(self, scan, velocity) -> None:
-        """Take in a scan (rows, points), and how far the torso has moved at a velocity (rows, 2), m/s."""
-        heights, moved = self._state.heights, self._state.moved
-        heights[:, 1:] = heights[:, :-1].copy()
-        moved[:, 1:] = moved[:, :-1] + velocity[:, None] * self._step
-        heights[:, 0], moved[:, 0] = scan, 0.0
+    def _looked(self, plan: Plan, scan, velocity) -> Plan:
+        """The plan with a scan (environments, points) more, the torso moving at a velocity (environments, 2), m/s."""
+        numpy = scan.__array_namespace__()
+        moved = plan.moved[:, :-1] + velocity[:, None] * self.step
+        return plan._replace(
+            heights=numpy.concatenate([scan[:, None], plan.heights[:, :-1]], axis=1),
+            moved=numpy.concatenate([numpy.zeros_like(moved[:, :1]), moved], axis=1),
+        )
 
-    def _planned(self, cycle, asked, foreseen, size, quaternion) -> np.ndarray:
-        """Places (rows, legs, 3) of the soles at the next control step, m.
+    def _next_feet(self, plan: Plan, cycle, motion, predicted, size, quaternion) -> tuple:
+        """Places (environments, legs, 3) of the soles in the next control step, m, and shifts of where they land.
 
         Args:
-            cycle: (rows, legs) phases of the legs then.
-            asked: (rows, 3) velocity, m/s and rad/s.
-            foreseen: (rows, 3) velocity until feet land.
-            size: (rows, 1) of the gait.
-            quaternion: (rows, 4) of the torso.
+            plan: with the latest scan.
+            cycle: (environments, legs) phases of the legs then.
+            motion: (environments, 3) requested velocity, m/s and rad/s.
+            predicted: (environments, 3) velocity until feet land.
+            size: (environments, 1) of the gait.
+            quaternion: (environments, 4) of the torso.
         """
-        feet, stands = self._state.feet, cycle < self._duty
-        left = np.where(stands, 0.0, (1.0 - cycle) / self._cycles)  # control steps from then to landing
-        early = np.minimum(left, _EARLY)
-        drift = flows(foreseen, self._places) * self._step  # of the torso over the ground, a control step
-        goal = self._landing(asked, drift * (left + 1.0)[..., None], stands | (left + 1.0 < _HELD / self._cycles))
-        goal += drift * early[..., None]
-        swung = feet[..., :2] + (goal - feet[..., :2]) / (np.floor(left - early) + 1.0)[..., None]
-        stood = (cycle / self._cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
-        stood = feet[..., :2] - flows(asked, feet) * self._step * stood
-        tilt = rises(rotations.matrix(quaternion)[:, 2], self._places)  # by the world's vertical in the torso's frame
-        progress = ((cycle - self._duty) / (1.0 - self._duty)).clip(0.0)
-        lift = size * self._tread.lift * self._height * np.sin(np.pi * progress)
-        heights = self._places[:, 2] + lift + self._tread.attitude * tilt
-        return np.concatenate([np.where(stands[..., None], stood, swung), heights[..., None]], axis=-1)
+        numpy, duty = cycle.__array_namespace__(), self.duty_factor
+        feet, stands = plan.feet, cycle < duty
+        left = numpy.where(stands, 0.0, (1.0 - cycle) / self.cycles)  # control steps from then to landing
+        early = numpy.minimum(left, _EARLY)
+        drift = flows(predicted, self.places) * self.step  # of the torso over the ground, a control step
+        held = stands | (left + 1.0 < _HELD / self.cycles)
+        goal, shifts = self._landing(plan, motion, drift * (left + 1.0)[..., None], held)
+        goal = goal + drift * early[..., None]
+        swung = feet[..., :2] + (goal - feet[..., :2]) / (numpy.floor(left - early) + 1.0)[..., None]
+        stood = (cycle / self.cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
+        stood = feet[..., :2] - flows(motion, feet) * self.step * stood
+        tilt = rises(rotations.matrix(quaternion)[:, 2], self.places)  # by the world's vertical in the torso's frame
+        progress = ((cycle - duty) / (1.0 - duty)).clip(0.0)
+        lift = size * self.parameters.lift * self.pose.height * numpy.sin(np.pi * progress)
+        heights = self.places[:, 2] + lift + self.parameters.attitude * tilt
+        ground = numpy.where(stands[..., None], stood, swung)
+        return numpy.concatenate([ground, heights[..., None]], axis=-1), shifts
 
-    def _landing(self, asked, moved, held) -> np.ndarray:
-        """Where feet land (rows, legs, 2), m from where the torso is when they do.
+    def _landing(self, plan: Plan, motion, moved, held) -> tuple:
+        """Where feet land (environments, legs, 2), m from where the torso is then, and shifts (environments, legs).
 
         Args:
-            asked: (rows, 3) velocity, m/s and rad/s.
-            moved: (rows, legs, 2) way of the torso until then, at the feet, m.
-            held: (rows, legs) whether what was chosen stays.
+            plan: with the latest scan.
+            motion: (environments, 3) requested velocity, m/s and rad/s.
+            moved: (environments, legs, 2) displacement of the torso until then, at the feet, m.
+            held: (environments, legs) whether the last choice stays.
         """
-        half = 0.5 * self._stance * flows(asked, self._places)
-        along = half / np.maximum(np.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
-        landing, shifts = self._places[:, :2] + half, self._state.shifts
-        view = footholds.View(self._state.heights, self._state.moved, self._reach)
-        found = footholds.shifts(view, landing + moved, along, self._places[:, :2], self._height)
-        shifts[:] = np.where(held, shifts, found)
-        return landing + shifts[..., None] * along
+        numpy = motion.__array_namespace__()
+        half = 0.5 * self.stance * flows(motion, self.places)
+        along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
+        landing, view = self.places[:, :2] + half, footholds.View(plan.heights, plan.moved, self._reach)
+        found = footholds.shifts(view, landing + moved, along, self.places[:, :2], self.pose.height)
+        shifts = numpy.where(held, plan.shifts, found)
+        return landing + shifts[..., None] * along, shifts

@@ -1,62 +1,46 @@
-"""Demonstrators that feel: one law for any body that follows a command of velocities.
+"""The demonstrators `steered` and `surefooted`: one law for any body that follows a command of velocities.
 
-Each foot on the ground is to move, relative to the torso, against the velocity that is asked for
+Each foot on the ground is to move, relative to the torso, against the velocity that is requested
 where it stands; in swing it returns and is lifted. Both are directions in a leg's joint space,
-found by damped least squares at a neutral pose that leaves every joint room to both sides. What is
-asked for is the command, corrected by how the measured motion falls short of it.
+found by damped least squares at a neutral pose that leaves every joint room to both sides. The
+request is the command, corrected by feedback.
 """
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import robots, rotations
-from arc_suite.cpg.following import Following, phase
-from arc_suite.cpg.kinematics import flows, rises
-from arc_suite.cpg.law import blocks, felt, torques
+from arc_suite import rotations
+from arc_suite.cpg.commanded import Commanded, Request
+from arc_suite.cpg.kinematics import flows, rises, weights
 from arc_suite.cpg.stride import lifted
-from arc_suite.models.sizing import control_timestep, position_gains, sized
-from arc_suite.models.standing import Standing, standing
+from arc_suite.models.sizing import sized
+from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import walk
-from arc_suite.tasks.fitting import velocity_units
+from arc_suite.tasks.contract import Task
 
 
-class Manner(NamedTuple):
+class SteeringParameters(NamedTuple):
     """How a steering demonstrator walks.
 
     Attributes:
         lift: of a foot in mid-swing, in standing heights.
-        gain: of the motion's shortfall, forward, left and turning.
+        gain: of the motion's error, forward, left and turning.
         integral: of the same, a cycle of the gait.
         attitude: how far the low side of the torso is pushed up, rad of lift per rad of tilt.
-    """
-
-    lift: float
-    gain: tuple[float, float, float]
-    integral: float
-    attitude: float
-
-
-STEERING = {
-    "steered": Manner(lift=0.2, gain=(1.0, 1.0, 0.5), integral=0.3, attitude=0.0),
-    "surefooted": Manner(lift=0.45, gain=(2.0, 2.0, 1.0), integral=0.6, attitude=0.3),
-}
-
-
-class Build(NamedTuple):
-    """Numbers of the law that depend on how a body is built.
-
-    Attributes:
         share: of a joint's range that the neutral pose leaves to either side.
-        level: how much it matters that a foot does not rise or sink in stance.
+        level: weight of a foot's vertical motion in stance against its motion along its path.
         sweep: most that a joint is swept to either side, rad.
-        unload: of the standing height, by which a leg is held up that cannot sweep as asked.
+        unload: of the standing height, by which a leg is held up that cannot sweep as requested.
         lead: of all legs over the gait's clock, cycles.
     """
 
+    lift: float = 0.2
+    gain: tuple[float, float, float] = (1.0, 1.0, 0.5)
+    integral: float = 0.3
+    attitude: float = 0.0
     share: float = 0.25
     level: float = 4.0
     sweep: float = 0.5
@@ -64,14 +48,7 @@ class Build(NamedTuple):
     lead: float = 0.0
 
 
-BUILDS = {
-    "queen": Build(lead=0.12),
-    "bastion": Build(lead=0.08),
-    "tick": Build(lead=0.1),
-    "leaper": Build(share=0.03, level=1.0, sweep=0.8, unload=0.0, lead=0.04),
-}
-
-_ACROSS = 0.1  # how much it matters that a foot does not slip across its way
+_ACROSS = 0.1  # weight of a foot's slip across its path against its motion along it
 _DAMPING = 0.1  # of the leg's largest Jacobian entry, for a joint with room for _ROOM
 _ROOM = 0.5  # rad
 
@@ -80,118 +57,92 @@ class _Leg(NamedTuple):
     """A leg in the neutral pose.
 
     Attributes:
-        joints: (n,) indices.
         jacobian: (3, n) of the sole.
-        foot: (2,) place of the sole, from the centre of mass, m.
         room: (n,) to either side for sweeping, rad.
         lift: (n,) angles in mid-swing, rad.
-        offset: cycles, over the clock.
     """
 
-    joints: np.ndarray
     jacobian: np.ndarray
-    foot: np.ndarray
     room: np.ndarray
     lift: np.ndarray
-    offset: float
 
 
-class Steered:
-    """Follows the block `command` of a task in the rows of a batch, by the gait that the block `gait_clock` tells.
+class Steered(Commanded):
+    """Follows a command on level ground, without sight.
 
     Attributes:
-        extent: of the feet from the centre of mass in the neutral pose, m.
+        neutral: (joints,) pose, rad.
+        legs: in that pose.
+        feet: (legs, 2) places of the soles, from the centre of mass, m.
+        extent: of the feet from the centre of mass, m.
     """
 
-    def __init__(self, body: Body, manner: Manner, build: Build | None = None):
-        """Fit the law to a body.
+    def __init__(self, task: Task, parameters: SteeringParameters):
+        """Fit the law to a task; see `Commanded`."""
+        body = sized(task.scene.body)
+        self.neutral = _neutral(body, parameters.share)
+        super().__init__(task, parameters, tuple(self.neutral))
+        self.legs = list(self._legs())
+        self.feet = (self.pose.soles - self.pose.centre)[:, :2]
+        self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
 
-        Args:
-            body: any body.
-            manner: how it walks, one of `STEERING` or numbers of one's own.
-            build: numbers for a body of another build; None for those of its name, or the usual ones.
-        """
-        self._manner = manner
-        build = build or robots.row(BUILDS, body, "steering") or Build()
-        body, self._parts = sized(body), len(body.part_names)
-        parameters = walk.settings(body, {}).parameters
-        self._duty, self._unload = parameters.duty_factor, build.unload / self._manner.lift
-        self._neutral = _neutral(body, build.share)
-        pose = standing(body, tuple(self._neutral))
-        self._legs = _legs(body, pose, self._neutral, build, self._manner, parameters.phase_offsets)
-        self._level, self._height = build.level, pose.height
-        step = control_timestep(body)
-        self._cycles = parameters.gait_frequency * step  # a control step
-        self._step = step
-        self._stance = parameters.duty_factor / parameters.gait_frequency  # s
-        self._units = velocity_units(body, parameters.target_velocity)
-        self._stiffness, self._damping = position_gains(body, pose.inertias)
-        self._following = Following(manner.gain, manner.integral, self._cycles)
-        self._feet = np.array([leg.foot for leg in self._legs])
-        self.extent = float(max(np.hypot(*self._feet.T) + [leg.foot.radius for leg in body.legs]))
+    def initial_plan(self, count: int) -> tuple:
+        """Return nothing: the law remembers no more than `State` does."""
+        return ()
 
-    def begin(self, rows: Sequence[int]) -> None:
-        """Start episodes in some rows, given by their indices."""
-        self._following.begin(rows)
-
-    def act(self, observation: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return the actions (rows, joints) of a control step; see `Demonstrator.act`."""
-        quaternion, angles, velocities = felt(observation, len(self._neutral), self._parts)
-        commanded, clock = blocks(observation, "steer", "command", "gait_clock")
-        asked, size = self._following.asked(clock, commanded)
-        sweeps, raised, lifts = self._directions(asked * self._units, quaternion)
-        now = phase(clock)
-        targets, ahead = (size * (raised + self._swung(at, sweeps, lifts)) for at in (now, now + self._cycles))
-        speeds = (ahead - targets) / self._step
-        return torques(self._neutral + targets, angles, velocities - speeds, self._stiffness, self._damping)
-
-    def _directions(self, asked, quaternion):
-        """Sweeps, raised poses and lifts of all joints, (rows, joints) each."""
-        shape = (len(asked), len(self._neutral))
-        sweeps, raised, lifts = np.zeros(shape), np.zeros(shape), np.zeros(shape)
-        ways = 0.5 * self._stance * flows(asked, self._feet)
+    def planned(self, plan: tuple, request: Request, observation: Mapping) -> tuple:
+        """Return the target angles (environments, joints), rad, and their change in a step; see `Commanded`."""
+        numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
+        paths = 0.5 * self.stance * flows(request.motion * self.units, self.feet)
         # The low side of the torso is pushed up: its feet go down.
-        lows = -rises(rotations.matrix(quaternion)[:, 2], self._feet) / self._height
-        for index, leg in enumerate(self._legs):
-            sweep, able = _sweep(leg, ways[:, index], self._level)
-            sweeps[:, leg.joints] = sweep
+        lows = -rises(rotations.matrix(quaternion)[:, 2], self.feet) / self.pose.height
+        unload = self.parameters.unload / self.parameters.lift
+        now, later = [], []
+        for index, leg in enumerate(self.legs):
+            sweep, able = _sweep(leg, paths[:, index], self.parameters.level)
             low = lows[:, index : index + 1]
-            raised[:, leg.joints] = ((1.0 - able) * self._unload - self._manner.attitude * low) * leg.lift
-            lifts[:, leg.joints] = leg.lift
-        return sweeps, raised, lifts
+            raised = ((1.0 - able) * unload - self.parameters.attitude * low) * leg.lift
+            for targets, phase in ((now, request.phase), (later, request.phase + request.advance)):
+                cycle = (phase + self.offsets[index]) % 1.0
+                targets.append(raised + _swung(cycle[:, None], self.duty_factor, sweep, leg.lift))
+        now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
+        return plan, self.neutral + now, later - now
 
-    def _swung(self, phase, sweeps, lifts) -> np.ndarray:
-        """Departures (rows, joints) from the neutral pose at phases (rows,) of the clock, cycles."""
-        targets = np.zeros_like(sweeps)
-        for leg in self._legs:
-            cycle = (phase + leg.offset) % 1.0
-            stands = cycle < self._duty
-            progress = np.where(stands, cycle / self._duty, (cycle - self._duty) / (1.0 - self._duty))[:, None]
-            stands = stands[:, None]
-            swept = np.where(stands, 1.0 - 2.0 * progress, 2.0 * progress - 1.0) * sweeps[:, leg.joints]
-            lifted = np.where(stands, 0.0, np.sin(np.pi * progress)) * lifts[:, leg.joints]
-            targets[:, leg.joints] = swept + lifted
-        return targets
+    def _legs(self):
+        low, high = _ranges(self.body) - self.neutral
+        first = 0
+        for leg, jacobian in zip(self.body.legs, self.pose.jacobians, strict=True):
+            joints = slice(first, first + len(leg.joints))
+            first = joints.stop
+            below, above = -0.95 * low[joints], 0.95 * high[joints]
+            room = np.minimum(np.minimum(below, above), self.parameters.sweep).clip(1e-3)
+            yield _Leg(jacobian, room, lifted(jacobian, self.parameters.lift * self.pose.height, below, above))
 
 
-def _sweep(leg: _Leg, way, level: float):
-    """Joint angles (rows, n) that move a foot by a way (rows, 2), and which share (rows, 1) of it they manage."""
-    length = np.hypot(way[:, 0], way[:, 1])[:, None]
-    along = way / np.maximum(length, 1e-9)
-    frame = np.zeros((len(way), 3, 3))
-    frame[:, 0, :2] = along
-    frame[:, 1, 0], frame[:, 1, 1] = -_ACROSS * along[:, 1], _ACROSS * along[:, 0]
-    frame[:, 2, 2] = level
-    weighted = frame @ leg.jacobian
+def _swung(cycle, duty_factor: float, sweep, lift):
+    """Departures (environments, n) of a leg's joints from the neutral pose at phases (environments, 1), cycles."""
+    numpy, stands = cycle.__array_namespace__(), cycle < duty_factor
+    progress = numpy.where(stands, cycle / duty_factor, (cycle - duty_factor) / (1.0 - duty_factor))
+    swept = numpy.where(stands, 1.0 - 2.0 * progress, 2.0 * progress - 1.0) * sweep
+    return swept + numpy.where(stands, 0.0, numpy.sin(np.pi * progress)) * lift
+
+
+def _sweep(leg: _Leg, path, level: float):
+    """Joint angles (environments, n) that move a foot along a path (environments, 2), and the share (environments, 1)
+    of it that they manage."""
+    numpy = path.__array_namespace__()
+    length = numpy.hypot(path[:, 0], path[:, 1])[:, None]
+    along = path / numpy.maximum(length, 1e-9)
+    weighted = weights(path, _ACROSS, level) @ leg.jacobian
     damping = np.diag((_DAMPING * abs(leg.jacobian).max() * _ROOM / leg.room) ** 2)
-    turned = np.swapaxes(weighted, -1, -2)
-    angles = np.linalg.solve(turned @ weighted + damping, turned[..., :1] * length[..., None])[..., 0]
+    turned = weighted.swapaxes(-1, -2)
+    angles = numpy.linalg.solve(turned @ weighted + damping, turned[..., :1] * length[..., None])[..., 0]
     moved = (weighted @ angles[..., None])[..., 0]
-    angles *= moved[:, :1] * length / np.maximum((moved**2).sum(axis=-1, keepdims=True), 1e-12)
-    angles *= np.minimum(1.0, (leg.room / np.maximum(abs(angles), 1e-12)).min(axis=-1, keepdims=True))
-    # A product of each row by itself: one of all rows would round as their number has it.
+    angles = angles * (moved[:, :1] * length / numpy.maximum((moved**2).sum(axis=-1, keepdims=True), 1e-12))
+    angles = angles * numpy.minimum(1.0, (leg.room / numpy.maximum(abs(angles), 1e-12)).min(axis=-1, keepdims=True))
+    # A product for each environment by itself: one of all would round differently with their number.
     reached = (along * (leg.jacobian[:2] @ angles[..., None])[..., 0]).sum(axis=-1, keepdims=True)
-    return angles, np.where(length > 1e-9, reached / np.maximum(length, 1e-9), 1.0).clip(0.0, 1.0)
+    return angles, numpy.where(length > 1e-9, reached / numpy.maximum(length, 1e-9), 1.0).clip(0.0, 1.0)
 
 
 def _ranges(body: Body) -> np.ndarray:
@@ -214,23 +165,3 @@ def _neutral(body: Body, share: float) -> np.ndarray:
             first = last
         angles = angles.clip(low, high)
     return angles
-
-
-def _legs(body: Body, pose: Standing, neutral, build: Build, manner: Manner, offsets) -> list[_Leg]:
-    low, high = _ranges(body) - neutral
-    legs, first = [], 0
-    for leg, jacobian, sole, offset in zip(body.legs, pose.jacobians, pose.soles, offsets, strict=True):
-        joints = np.arange(first, first + len(leg.joints))
-        first = joints[-1] + 1
-        below, above = -0.95 * low[joints], 0.95 * high[joints]
-        legs.append(
-            _Leg(
-                joints,
-                jacobian,
-                (sole - pose.centre)[:2],
-                np.minimum(np.minimum(below, above), build.sweep).clip(1e-3),
-                lifted(jacobian, manner.lift * pose.height, below, above),
-                offset / (2.0 * np.pi) + build.lead,
-            )
-        )
-    return legs

@@ -11,12 +11,12 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite import checks, rotations
-from arc_suite.cpg.law import Pattern, joint_targets, torques
-from arc_suite.models.sizing import GRAVITY, control_timestep, position_gains, sized
+from arc_suite.cpg.gait import gait_of
+from arc_suite.cpg.law import Clocked, Pattern, joint_targets, torques
+from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
-from arc_suite.robots.gaits import Gait
-from arc_suite.robots.spec import Body, Leg
-from arc_suite.tasks.fitting import GAIT_FREQUENCY
+from arc_suite.robots.spec import Leg
+from arc_suite.tasks.contract import Task
 
 _LEAST_FROUDE = 1e-3
 
@@ -59,26 +59,26 @@ class Stride(NamedTuple):
     steering: np.ndarray
 
     @classmethod
-    def fit(cls, body: Body, froude: float, gait: Gait) -> Self:
-        """Return the stride that suits a body.
+    def fit(cls, task: Task, froude: float) -> Self:
+        """Return the stride that suits a body, in the gait of a task.
 
         Args:
-            body: the spec.
-            froude: wanted speed as a share of sqrt(g h), from -1 to 1 and not 0; where legs are too
-                short for it, they sweep as far as they reach. A negative one walks backwards.
-            gait: when each leg stands.
+            task: whose body is to walk, and whose gait it walks in.
+            froude: speed as a share of sqrt(g h), from -1 to 1 and not 0, at the default target velocity, with
+                which it scales; where legs are too short for it, they sweep as far as they reach. A negative
+                one walks backwards.
 
         Raises:
-            ValueError: such a speed cannot be.
+            ValueError: the speed or the gait does not fit; one line.
         """
         if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
             raise ValueError(f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {froude!r}")
+        body, gait = task.scene.body, gait_of(task)
         pose = standing(body)  # of the body as it came, for which the task has it at hand
         body = sized(body)
-        cycle = GAIT_FREQUENCY * math.sqrt(GRAVITY / pose.height)
-        speed = froude * math.sqrt(GRAVITY * pose.height)
+        speed = gait.pace * froude * math.sqrt(GRAVITY * pose.height)
         # A foot on the ground covers from +reach to -reach while its stance lasts.
-        reach = 0.5 * speed * gait.duty_factor / cycle
+        reach = 0.5 * speed * gait.duty_factor / gait.frequency or 1e-6 * pose.height
         joints = [joint for leg in body.legs for joint in leg.joints]
         counts = [len(leg.joints) for leg in body.legs]
         sweeps, lifts, raised = [], [], []
@@ -94,7 +94,7 @@ class Stride(NamedTuple):
         lateral = pose.soles[:, 1] / max(abs(pose.soles[:, 1]).max(), 1e-9)
         return cls(
             pattern=Pattern(
-                frequency=cycle,
+                frequency=gait.frequency,
                 duty_factor=gait.duty_factor,
                 offset=np.repeat(gait.offsets, counts),
                 sweep=np.concatenate(sweeps),
@@ -102,15 +102,15 @@ class Stride(NamedTuple):
                 stance=np.zeros(len(joints)),
                 swing=np.concatenate(lifts),
             ),
-            control_timestep=control_timestep(body),
+            control_timestep=task.scene.control_timestep,
             stiffness=stiffness,
             damping=damping,
-            steering=math.copysign(STEERING, froude) * np.repeat(lateral, counts),
+            steering=math.copysign(STEERING, speed) * np.repeat(lateral, counts),
         )
 
-    def __call__(self, clock, quaternion, angles, velocities) -> np.ndarray:
+    def __call__(self, clock, quaternion, angles, velocities):
         """Return the actions (..., joints) after `clock` (...) control steps."""
-        yaw = rotations.yaw(np.asarray(quaternion))[..., None]
+        yaw = rotations.yaw(quaternion)[..., None]
         # Turned to the left, legs on the left take longer strides.
         pattern = self.pattern._replace(
             sweep=self.pattern.sweep * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))
@@ -118,9 +118,17 @@ class Stride(NamedTuple):
         time = self.control_timestep * clock
         onset = (pattern.frequency * time[..., None] / ONSET).clip(max=1.0)
         targets = onset * joint_targets(pattern, time)
-        ahead = onset * joint_targets(pattern, time + self.control_timestep)
-        target_velocities = (ahead - targets) / self.control_timestep
+        following = onset * joint_targets(pattern, time + self.control_timestep)
+        target_velocities = (following - targets) / self.control_timestep
         return torques(targets, angles, velocities - target_velocities, self.stiffness, self.damping)
+
+
+class StrideLaw(Clocked):
+    """The law by a stride, in the gait of a task."""
+
+    def __init__(self, task: Task, froude: float):
+        """Fit a stride; see `Stride.fit`."""
+        super().__init__(Stride.fit(task, froude))
 
 
 def _sweep(leg: Leg, jacobian, reach: float) -> np.ndarray:

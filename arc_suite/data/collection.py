@@ -17,7 +17,7 @@ from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import Task, terms
 
-ROWS = 64  # from here on a row's step costs the same, and a dataset's tail idles more
+NUM_ENVS = 64  # from here on a step costs the same for each, and a dataset's tail idles more
 
 # A finished episode is written at once, unless writing has taken more than this share of the time so far, which
 # happens where episodes are short, or when those that wait have this size in bytes.
@@ -29,7 +29,7 @@ def collect(
     dataset_id: str,
     settings: Settings,
     episodes: int,
-    rows: int = ROWS,
+    num_envs: int = NUM_ENVS,
     threads: int | None = None,
     overwrite: bool = False,
     progress: Callable = tqdm,
@@ -43,7 +43,7 @@ def collect(
         dataset_id: Minari's.
         settings: what the episodes depend on.
         episodes: how many the dataset is to have.
-        rows: how many are played at a time; the data do not depend on it.
+        num_envs: number of episodes that are played at a time; the data do not depend on it.
         threads: on which to simulate; None for all cores. The data do not depend on it.
         overwrite: replace a dataset that is there, when the new one is complete.
         progress: makes progress bars as `tqdm` does.
@@ -77,7 +77,7 @@ def collect(
                 if storage.metadata is None:
                     storage.metadata = _metadata(dataset_id, settings, provenance, threads)
                 storage.metadata |= said
-                _play(storage, settings, missing, rows, threads, progress)
+                _play(storage, settings, missing, num_envs, threads, progress)
             storage.finish(lambda indices: progress(indices, desc="merging", unit="episode", leave=False))
         except (ValueError, OSError, KeyboardInterrupt) as error:
             kind = next(kind for kind in (ValueError, OSError, KeyboardInterrupt) if isinstance(error, kind))
@@ -91,11 +91,11 @@ def _check(settings: Settings, episodes: int) -> None:
     checks.integer("steps", settings.steps, 1)
     checks.seed(settings.seed)
     checks.seed(settings.seed + episodes - 1)
-    _policy(settings, rows=1)  # finds out whether there is such a policy
+    _policy(settings, num_envs=1)  # finds out whether there is such a policy
 
 
-def _policy(settings: Settings, rows: int, task: Task | None = None) -> policies.Policy:
-    return policies.policy(settings.policy, settings.setup.body, settings.presets, rows, settings.noise, task)
+def _policy(settings: Settings, num_envs: int, task: Task | None = None) -> policies.Policy:
+    return policies.policy(settings.policy, settings.setup.body, settings.presets, num_envs, settings.noise, task)
 
 
 def _difference(was: dict, now: dict) -> str | None:
@@ -110,10 +110,11 @@ def _difference(was: dict, now: dict) -> str | None:
     return None
 
 
-def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, threads, progress: Callable) -> None:
+def _play(storage: Storage, settings: Settings, missing: list[int], num_envs: int, threads, progress: Callable) -> None:
     """Play the missing episodes into the storage."""
-    rows = math.ceil(len(missing) / math.ceil(len(missing) / rows))  # all rows busy to the end, or nearly
-    environment = settings.environment(rows, threads)
+    # All environments are busy to the end, or nearly.
+    num_envs = math.ceil(len(missing) / math.ceil(len(missing) / num_envs))
+    environment = settings.environment(num_envs, threads)
     seeds = [settings.seed + index for index in missing]
     pending, size, started, spent = {}, 0, time.monotonic(), 0.0
 
@@ -136,7 +137,8 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
         unit_scale=True,
     ) as bar:
         try:
-            for step in rollouts.play(environment, _policy(settings, rows, environment.task), seeds, settings.steps):
+            policy = _policy(settings, num_envs, environment.task)
+            for step in rollouts.play(environment, policy, seeds, settings.steps):
                 bar.update(step.playing)
                 for episode in step.finished:
                     pending[episode.seed - settings.seed] = episode._replace(preset=settings.preset(episode.seed))
@@ -180,4 +182,4 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) ->
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
     """Return the mean return by the evaluation protocol."""
     policy = _policy(settings, environment.num_envs, environment.task)
-    return float(np.mean([episode.total for episode in evaluation.episodes_in_rows(environment, policy)]))
+    return float(np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, policy)]))

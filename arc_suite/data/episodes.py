@@ -121,7 +121,7 @@ def read(file, index: int) -> Episode:
 
 
 def summary(file, index: int) -> dict:
-    """Read the attributes of an episode from an open HDF5 file, without its arrays, whose number of rows is compared.
+    """Read the attributes of an episode from an open HDF5 file, without its arrays, whose length is compared.
 
     Raises:
         ValueError: an attribute is missing or of another kind, or its length is not that of the arrays.

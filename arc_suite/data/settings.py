@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from arc_suite import policies
-from arc_suite.cpg.demonstrator import presets_of
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
@@ -53,9 +53,9 @@ class Settings(NamedTuple):
         name = re.sub(r"[^-a-zA-Z0-9]+", "_", "-".join(parts))
         return f"arc_suite/{self.setup.body.name}/{self.setup.kind.name}/{name}-v0"
 
-    def environment(self, rows: int, threads: int | None = None) -> VectorEnv:
+    def environment(self, num_envs: int, threads: int | None = None) -> VectorEnv:
         """Return a vector environment in which the episodes can be played."""
-        return self.setup.make_vec(rows, num_threads=threads, max_episode_steps=self.steps)
+        return self.setup.make_vec(num_envs, num_threads=threads, max_episode_steps=self.steps)
 
     def provenance(self) -> dict[str, Any]:
         """Return, JSON-able, the setup's provenance with the other settings and hashes of presets and policy files.

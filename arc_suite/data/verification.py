@@ -7,7 +7,7 @@ from tqdm import tqdm
 
 from arc_suite import checks, registry
 from arc_suite.data import rollouts
-from arc_suite.data.collection import ROWS
+from arc_suite.data.collection import NUM_ENVS
 from arc_suite.data.dataset import open
 from arc_suite.data.episodes import Episode
 from arc_suite.policies import Script
@@ -17,7 +17,7 @@ from arc_suite.robots.spec import Body
 def verify(
     dataset_id: str,
     body: Body | None = None,
-    rows: int = ROWS,
+    num_envs: int = NUM_ENVS,
     threads: int | None = None,
     progress: Callable = tqdm,
     task: str | None = None,
@@ -27,7 +27,7 @@ def verify(
     Args:
         dataset_id: Minari's.
         body: the expected body; None for any.
-        rows: how many are replayed at a time.
+        num_envs: number of episodes that are replayed at a time.
         threads: on which to simulate; None for all cores.
         progress: makes a progress bar as `tqdm` does.
         task: name of the expected task; None for any.
@@ -58,7 +58,7 @@ def verify(
     count, first = len(dataset), settings.seed
     if not count:
         return 0
-    rows = min(rows, count)
+    num_envs = min(num_envs, count)
     # One step more than any episode has: a replay that goes on shows, and the file alone says how much is allocated.
     steps = min(settings.steps, 1 + max(summary["length"] for summary in dataset.summaries()))
     recorded = {}
@@ -70,7 +70,7 @@ def verify(
         recorded[seed] = episode
         return episode.actions
 
-    environment = settings._replace(steps=steps).environment(rows, threads)
+    environment = settings._replace(steps=steps).environment(num_envs, threads)
     replayer = Script(script, *environment.action_space.shape)
     bar = progress(desc="replaying", leave=False, total=dataset.metadata["total_steps"], unit="step", unit_scale=True)
     with contextlib.closing(environment), bar:
@@ -85,13 +85,13 @@ def verify(
 
 
 def _difference(recorded: Episode, replayed: Episode) -> str:
-    """Return in words where episodes differ first: the array and the row."""
+    """Return in words where episodes differ first: the array and the step."""
     if recorded.length != replayed.length:
         return f"{recorded.length} steps were recorded, {replayed.length} replayed"
     if recorded.terms.keys() != replayed.terms.keys():
         return f"terms {', '.join(recorded.terms)} were recorded, {', '.join(replayed.terms)} replayed"
     for (name, there), here in zip(recorded.arrays().items(), replayed.arrays().values(), strict=True):
-        for row, (was, now) in enumerate(zip(there, here, strict=True)):
+        for step, (was, now) in enumerate(zip(there, here, strict=True)):
             if was.tobytes() != now.tobytes():
-                return f"{name}[{row}]"
+                return f"{name}[{step}]"
     raise AssertionError("episodes with different digests differ")

@@ -1,1 +1,1 @@
-"""The faces of a task: dm_env, Gymnasium, many rows at once. They know no task in particular."""
+"""The faces of a task: dm_env, Gymnasium, many environments at once. They know no task in particular."""

@@ -12,8 +12,8 @@ from dm_control.rl import control
 from dm_env import specs
 
 from arc_suite import checks
-from arc_suite.envs.lock import Lock, one_thread_at_a_time
-from arc_suite.envs.prepare import checked_action, checked_command, prepared
+from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.prepare import prepared
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
@@ -39,7 +39,7 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers.Modifiers`;
-            for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.settings`.
+            for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.Settings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
             else dm_control's environments take, steps and substeps are part of the benchmark and are
             refused, and `time_limit` is a setting of the task.
@@ -169,7 +169,7 @@ class TaskRun(control.Task):
 
     @random.setter
     def random(self, value: np.random.RandomState):
-        self._random, self._carry, self._stream_begins = value, self.definition.first(), True
+        self._random, self._stream, self._stream_begins = value, self.definition.first(), True
 
     @property
     def body(self):
@@ -195,7 +195,7 @@ class TaskRun(control.Task):
         value = checked_command(self.definition, name, value)
         if self.memory is None:
             raise ValueError(f"command {name!r}: no episode has begun; reset first")
-        self.memory = self.memory._replace(**{name: value})
+        self.memory = self.definition.commanded(self.memory, name, value)
 
     def action_spec(self, physics):
         """Return the spec of one control in [-1, 1] for each motor."""
@@ -209,16 +209,16 @@ class TaskRun(control.Task):
     def initialize_episode(self, physics):
         """Draw how the episode starts, and write it."""
         if self.memory is not None and not self._stream_begins:
-            self._carry = self.definition.carry(self.memory)
+            self._stream = self.definition.stream_state(self.memory)
         self._stream_begins = False
-        start = self.definition.start(self._random, self._carry)
+        start = self.definition.start(self._random, self._stream)
         if start.model:
             physics.change_model(start.model)
         data = physics.data.ptr
         data.qpos[:], data.qvel[:] = start.qpos, start.qvel
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
-        physics.shown_reward, physics.marker = None, self.marks
+        physics.shown_reward, physics.marker = None, self.markers
         self.memory, self._starting = start.memory, True
 
     def before_step(self, action, physics):
@@ -229,7 +229,7 @@ class TaskRun(control.Task):
         """
         action = checked_action(action, self._motors)
         self.memory, inputs = self.definition.before(self.memory, action)
-        data, physics.marker = physics.data.ptr, self.marks  # which a copy of the simulation has not
+        data, physics.marker = physics.data.ptr, self.markers  # which a copy of the simulation has not
         data.ctrl[:] = inputs.ctrl
         if inputs.kick is not None:
             data.qvel[:] += inputs.kick
@@ -271,9 +271,9 @@ class TaskRun(control.Task):
         self._readings = None  # nobody asks once more before the simulation moves, but for users who have moved it
         return 0.0 if terminated else 1.0 if truncated else None
 
-    def marks(self, physics):
+    def markers(self, physics):
         """Return what pictures show of what the task asks for now."""
-        return self.definition.marks(self.memory, self._latest(physics))
+        return self.definition.markers(self.memory, self._latest(physics))
 
     def _latest(self, physics):
         """The readings of the latest step."""
@@ -283,7 +283,7 @@ class TaskRun(control.Task):
         """The readings of the start, of which the memory takes down what the first step needs."""
         self._starting, data = False, physics.data.ptr
         readings = self.definition.read(data)
-        lifted = self.definition.lift(self.memory, readings)
+        lifted = self.definition.clear_spawn(self.memory, readings)
         if lifted is not None:
             data.qpos[:] = lifted
             physics.after_reset()

@@ -11,8 +11,9 @@ from shimmy.dm_control_compatibility import DmControlCompatibilityV0
 from shimmy.utils.dm_env import dm_env_step2gym_step
 
 from arc_suite import checks
+from arc_suite.envs.calls import one_thread_at_a_time
 from arc_suite.envs.dm import load
-from arc_suite.envs.lock import one_thread_at_a_time
+from arc_suite.envs.window import Window
 from arc_suite.simulation import opengl, pictures
 from arc_suite.tasks import Task
 
@@ -61,7 +62,7 @@ class Env(DmControlCompatibilityV0):
             task_kwargs: likewise.
             visualize_reward: likewise.
             render_mode: None, rgb_array, depth_array (m) or, where there is a display, human.
-            width: of a picture, pixels.
+            width: of a picture, pixels; a window has its own size.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
 
@@ -202,11 +203,9 @@ class Env(DmControlCompatibilityV0):
             return
         decorated = self._env.physics.decorated()
         if self._window is None:
-            from arc_suite.envs.window import Window  # GLFW, which only a window needs
-
-            self._window = Window(decorated, **self.render_kwargs)
+            self._window = Window(decorated, self.render_kwargs["camera_id"])
             weakref.finalize(self, self._window.close)  # before the interpreter takes GLFW apart
-        self._window.show(self.dt, decorated.marks)
+        self._window.show(self.dt, decorated.markers)
 
     def __getstate__(self):
         return self.__dict__ | {"_window": None}

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from arc_suite import checks, registry
 from arc_suite.models.sizing import SUBSTEPS
@@ -14,8 +13,6 @@ from arc_suite.tasks import modified, modifiers
 from arc_suite.tasks.contract import CHANGEABLE, STEPS, Scene, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
-
-_NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
 
 
 def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> tuple[Task, mujoco.MjModel]:
@@ -37,7 +34,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     if arena is not None and kind.own_arena:
         raise ValueError(f"arena: task {kind.name} has a ground of its own, expected none")
     changes = {**kind.modifiers, **{name: settings.pop(name) for name in modifiers.NAMES if name in settings}}
-    settings = kind.fitted(body, settings)
+    settings = kind.settings_for(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)
     step = SUBSTEPS * model.opt.timestep
@@ -78,53 +75,3 @@ def _step_limit(time_limit, step: float) -> float:
     if time_limit == math.inf:
         return math.inf
     return max(1, math.ceil(checks.number("time_limit", time_limit, 1e-9) / step - 1e-6))
-
-
-def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
-    """Return the action as float64, clipped to [-1, 1].
-
-    Args:
-        action: of the shape.
-        shape: (..., motors)
-
-    Raises:
-        ValueError: another shape, not numbers, or NaN; one line that names the index.
-    """
-    array = _real(action)
-    if array is None:
-        numbers, kind = " x ".join(map(str, shape)), type(action).__name__
-        kind += f" of {action.dtype}" if isinstance(action, np.ndarray) else ""
-        raise ValueError(f"action: expected {numbers} numbers, got {kind}")
-    if array.shape != shape:
-        raise ValueError(f"action: expected shape {shape}, got {array.shape}")
-    invalid = np.isnan(array)
-    if np.count_nonzero(invalid):
-        index = np.argwhere(invalid)[0]
-        raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
-    return array.clip(-1.0, 1.0)
-
-
-def checked_command(task: Task, name: str, value, rows: tuple[int, ...] = ()) -> np.ndarray:
-    """Return the value of a live command as floats, (*rows, size); None stands for what the task itself would do.
-
-    Raises:
-        ValueError: the task has no such command, or the value has another size; one line.
-    """
-    if not task.commands:
-        raise ValueError(f"command {name!r}: task {task.name} has no commands")
-    size = task.commands[checks.name(name, task.commands, "command")]
-    numbers = np.full(size, np.nan) if value is None else _real(value)
-    if numbers is None or numbers.shape not in ((size,), (*rows, size)) or np.isinf(numbers).any():
-        raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
-    return np.broadcast_to(numbers, (*rows, size)).copy()
-
-
-def _real(value) -> np.ndarray | None:
-    """The value as floats; None where it holds anything but real numbers, or hides some of them."""
-    try:
-        array = np.asarray(value)
-        if array.dtype.kind in _NOT_REAL or (array is not value and isinstance(value, np.ma.MaskedArray)):
-            return None
-        return array.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
-        return None

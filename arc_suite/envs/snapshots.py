@@ -8,8 +8,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.envs import trees
 
-# Attributes of the environment that are arrays with a leading axis for the rows.
+# Attributes of the environment that are arrays with a leading axis for the environments.
 _ARRAYS = ("_stream_seeds", "_streams_begin", "_steps", "_ended", "_resting", "_observation")
 
 
@@ -20,10 +21,10 @@ def taken(environment) -> dict[str, np.ndarray]:
         _, key, position, half, normal = random.get_state()
         keys.append(key), positions.append(position), halves.append(half), normals.append(normal)
     arrays = {f"batch/{name}": array for name, array in environment.batch.snapshot().items()}
-    arrays |= {f"memory/{name}": array.copy() for name, array in environment._memory._asdict().items()}
+    arrays |= {f"memory/{place}": leaf.copy() for place, leaf in enumerate(trees.leaves(environment._memory))}
     arrays |= {name.lstrip("_"): getattr(environment, name).copy() for name in _ARRAYS}
-    for row, carry in enumerate(environment._carries):
-        arrays |= {f"carry/{row}/{place}": np.asarray(leaf) for place, leaf in enumerate(_leaves(carry))}
+    for index, stream in enumerate(environment._streams):
+        arrays |= {f"stream/{index}/{place}": np.asarray(leaf) for place, leaf in enumerate(trees.leaves(stream))}
     return arrays | {
         "random/keys": np.array(keys),
         "random/positions": np.array(positions),
@@ -43,20 +44,19 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
             name.removeprefix("batch/"): array for name, array in arrays.items() if name.startswith("batch/")
         }
         environment.batch.restore(simulations)
-        memory = environment._memory
-        environment._memory = type(memory)(
-            **{name: _fitting(arrays[f"memory/{name}"], like) for name, like in memory._asdict().items()}
-        )
+        memory = (arrays[f"memory/{place}"] for place, _ in enumerate(trees.leaves(environment._memory)))
+        environment._memory = trees.mapped(lambda like: _fitting(next(memory), like), environment._memory)
         for name in _ARRAYS:
             setattr(environment, name, _fitting(arrays[name.lstrip("_")], getattr(environment, name)))
-        for row, random in enumerate(environment._randoms):
-            parts = (arrays[f"random/{part}"][row] for part in ("keys", "positions", "halves", "normals"))
+        for index, random in enumerate(environment._randoms):
+            parts = (arrays[f"random/{part}"][index] for part in ("keys", "positions", "halves", "normals"))
             key, position, half, normal = parts
             random.set_state(("MT19937", key, int(position), int(half), float(normal)))
-            leaves = (arrays[f"carry/{row}/{place}"] for place, _ in enumerate(_leaves(environment.task.first())))
-            environment._carries[row] = _rebuilt(environment.task.first(), leaves)
+            first = environment.task.first()
+            stream = (arrays[f"stream/{index}/{place}"] for place, _ in enumerate(trees.leaves(first)))
+            environment._streams[index] = _refilled(first, stream)
     except (KeyError, ValueError, TypeError, IndexError) as error:
-        raise ValueError(f"snapshot: of other rows or another task: {checks.quoted(error)}") from None
+        raise ValueError(f"snapshot: of another task or number of environments: {checks.quoted(error)}") from None
 
 
 def _fitting(array: np.ndarray, like: np.ndarray) -> np.ndarray:
@@ -65,21 +65,10 @@ def _fitting(array: np.ndarray, like: np.ndarray) -> np.ndarray:
     return array.copy()
 
 
-def _leaves(carry) -> Iterator:
-    """The numbers and arrays of a task's carry, which is one, a tuple of such, or None."""
-    if isinstance(carry, tuple):
-        for item in carry:
-            yield from _leaves(item)
-    elif carry is not None:
-        yield carry
+def _refilled(like, values: Iterator[np.ndarray]):
+    """A tree like another one, with other numbers."""
+    return trees.mapped(lambda leaf: _as(next(values), leaf), like)
 
 
-def _rebuilt(like, leaves: Iterator[np.ndarray]):
-    """A carry like another one, with other numbers."""
-    if isinstance(like, tuple):
-        items = [_rebuilt(item, leaves) for item in like]
-        return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
-    if like is None:
-        return None
-    leaf = next(leaves)
-    return leaf if isinstance(like, np.ndarray) else type(like)(leaf[()])
+def _as(value: np.ndarray, like):
+    return value if isinstance(like, np.ndarray) else type(like)(value[()])

@@ -1,80 +1,97 @@
-"""A window that shows a simulation at the pace of its time: Gymnasium's viewer, made safe to close."""
+"""A window that shows a body at the pace of its simulated time: MuJoCo's viewer."""
 
-import contextlib
+import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
-import glfw
 import mujoco
-from gymnasium.envs.mujoco.mujoco_rendering import WindowViewer
+import numpy as np
 
-from arc_suite.marks import Mark
-from arc_suite.simulation import opengl, pictures
+from arc_suite.markers import Marker
+from arc_suite.simulation import opengl
+from arc_suite.simulation.pictures import Decorated, geom_of
 
-
-class _Viewer(WindowViewer):
-    def _key_callback(self, window, key, scancode, action, mods):
-        if key == glfw.KEY_ESCAPE:  # the viewer would end GLFW for everybody, and then go on drawing
-            glfw.set_window_should_close(window, True)
-        else:
-            super()._key_callback(window, key, scancode, action, mods)
+_PATIENCE = 10.0  # s, for the window to close
 
 
 class Window:
-    """Stays closed once a person has closed it, by its button or the escape key."""
+    """Shows a decorated body until a person closes it; it stays closed then."""
 
-    def __init__(self, physics, camera_id: int | str, width: int, height: int):
+    def __init__(
+        self,
+        shown: Decorated,
+        camera_id: int | str = -1,
+        pressed: Callable[[int], None] | None = None,
+        instead: str = "use render_mode 'rgb_array'",
+    ):
         """Open the window.
 
         Args:
-            physics: the dm_control simulation to show; updated by its owner.
-            camera_id: name or index of the camera to begin with, -1 for a free one.
-            width: pixels.
-            height: pixels.
+            shown: the decorated body; its owner poses it.
+            camera_id: name or index of the first camera, -1 for one that follows the torso and that the mouse turns.
+            pressed: called with GLFW's number of each key, in the window's thread.
+            instead: the alternative to a window, for the error.
 
         Raises:
             RenderingUnavailable: no window can be opened here.
         """
-        opengl.require_window()
-        before = glfw.get_current_context()
-        self._viewer = _Viewer(physics.model.ptr, physics.data.ptr, width, height)
-        glfw.make_context_current(before)
-        index = physics.model.name2id(camera_id, "camera") if isinstance(camera_id, str) else camera_id
-        if index >= 0:
-            self._viewer.cam.type, self._viewer.cam.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
+        opengl.require_window(instead)
+        from mujoco import viewer  # initializes GLFW, which complains where there is no display
+
+        self._model, self._data, others = shown.model.ptr, shown.data.ptr, set(threading.enumerate())
+        try:
+            self._viewer = viewer.launch_passive(
+                self._model, self._data, key_callback=pressed, show_left_ui=False, show_right_ui=False
+            )
+        except RuntimeError as error:  # macOS has windows under `mjpython` alone
+            raise opengl.RenderingUnavailable(f"cannot open a window: {error}; {instead}") from None
+        self._threads = set(threading.enumerate()) - others
+        index = self._model.camera(camera_id).id if isinstance(camera_id, str) else camera_id
+        with self._viewer.lock():
+            camera = self._viewer.cam
+            if index >= 0:
+                camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, index
+            else:
+                camera.type, camera.trackbodyid = mujoco.mjtCamera.mjCAMERA_TRACKING, self._model.body("torso").id
+                camera.azimuth, camera.elevation = 140.0, -15.0
         self._due = time.monotonic()
 
-    def show(self, duration: float, marks: Iterable[Mark] = ()) -> None:
-        """Draw the present state and marks, and return `duration` seconds after the last picture was due."""
-        if self._viewer is None:
+    @property
+    def is_open(self) -> bool:
+        """Whether nobody has closed the window."""
+        return self._viewer.is_running()
+
+    def show(self, duration: float, markers: Iterable[Marker] = (), text: str = "") -> None:
+        """Draw the present pose and return `duration` seconds after the last picture was due; nothing once closed.
+
+        Args:
+            duration: s, for which the picture stands.
+            markers: debug markers to show.
+            text: a line in the lower left corner.
+        """
+        if not self.is_open:
             return
-        if glfw.window_should_close(self._viewer.window):
-            self.close()
-            return
-        for mark in marks:
-            geom = pictures.geom_of(mark)
-            shape = {"type": geom.type, "size": geom.size, "pos": geom.pos, "mat": geom.mat.ravel(), "rgba": geom.rgba}
-            self._viewer.add_marker(**shape)
-        with _current(self._viewer):
-            self._viewer.render()
+        with self._viewer.lock():
+            scene, markers = self._viewer.user_scn, list(markers)
+            scene.ngeom = len(markers)
+            for marker, geom in zip(markers, scene.geoms, strict=False):
+                geom_of(marker, geom)
+        self._viewer.set_texts((None, mujoco.mjtGridPos.mjGRID_BOTTOMLEFT, text, None))
+        self._viewer.sync()
         time.sleep(max(0.0, self._due - time.monotonic()))
         self._due = time.monotonic() + duration
 
+    def pulls(self) -> np.ndarray:
+        """Return force, N, and torque, N m, with which the mouse pulls at each body of the model: (bodies, 6)."""
+        self._data.xfrc_applied[:] = 0.0
+        with self._viewer.lock():
+            perturb = self._viewer.perturb
+            if perturb.active and perturb.select > 0:
+                mujoco.mjv_applyPerturbForce(self._model, self._data, perturb)
+        return self._data.xfrc_applied.copy()
+
     def close(self) -> None:
         """Close the window; once more does nothing."""
-        if self._viewer is not None:
-            with _current(self._viewer):
-                self._viewer.con.free()
-            self._viewer.free()
-            self._viewer = None
-
-
-@contextlib.contextmanager
-def _current(viewer):
-    """Draws in the viewer's context, then gives way to that of pictures rendered beside the window."""
-    before = glfw.get_current_context()
-    viewer.make_context_current()
-    try:
-        yield
-    finally:
-        glfw.make_context_current(before)
+        self._viewer.close()
+        for thread in self._threads:  # were the process to end while one still draws, it would crash
+            thread.join(_PATIENCE)

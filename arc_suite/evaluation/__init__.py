@@ -1,6 +1,6 @@
 """Evaluation of policies: the protocol, and statistics over episodes."""
 
-from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, episodes_in_rows, expert_return, rollout, run
+from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, episodes_in_batch, expert_return, rollout, run
 from arc_suite.evaluation.statistics import (
     Curve,
     Summary,
@@ -19,7 +19,7 @@ __all__ = [
     "Summary",
     "curve",
     "episodes",
-    "episodes_in_rows",
+    "episodes_in_batch",
     "expert_return",
     "interquartile_mean",
     "iqm_and_interval",

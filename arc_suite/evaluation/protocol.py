@@ -43,7 +43,7 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
 
     Args:
         environment: of `arc_suite.load`.
-        policy: made for one row.
+        policy: made for one environment.
         seed: of the episode's start.
         max_steps: to stop early.
 
@@ -71,37 +71,38 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 
     Args:
         environment: of `arc_suite.load`.
-        policy: made for one row.
+        policy: made for one environment.
         seeds: of the episodes; by default the protocol's.
     """
     return [run(environment, policy, seed) for seed in seeds]
 
 
-def episodes_in_rows(environment: VectorEnv, policy: Policy, seeds: Sequence[int] = range(EPISODES)) -> list[Episode]:
+def episodes_in_batch(environment: VectorEnv, policy: Policy, seeds: Sequence[int] = range(EPISODES)) -> list[Episode]:
     """Run one episode for each seed, all at once.
 
     They are bit-equal to those of `episodes` if the policy takes observations as float32, as networks do.
 
     Args:
-        environment: one row for each seed, in the mode Disabled.
-        policy: made for as many rows.
+        environment: one environment for each seed, in the mode Disabled.
+        policy: made for as many environments.
         seeds: of the episodes; by default the protocol's.
     """
-    rows = len(seeds)
+    num_envs = len(seeds)
     observations, _ = environment.reset(seed=list(seeds))
-    policy.begin(range(rows), list(seeds))
-    totals, rewards, lengths, progress = np.zeros(rows), np.zeros(rows), np.zeros(rows, int), [{}] * rows
-    playing = np.ones(rows, bool)
+    policy.reset(range(num_envs), list(seeds))
+    totals, rewards, lengths = np.zeros(num_envs), np.zeros(num_envs), np.zeros(num_envs, int)
+    progress = [{}] * num_envs
+    playing = np.ones(num_envs, bool)
     while playing.any():
         actions = policy.act(environment.task.split(observations), rewards)
         observations, rewards, terminated, truncated, info = environment.step(actions)
         totals[playing] += rewards[playing]
         lengths += playing
         ended = playing & (terminated | truncated)
-        for row in np.flatnonzero(ended):
+        for index in np.flatnonzero(ended):
             metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
-            progress[row] = {name.removeprefix(_PROGRESS): float(values[row]) for name, values in metrics.items()}
+            progress[index] = {name.removeprefix(_PROGRESS): float(values[index]) for name, values in metrics.items()}
         playing &= ~ended
         if ended.any() and playing.any():
             environment.rest(~playing)
-    return [Episode(*row) for row in zip(totals.tolist(), lengths.tolist(), progress, strict=True)]
+    return [Episode(*each) for each in zip(totals.tolist(), lengths.tolist(), progress, strict=True)]

@@ -15,7 +15,6 @@ from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import GRAVITY
-from arc_suite.robots import gaits
 
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
 MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
@@ -29,13 +28,11 @@ class Trial(NamedTuple):
         setup: a body in a kind of walk, whose settings have a `time_limit`.
         seed: of the initial pose.
         froude: desired speed in units of sqrt(g h); None for the medium one, negative for backwards.
-        in_phase: move all legs at once, with which no body walks.
     """
 
     setup: Setup
     seed: int = 0
     froude: float | None = None
-    in_phase: bool = False
 
 
 class Outcome(NamedTuple):
@@ -88,11 +85,10 @@ def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
     Returns:
         The environment as the walk left it, and the walk.
     """
-    body, environment = trial.setup.body, trial.setup.load(trial.seed)
-    gait = gaits.Gait(0.6, (0.0,) * len(body.legs)) if trial.in_phase else None
-    demonstrator = Demonstrator(body, froude=trial.froude, gait=gait)
+    environment = trial.setup.load(trial.seed)
+    demonstrator = Demonstrator(environment, "medium" if trial.froude is None else trial.froude)
     data = environment.physics.data.ptr
-    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in body.torso.solids]
+    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in trial.setup.body.torso.solids]
     step, ending = environment.reset(), "time"
     positions, touching = [data.qpos[:2].copy()], [False]
     try:

@@ -10,7 +10,8 @@ import mujoco
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.demonstrator import Demonstrator, first_preset
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.export import root_motion
 from arc_suite.export.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
@@ -124,7 +125,7 @@ def clips(
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     body = setup.body
     if preset is None:
-        preset = first_preset(body, "tuned", "medium")
+        preset = "tuned" if "tuned" in presets_of(body) else "medium"
     model, recorded = compiled(body), {}
     for name in progress(list(names)):
         spec = CLIPS[name]
@@ -179,7 +180,8 @@ def _recorded(setup: Setup, spec: RecordingSpec, policy, preset) -> _Recorded:
             seconds = len(recording.qpos) * recording.step / 2.0
             raise ValueError(f"the pose does not return within {seconds:.3g} s")
         return _Recorded(recording, cycle)
-    environment, actor = Setup.of(setup.body, "steer").load(seed=0), Demonstrator(setup.body, "steered")
+    environment = Setup.of(setup.body, "steer").load(seed=0)
+    actor = Demonstrator(environment, "steered")
     # It walks by the task's clock; some bodies take every other stride differently.
     cycle = 1.0 / environment.task.definition.parameters.gait_frequency
     if not spec.stops:

@@ -36,7 +36,7 @@ def record(
 
     Args:
         environment: of `arc_suite.load`; its next episode is played.
-        policy: made for one row.
+        policy: made for one environment.
         settle: control steps before the recording.
         steps: control steps to record.
         commands: pairs of a control step, counted from the start, and the value that the task's `command`

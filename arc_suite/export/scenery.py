@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import models
 from arc_suite.export.parts import KINDS
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.style.tracks import Track
 
 _MARGIN = 12.0  # standing heights of ground around the path
@@ -81,18 +81,18 @@ def _solid(model: mujoco.MjModel, geom: int, kind: str, place) -> dict[str, Any]
 def _marks(environment, track: Track) -> tuple[list, list]:
     """The styles of marks, and the marks of every row, of an environment that stands at the start of a track."""
     physics, styles, rows = environment.physics, {}, []
-    if not environment.task.marks(physics):
+    if not environment.task.markers(physics):
         return [], []
     near = _SAME * track.body.torso.standing_height
     for action, position in zip(track.actions, track.positions, strict=True):
         environment.step(action)
         if abs(physics.data.qpos[:3] - position).max() > near:
             break
-        rows.append(_styled(environment.task.marks(physics), styles))
+        rows.append(_styled(environment.task.markers(physics), styles))
     return [dict(zip(("shape", "radius", "colour"), style[:3], strict=True)) for style in styles], rows
 
 
-def _styled(marks: Sequence[Mark], styles: dict[tuple, int]) -> list[list]:
+def _styled(marks: Sequence[Marker], styles: dict[tuple, int]) -> list[list]:
     """Marks as indices of styles, start and end; styles that are new are added. None has two marks at once."""
     row, counts = [], {}
     for mark in marks:

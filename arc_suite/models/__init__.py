@@ -1,4 +1,4 @@
-"""From a spec to MJCF: builder, standing pose, sizing, looks."""
+"""From a spec to MJCF: builder, standing pose, sizing, visuals."""
 
 from arc_suite.models.assembly import assemble
 

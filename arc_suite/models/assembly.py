@@ -1,9 +1,9 @@
-"""Whole models: a body in its arena, as PyMJCF, with or without looks."""
+"""Whole models: a body in its arena, as PyMJCF, with or without visuals."""
 
 from dm_control import mjcf
 
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.models import builder, looks, sizing
+from arc_suite.models import builder, sizing, visuals
 from arc_suite.robots.spec import Body
 
 
@@ -13,7 +13,7 @@ def assemble(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mjcf.R
     Args:
         body: the spec; what it leaves open is sized.
         arena: where it moves.
-        decorated: add looks, which change nothing dynamic but cost about a tenth of the speed.
+        decorated: add visuals, which leave the dynamics unchanged but cost about a tenth of the speed.
 
     Returns:
         The model; `.to_xml_string()` loads in plain MuJoCo.
@@ -22,5 +22,5 @@ def assemble(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mjcf.R
     root = builder.build(body)
     arena.add_to(root, **builder.contact(body.simulation))
     if decorated:
-        looks.decorate(root, body)
+        visuals.decorate(root, body)
     return root

@@ -1,4 +1,4 @@
-"""From a `Body` to one PyMJCF root element: the dynamics, and nothing that is only for show."""
+"""From a `Body` to one PyMJCF root element: dynamics alone, without visuals."""
 
 import math
 
@@ -61,7 +61,7 @@ def build(body: Body) -> mjcf.RootElement:
 
 
 def contact(simulation: Simulation) -> dict:
-    """Return how floor and robot touch, as attributes of a geom; what has no dimension is the same for all."""
+    """Return the contact attributes of geoms; dimensionless ones are the same for all bodies."""
     return {
         "condim": 3,
         "friction": (1.0, 0.5, 0.5),
@@ -121,7 +121,7 @@ def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> No
 
 
 def _add_cameras(torso, body: Body) -> None:
-    """Add `tracking`, the side view of the spec, and two that the body fills: `portrait` and `profile`."""
+    """Add the cameras `tracking`, of the spec, and `portrait` and `profile`, which frame the body."""
     camera = body.camera
     torso.add("camera", name="tracking", mode="trackcom", pos=camera.position, xyaxes=camera.xyaxes)
     for name, azimuth, elevation in _VIEWS:
@@ -129,11 +129,11 @@ def _add_cameras(torso, body: Body) -> None:
 
 
 def _framing(body: Body, azimuth: float, elevation: float) -> dict:
-    """Return the nearest place from which a camera that looks in a direction sees the whole standing body.
+    """Return the nearest position from which a camera in a given direction sees the whole standing body.
 
     With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
     the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and
-    likewise for v: each side of the picture is a plane that touches the hull of the outline.
+    |v - cv| <= t (cb - b): each side of the picture is a plane that touches the hull of the outline.
     """
     back = np.array(
         (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth), math.sin(elevation))

@@ -1,4 +1,4 @@
-"""The room that a body takes as it stands, by which cameras and looks are scaled."""
+"""Outline of a standing body, which scales cameras and visuals."""
 
 import itertools
 from collections.abc import Iterator

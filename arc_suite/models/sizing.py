@@ -1,4 +1,4 @@
-"""What a body leaves open, sized to it: motors, armature, damping, constants of the simulation, camera.
+"""Sizing of the open fields of a body: motors, armature, damping, simulation constants, camera.
 
 Everything follows from the standing pose by rules without dimension, so that bodies of one shape
 and different size are dynamically similar: lengths scale with the height h, times with
@@ -39,12 +39,12 @@ _LEAST_ARMATURE = 0.3
 
 
 def control_timestep(body: Body) -> float:
-    """Return the time between two actions, s."""
+    """Return the control step, s."""
     return SUBSTEPS * simulation(body).timestep
 
 
 def simulation(body: Body) -> Simulation:
-    """Return the body's constants, or those of its size: times scale with sqrt(h), lengths with h."""
+    """Return the body's simulation constants, or sized ones: times scale with sqrt(h), lengths with h."""
     if body.simulation:
         return body.simulation
     scale = body.torso.standing_height / _REFERENCE_HEIGHT
@@ -79,7 +79,7 @@ def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.nda
 
 @functools.lru_cache(maxsize=256)
 def sized(body: Body) -> Body:
-    """Return the body with everything filled in that it leaves open.
+    """Return the body with all open fields sized.
 
     Args:
         body: the spec.

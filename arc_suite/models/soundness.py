@@ -1,4 +1,4 @@
-"""What keeps a body from standing or walking, told by its standing pose before anything is simulated."""
+"""Flaws that keep a body from standing or walking, found in its standing pose without simulation."""
 
 import math
 from collections.abc import Iterator
@@ -22,11 +22,11 @@ _LARGEST_TURN = 0.5  # rad, of a joint
 
 
 class Flaw(NamedTuple):
-    """Something that keeps a body from standing or walking.
+    """A reason why a body cannot stand or walk.
 
     Attributes:
-        text: one line that says what is wrong, and the value that would fit.
-        hopeless: whether nothing can walk with it.
+        text: what is wrong, and a value that fits.
+        hopeless: whether no body can walk with it.
     """
 
     text: str
@@ -34,13 +34,13 @@ class Flaw(NamedTuple):
 
 
 def flaws(body: Body) -> list[Flaw]:
-    """Return what is wrong with how a body stands; nothing for one that should walk."""
+    """Return the flaws of a body, none for one that should walk."""
     pose = standing(body)
     return [flaw for check in (_height, _support, _motors, _joints) for flaw in check(body, pose)]
 
 
 def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
-    """Find feet off the floor or in it, and whatever reaches lower than they do."""
+    """Find feet above or below the floor, and parts of the torso below the feet."""
     height, soles = pose.height, pose.soles[:, 2]
     gap = float(height + soles.min())
     fits = f"standing_height {-soles.min():.3g} fits"
@@ -60,7 +60,7 @@ def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
 
 
 def _support(body: Body, pose: Standing) -> Iterator[Flaw]:
-    """Find a centre of mass that the feet do not hold up."""
+    """Find a centre of mass outside the polygon of the feet, or too near its edge."""
     if len(body.legs) < 3:
         yield Flaw(f"{len(body.legs)} feet span no area to stand on: 3 or more legs fit", False)
         return
@@ -100,7 +100,7 @@ def _displacement(x: float, y: float) -> str:
 
 
 def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
-    """Find motors that are too weak to hold the body up in its standing pose, where no limit of their joint does."""
+    """Find motors too weak to hold the standing pose, where no joint limit holds it."""
     joints = [joint for leg in body.legs for joint in leg.joints]
     low, high = np.transpose([joint.range_deg for joint in joints])
     needed = np.where(np.where(pose.loads > 0.0, low, high) == 0.0, 0.0, abs(pose.loads))
@@ -135,7 +135,7 @@ def _joints(body: Body, pose: Standing) -> Iterator[Flaw]:
 
 
 def _reach(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
-    """Return how far any one joint moves a foot forward as well as back, and how far up, m."""
+    """Return the largest stroke of a foot by one joint: forward and back, and up, m."""
     low, high = np.radians([joint.range_deg for joint in leg.joints]).clip(-_LARGEST_TURN, _LARGEST_TURN).T
     sweep = abs(jacobian[0]) * np.minimum(-low, high)
     return sweep.max(), np.maximum(jacobian[2] * low, jacobian[2] * high).max()

@@ -1,4 +1,4 @@
-"""The standing pose of a body, all joints at zero, from which its proportions, motors and gait are derived."""
+"""The standing pose of a body, all joints at zero; proportions, motors and gait derive from it."""
 
 import functools
 import math
@@ -45,7 +45,7 @@ class Standing(NamedTuple):
 
 @functools.lru_cache(maxsize=256)
 def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
-    """Return the mechanics of a body's standing pose; armature, damping, motors and constants play no part.
+    """Return the mechanics of a body's standing pose; armature, damping, motors and constants do not matter.
 
     Args:
         body: the spec.
@@ -86,9 +86,9 @@ def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
 
 @functools.lru_cache(maxsize=256)
 def _model(body: Body) -> mujoco.MjModel:
-    """Compile what `builder.build` makes of a body, without all that plays no part in how it stands.
+    """Compile the body of `builder.build` without motors, contacts and constants.
 
-    By MuJoCo's own means: PyMJCF would take as long again as the whole model does.
+    MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model.
     """
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
@@ -115,8 +115,8 @@ def _model(body: Body) -> mujoco.MjModel:
 def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
     """Return vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the centre of mass.
 
-    The least-norm solution of the balance of force and moments; no foot is taken to carry less
-    than a quarter of its equal share, since in walking every foot has its turn.
+    The least-norm solution of the balance of force and moments. Every foot carries at least a quarter
+    of its equal share, since in walking every foot carries in turn.
     """
     balance = np.stack([np.ones(len(soles)), *soles.T])
     forces = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
@@ -124,7 +124,7 @@ def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
 
 
 def stability_margin(centre, soles) -> float:
-    """Return how far inside the convex hull of other points a point lies, seen from above; < 0 outside.
+    """Return the distance of a point to the edge of the convex hull of others, seen from above; negative outside.
 
     Args:
         centre: (2,) or more, the point.

@@ -1,6 +1,5 @@
 """Policies by name: some need no training; any other is found on Python's path."""
 
-import itertools
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -8,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg import PRESETS, Demonstrator
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.selection import preset_names
 from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import ROBOTS, is_robot
@@ -20,18 +19,19 @@ _ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
 
 
-def _cpg(body: Body, presets: Sequence[str], rows: int) -> Policy:
+def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     if not presets:
-        raise ValueError(f"preset: expected one or more of {', '.join(PRESETS)}, got none")
-    demonstrators = [Demonstrator(body, preset) for preset in presets]
-    return demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, rows)
+        raise ValueError(f"preset: expected one or more of {', '.join(preset_names())}, got none")
+    demonstrators = [Demonstrator(task or body, preset) for preset in presets]
+    made = demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, num_envs)
+    return Positioned(made, task) if task and task.actions == "position" else made
 
 
-def _zero(body: Body, presets: Sequence[str], rows: int) -> Policy:
-    return Script(lambda seed: (), rows, len(body.joint_names))
+def _zero(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
+    return Script(lambda seed: (), num_envs, len(body.joint_names))
 
 
-def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
+def _random(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     joints = len(body.joint_names)
 
     def draw(seed):
@@ -39,10 +39,10 @@ def _random(body: Body, presets: Sequence[str], rows: int) -> Policy:
         while True:
             yield from random.uniform(-1.0, 1.0, (_CHUNK, joints))
 
-    return Script(draw, rows, joints)
+    return Script(draw, num_envs, joints)
 
 
-# Name -> what makes the policy of a body, presets and a number of rows.
+# By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
 POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
@@ -50,23 +50,18 @@ HELP = (
     "saved, whose pickles are run; or module:attribute, a function that makes a policy from a robot's name, or from "
     "any other Body."
 )
-PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
-
-
-def preset_names() -> tuple[str, ...]:
-    """Return the names of the presets of all robots, including those of other packages."""
-    return tuple(dict.fromkeys(itertools.chain(PRESETS, *TUNINGS.values())))
+PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the robot has."
 
 
 def policy(
     name: str,
     robot: str | Body,
     presets: str | Sequence[str] = "medium",
-    rows: int = 1,
+    num_envs: int = 1,
     noise: float = 0.0,
     task: Task | None = None,
 ) -> Policy:
-    """Make a policy for the rows of a batch, or for one environment; see `protocol.alone`.
+    """Make a policy for a batch of environments, or for one environment; see `protocol.alone`.
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
@@ -75,12 +70,11 @@ def policy(
             stable-baselines3, see `sb3_file`; or `module:attribute`, a function on Python's path that makes
             a function from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        presets: of the demonstrator, one of `cpg.PRESETS` or another that the robot has, or several
-            that take turns from seed to seed.
-        rows: of the batch.
+        presets: of the demonstrator, a name or several that take turns from seed to seed; see `cpg.Demonstrator`.
+        num_envs: number of environments.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
-        task: the task to act in; None for torques. If its actions are positions, the demonstrator's torques are
-            converted, see `protocol.Positioned`; other policies are used as they are.
+        task: that it is to act in. The demonstrator is fitted to it, and gives positions in place of torques
+            where the task takes them, as `protocol.Positioned`. None for walk with default settings.
 
     Raises:
         ValueError: an unknown name, or a value out of range; one line that names it and the nearest
@@ -95,17 +89,15 @@ def policy(
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
         turns = network.checkpoint_files(Path(name))
         several = [_from_file(path, body, task) for path in turns or [Path(name)]]
-        made = Mixture(several, rows) if turns else several[0]
+        made = Mixture(several, num_envs) if turns else several[0]
     elif isinstance(name, str) and ":" in name:
-        made = _from_path(name, body, rows)
+        made = _from_path(name, body, num_envs)
     else:
-        made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, rows)
-        if name == "cpg" and task is not None and task.actions == "position":
-            made = Positioned(made, task)
-    return Sum(made, _noise(body, noise, rows)) if noise else made
+        made = POLICIES[checks.name(name, POLICIES, "policy")](body, presets, num_envs, task)
+    return Sum(made, _noise(body, noise, num_envs)) if noise else made
 
 
-def _noise(body: Body, deviation: float, rows: int) -> Policy:
+def _noise(body: Body, deviation: float, num_envs: int) -> Policy:
     joints = len(body.joint_names)
 
     def draw(seed):
@@ -113,7 +105,7 @@ def _noise(body: Body, deviation: float, rows: int) -> Policy:
         while True:
             yield from random.normal(0.0, deviation, (_CHUNK, joints))
 
-    return Script(draw, rows, joints)
+    return Script(draw, num_envs, joints)
 
 
 def is_file(name: str) -> bool:
@@ -151,13 +143,13 @@ def _from_zip(path: Path, body: Body) -> Policy:
     return sb3_file.Saved(path, body)
 
 
-def _from_path(path: str, body: Body, rows: int) -> Policy:
+def _from_path(path: str, body: Body, num_envs: int) -> Policy:
     factory = checks.imported(path, "policy")
     if not callable(factory):
         raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
     make = _checked(path, factory, body.name if is_robot(body) else body)
     make()  # finds out at once whether it makes one
-    return Individuals(make, rows, len(body.joint_names), f"policy {path!r}")
+    return Individuals(make, num_envs, len(body.joint_names), f"policy {path!r}")
 
 
 def _checked(path: str, factory: Callable, robot: str | Body) -> Callable[[], Callable]:

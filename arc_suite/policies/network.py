@@ -45,7 +45,7 @@ class Layer(NamedTuple):
 
 
 def _linear(x, weight, bias):
-    # Not a product of matrices: BLAS rounds by the number of rows and threads, and a row is to do the same alone.
+    # Not a product of matrices: BLAS rounds by the number of environments and threads.
     return np.einsum("ri,io->ro", x, weight) + bias
 
 
@@ -55,7 +55,7 @@ def _layer_norm(x, scale, offset):
 
 
 class Kind(NamedTuple):
-    """What a layer computes: a function of rows (rows, n) float32 and of a number of arrays."""
+    """What a layer computes: a function of inputs (num_envs, n) float32 and of a number of arrays."""
 
     function: Callable
     arrays: int = 0
@@ -75,7 +75,7 @@ KINDS = {
 
 
 def forward(layers: Sequence[Layer], x: np.ndarray) -> np.ndarray:
-    """Return what layers make of rows (rows, n), float32; every row's bits are those that it would have alone."""
+    """Return the outputs of layers for inputs (num_envs, n), float32; each is bit-exact as if computed alone."""
     for layer in layers:
         x = KINDS[layer.kind].function(x, *layer.arrays)
     return x
@@ -85,7 +85,7 @@ class Network(NamedTuple):
     """A deterministic policy, and the setup it was trained in.
 
     Attributes:
-        layers: from the flat observation (rows, size) to actions (rows, joints).
+        layers: from the flat observation (num_envs, size) to actions (num_envs, joints).
         setup: body, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
     """
@@ -105,16 +105,16 @@ class Network(NamedTuple):
         return self.actions(np.zeros((1, self.size), np.float32)).shape[1]
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
-        """Return actions (rows, joints) float32 for flat observations (rows, size)."""
+        """Return actions (num_envs, joints) float32 for flat observations (num_envs, size)."""
         return forward(self.layers, observations.astype(np.float32, copy=False))
 
     # The protocol of acting.
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
 
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
-        """Return the actions (rows, joints) of a control step; see `Policy.act`.
+        """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
         Raises:
             ValueError: other blocks than those it was trained with; one line.

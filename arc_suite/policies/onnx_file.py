@@ -1,7 +1,7 @@
 """Policies as ONNX, which game engines and onnxruntime run: all layers of a network, its normaliser among them.
 
-The input `observations` is (rows, size) float32, flat: the task's blocks one after the other. The output
-`actions` is (rows, joints) in [-1, 1]. The metadata hold what else a game needs, JSON by name; see `metadata`.
+The input `observations` is (num_envs, size) float32, flat: the task's blocks one after the other. The output
+`actions` is (num_envs, joints) in [-1, 1]. The metadata hold what else a game needs, JSON by name; see `metadata`.
 """
 
 import json
@@ -70,8 +70,8 @@ def save(path: str | os.PathLike, network: Network) -> None:
     graph = helper.make_graph(
         nodes,
         "policy",
-        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["rows", network.size])],
-        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["rows", network.joints])],
+        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["num_envs", network.size])],
+        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["num_envs", network.joints])],
         constants,
     )
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)

@@ -1,4 +1,4 @@
-"""The protocol of acting, made for the rows of a batch; one environment is a batch of one."""
+"""The protocol of acting, made for a batch of environments; one environment is a batch of one."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Protocol
@@ -7,48 +7,48 @@ import dm_env
 import numpy as np
 
 from arc_suite import checks
-from arc_suite.cpg.law import felt
-from arc_suite.envs.prepare import checked_action
+from arc_suite.cpg.law import Clocked, checked, proprioception
+from arc_suite.envs.calls import checked_action
 from arc_suite.tasks.modified import Modified
 
 
 class Policy(Protocol):
-    """A policy for the rows of a batch, each row an episode of its own.
+    """A policy for a batch of environments, each in an episode of its own.
 
     Its actions in an episode depend on the episode's seed, observations and rewards alone.
     """
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
-        """Start the episodes of seeds in some rows, given by their indices."""
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some environments, given by their indices."""
 
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions of a control step.
 
         Args:
-            observation: blocks by name, each (rows, size).
-            rewards: (rows,) of the step before; ignored in the first step of an episode.
+            observation: blocks by name, each (num_envs, size).
+            rewards: (num_envs,) of the step before; ignored in the first step of an episode.
 
         Returns:
-            (rows, joints), to be clipped to [-1, 1].
+            (num_envs, joints), to be clipped to [-1, 1].
         """
 
 
 class Script:
     """An open-loop policy: its actions do not depend on observations."""
 
-    def __init__(self, script: Callable[[int], Iterable[np.ndarray]], rows: int, joints: int):
+    def __init__(self, script: Callable[[int], Iterable[np.ndarray]], num_envs: int, joints: int):
         """Take a function of a seed that gives the actions (joints,) of its episode; past their end, 0."""
         self._script = script
-        self._scripts: list[Iterator] = [iter(())] * rows
+        self._scripts: list[Iterator] = [iter(())] * num_envs
         self._zero = np.zeros(joints)
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
-        """Start the episodes of seeds in some rows."""
-        for row, seed in zip(rows, seeds, strict=True):
-            self._scripts[row] = iter(self._script(seed))
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some environments."""
+        for index, seed in zip(indices, seeds, strict=True):
+            self._scripts[index] = iter(self._script(seed))
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the next actions (rows, joints)."""
+        """Return the next actions (num_envs, joints)."""
         return np.stack([next(script, self._zero) for script in self._scripts])
 
 
@@ -59,13 +59,13 @@ class Sum:
         """Take the policies."""
         self._policies = first, second
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
-        """Start the episodes of seeds in some rows."""
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some environments."""
         for policy in self._policies:
-            policy.begin(rows, seeds)
+            policy.reset(indices, seeds)
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the sum of the actions (rows, joints)."""
+        """Return the sum of the actions (num_envs, joints)."""
         return sum(policy.act(observation, rewards) for policy in self._policies)
 
 
@@ -79,37 +79,37 @@ class Positioned:
         """Take a policy of torques, and a task with `actions="position"`."""
         self._policy, self._task = policy, task
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
-        """Start the episodes of seeds in some rows."""
-        self._policy.begin(rows, seeds)
+    def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
+        """Start the episodes of seeds in some environments."""
+        self._policy.reset(indices, seeds)
 
     def act(self, observation, rewards=None) -> np.ndarray:
-        """Return the positions (rows, joints), as actions in [-1, 1].
+        """Return the positions (num_envs, joints), as actions in [-1, 1].
 
         Raises:
             ValueError: an observation without the blocks of joint angles and velocities; one line.
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
-        _, angles, speeds = felt(observation, torques.shape[-1])
+        _, angles, speeds = proprioception(checked(observation, Clocked.reads, torques.shape[-1]))
         return self._task.positions(torques, angles, speeds)
 
 
 class Mixture:
     """Several policies that take turns from seed to seed."""
 
-    def __init__(self, policies: Sequence[Policy], rows: int):
+    def __init__(self, policies: Sequence[Policy], num_envs: int):
         """Take the policies; the episode of seed s is that of the one at s modulo their number."""
         self._policies = policies
-        self._chosen = np.zeros(rows, int)
+        self._chosen = np.zeros(num_envs, int)
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
-        """Start the episodes of seeds in some rows."""
-        self._chosen[rows] = np.asarray(seeds) % len(self._policies)
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some environments."""
+        self._chosen[indices] = np.asarray(seeds) % len(self._policies)
         for policy in self._policies:
-            policy.begin(rows, seeds)
+            policy.reset(indices, seeds)
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the actions (rows, joints)."""
+        """Return the actions (num_envs, joints)."""
         actions = np.stack([policy.act(observation, rewards) for policy in self._policies])
         return actions[self._chosen, np.arange(len(self._chosen))]
 
@@ -120,43 +120,43 @@ class Individuals:
     A function gets the observations of the environment of `arc_suite.load`: named blocks.
     """
 
-    def __init__(self, make: Callable[[], Callable], rows: int, joints: int, name: str = "policy"):
+    def __init__(self, make: Callable[[], Callable], num_envs: int, joints: int, name: str = "policy"):
         """Take what makes a function of a `TimeStep`.
 
         Args:
             make: takes nothing.
-            rows: of the batch.
+            num_envs: number of environments.
             joints: of an action.
             name: with which an error begins.
         """
         self._make, self._name, self._joints = make, name, joints
-        self._functions, self._seeds, self._clock = [None] * rows, [0] * rows, [0] * rows
+        self._functions, self._seeds, self._clock = [None] * num_envs, [0] * num_envs, [0] * num_envs
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
-        """Start the episodes of seeds in some rows."""
-        for row, seed in zip(rows, seeds, strict=True):
-            self._functions[row], self._seeds[row], self._clock[row] = self._make(), seed, 0
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start the episodes of seeds in some environments."""
+        for index, seed in zip(indices, seeds, strict=True):
+            self._functions[index], self._seeds[index], self._clock[index] = self._make(), seed, 0
 
     def act(self, observation, rewards) -> np.ndarray:
-        """Return the actions (rows, joints).
+        """Return the actions (num_envs, joints).
 
         Raises:
             ValueError: an action of another shape, not of numbers, or with NaN; one line that names the episode
                 and the step.
         """
         actions = np.zeros((len(self._functions), self._joints))
-        for row, function in enumerate(self._functions):
+        for index, function in enumerate(self._functions):
             if function is None:
                 continue
-            blocks = {name: block[row].astype(float) for name, block in observation.items()}
-            first = self._clock[row] == 0
-            timestep = dm_env.restart(blocks) if first else dm_env.transition(float(rewards[row]), blocks)
+            blocks = {name: block[index].astype(float) for name, block in observation.items()}
+            first = self._clock[index] == 0
+            timestep = dm_env.restart(blocks) if first else dm_env.transition(float(rewards[index]), blocks)
             try:
-                actions[row] = checked_action(function(timestep), (self._joints,))
+                actions[index] = checked_action(function(timestep), (self._joints,))
             except ValueError as error:
-                where = f"episode of seed {self._seeds[row]}, step {self._clock[row]}"
+                where = f"episode of seed {self._seeds[index]}, step {self._clock[index]}"
                 raise ValueError(f"{self._name}: {where}: {error}") from None
-            self._clock[row] += 1
+            self._clock[index] += 1
         return actions
 
 
@@ -166,7 +166,7 @@ def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarr
     The first `TimeStep` of an episode begins it.
 
     Args:
-        policy: made for one row.
+        policy: made for one environment.
         seed: of its episodes.
 
     Raises:
@@ -176,7 +176,7 @@ def alone(policy: Policy, seed: int = 0) -> Callable[[dm_env.TimeStep], np.ndarr
 
     def act(timestep: dm_env.TimeStep) -> np.ndarray:
         if timestep.first():
-            policy.begin([0], [seed])
+            policy.reset([0], [seed])
         blocks = {name: block[None] for name, block in timestep.observation.items()}
         return policy.act(blocks, np.array([timestep.reward or 0.0]))[0]
 

@@ -42,11 +42,11 @@ class Saved:
             moved = spaces[1].shape
             raise ValueError(f"policy {path}: moves {moved} joints, and {body.name} has {len(body.joint_names)}")
 
-    def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
 
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
-        """Return the actions of a control step; one prediction for each row, so that its bits do not depend on others.
+        """Return the actions of a control step; one prediction for each environment, bit-exact.
 
         Raises:
             ValueError: observations of another size; one line.
@@ -55,4 +55,4 @@ class Saved:
         if flat.shape[1:] != self._size:
             raise ValueError(f"policy {self._path}: expected observations {self._size}, got {flat.shape[1:]}")
         with torch.no_grad():
-            return np.stack([self._policy.predict(row, deterministic=True)[0] for row in flat]).astype(float)
+            return np.stack([self._policy.predict(each, deterministic=True)[0] for each in flat]).astype(float)

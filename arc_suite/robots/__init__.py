@@ -14,19 +14,19 @@ def is_robot(body: Body) -> bool:
     return ROBOTS.get(body.name) == body
 
 
-def row(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
-    """Return a robot's row of a table of numbers, by the body's name; None where there is none.
+def parameters(table: Mapping[str, Any], body: Body, what: str) -> Any | None:
+    """Return the entry of a robot in a table, by the body's name; None where there is none.
 
     A body of a robot's name has the robot's numbers whatever its density or sizes are, as long as
     it has the robot's joints.
 
     Args:
-        table: rows by name of a robot.
+        table: by name of a robot.
         body: any body.
         what: the numbers are for, with which an error begins.
 
     Raises:
-        ValueError: a body of a robot's name that has other joints; one line.
+        ValueError: a body of a robot's name that has other joints.
     """
     if body.name not in table:
         return None

@@ -1,4 +1,4 @@
-"""Gaits as data: when each leg stands and when it swings.
+"""Gaits as data: stance and swing of each leg.
 
 A gait is a duty factor, the share of a cycle that a foot spends on the ground, and a phase offset
 for each leg. A leg of offset p stands while (t + p) mod 1 < duty factor, t being cycles.
@@ -15,7 +15,7 @@ TROT = (0.0, 0.5, 0.5, 0.0)  # of fl fr rl rr
 
 
 class Gait(NamedTuple):
-    """When each leg stands and when it swings.
+    """Stance and swing of each leg.
 
     Attributes:
         duty_factor: share of a cycle in stance.
@@ -29,7 +29,7 @@ class Gait(NamedTuple):
 def metachronal(body: Body, duty_factor: float) -> Gait:
     """Return the metachronal gait of a body: waves of swinging legs run from the rear to the front.
 
-    It is the rule behind most gaits of animals. On each side a leg takes off when the one behind it
+    Most gaits of animals follow this rule. On each side a leg takes off when the one behind it
     touches down, 1 - duty factor of a cycle later; the two sides are half a cycle apart (Wilson,
     "Insect walking", 1966). Six legs make a tripod gait at 1/2, a tetrapod at 2/3, a ripple at 3/4
     and a wave at 5/6.
@@ -81,7 +81,7 @@ NAMES = tuple(_GAITS)
 
 
 def fitting(body: Body) -> tuple[str, ...]:
-    """Return the names of the gaits that a body has the legs for."""
+    """Return the names of the gaits that fit the legs of a body."""
     sides = [leg.side for leg in body.legs]
     even = sides.count("left") == sides.count("right")
     return tuple(name for name, gait in _GAITS.items() if gait.fits(len(sides), even))
@@ -91,7 +91,7 @@ def gait(body: Body, name: str) -> Gait:
     """Return the gait of a body by name.
 
     Raises:
-        ValueError: no such gait, or none for these legs; one line that lists those that fit.
+        ValueError: an unknown gait, or one that does not fit the legs.
     """
     checks.name(name, NAMES, "gait")
     if name not in fitting(body):

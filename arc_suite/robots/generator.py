@@ -1,7 +1,7 @@
 """Bodies made to order: a number of legs and links with sensible defaults, or random ones of all proportions.
 
-What they are made of is geometry alone; motors and constants are sized to it (see `sizing`). With
-all joints at zero they stand with every foot on the floor.
+They hold geometry alone; `sizing` derives motors and constants from it. With all joints at zero
+they stand with every foot on the floor.
 """
 
 import math
@@ -46,7 +46,7 @@ _REACH = 0.9  # of the height, from mount to foot
 
 
 class _Proportions(NamedTuple):
-    """Everything that makes a body beside its counts; lengths of the torso are half-extents.
+    """Proportions of a generated body; lengths of the torso are half-extents.
 
     Attributes:
         height: from the floor to the mounts, m.
@@ -82,7 +82,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
         The body, `walker_<legs>x<links>`, 0.4 m high.
 
     Raises:
-        ValueError: a value out of range; one line that names it.
+        ValueError: a value out of range.
     """
     legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
     layout = _check_layout(layout, legs)
@@ -97,18 +97,18 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
     """Make a random body, the same for the same arguments.
 
-    Drawn are, where not given, 4 to 12 legs, 2 to 4 links and, for an even number of legs, the
-    layout, radial for three in ten; and always:
+    Draws, where not given, 4 to 12 legs, 2 to 4 links and, for an even number of legs, the layout,
+    radial for three in ten. Always draws:
 
     - half of the torso's length, log-uniform from 0.08 to 1.2 m;
     - the height at which it stands, 0.6 to 1.4 times that;
     - its half-width, 0.35 to 0.7 times its half-length (radial: all of it), and its
       half-thickness, 0.15 to 0.3 times the height;
-    - by how much legs fan out, 15 to 45 degrees;
+    - the fan of the legs, 15 to 45 degrees;
     - the legs' profile, each link's share of the length within 20 % and its elevation within 8
       degrees of `generate`'s;
-    - how far legs reach out, 0.7 to 1.2 times the height; for four bodies in ten legs are unequal,
-      each pair (radial: each leg) reaching 0.75 to 1.3 times that.
+    - the legs' reach, 0.7 to 1.2 times the height; in four bodies of ten legs are unequal, and each
+      pair (radial: each leg) reaches 0.75 to 1.3 times that.
 
     Args:
         seed: 0 or more.
@@ -120,7 +120,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         The body, `random_<seed>`.
 
     Raises:
-        ValueError: a value out of range; one line that names it.
+        ValueError: a value out of range.
     """
     random = np.random.default_rng(checks.seed(seed))
     drawn_legs, drawn_links = (int(random.integers(low, high + 1)) for low, high in (LEGS, (2, LINKS[1])))
@@ -161,7 +161,7 @@ def scaled(body: Body, factor: float) -> Body:
         body of `generate` are down to a height of 2 cm; at 300 kg/m^3 one of 1 cm walks too.
 
     Raises:
-        ValueError: the factor, or a length of the scaled body, is out of range; one line that names it.
+        ValueError: the factor, or a length of the scaled body, is out of range.
     """
     factor = checks.number("scale", factor, *SCALE)
 
@@ -196,7 +196,7 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         The body, `<name>_mutated`, to be sized anew.
 
     Raises:
-        ValueError: a value out of range, or a length grown out of range; one line that names it.
+        ValueError: a value out of range, or a length grown out of range.
     """
     random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
     legs: dict[str, Leg] = {}

@@ -1,4 +1,4 @@
-"""Bodies in a mirror: which leg, joint and part of a body takes the place of which across the x-z plane."""
+"""Left-right symmetry of bodies across the x-z plane: legs, joints and parts, and their counterparts."""
 
 from typing import NamedTuple
 
@@ -13,13 +13,13 @@ _TURNED = -_REFLECTION  # of the axis of a rotation
 
 
 class Image(NamedTuple):
-    """What of a body takes the place of what in its mirror image, which is the body itself.
+    """Left-right permutation of the legs, joints and parts of a symmetric body.
 
     Attributes:
-        legs: (legs,) index of the leg across, its own on the midline.
-        joints: (joints,) index of the joint across, in the order of the actions.
-        signs: (joints,) 1 where equal angles make mirrored poses, -1 where opposite ones do.
-        parts: (parts,) index of the rigid part across, in the order of the contact forces.
+        legs: (legs,) index of the leg on the other side; of a leg on the midline, its own.
+        joints: (joints,) index of the joint on the other side, in the order of the actions.
+        signs: (joints,) 1 where equal angles give symmetric poses, -1 where opposite angles do.
+        parts: (parts,) index of the rigid part on the other side, in the order of the contact forces.
     """
 
     legs: np.ndarray
@@ -29,23 +29,23 @@ class Image(NamedTuple):
 
 
 def image(body: Body) -> Image:
-    """Return what of a body takes the place of what across the x-z plane.
+    """Return the left-right permutation of a symmetric body.
 
-    What counts is geometry, joints and motors, whatever names and order the legs have.
+    It depends on geometry, joints and motors, not on names and order of the legs.
 
     Raises:
-        ValueError: a body that is not its own mirror image; one line that names a part without one.
+        ValueError: the body has no left-right symmetry; the message names a part without a counterpart.
     """
     rounding = _ROUNDING * body.torso.standing_height
     for kind, solids in (("solid", body.torso.solids), ("ballast", body.ballast)):
         for solid in solids:
             if not any(_solids_match(solid, other, rounding) for other in solids):
-                raise ValueError(f"{body.name} is not its own mirror image: no {kind} is across from {solid.name}")
+                raise ValueError(f"{body.name} is not left-right symmetric: no {kind} is across from {solid.name}")
     legs, signs = [], []
     for leg in body.legs:
         matches = [(across, found) for across, other in enumerate(body.legs) if (found := _signs(leg, other, rounding))]
         if not matches:
-            raise ValueError(f"{body.name} is not its own mirror image: no leg is across from {leg.name}")
+            raise ValueError(f"{body.name} is not left-right symmetric: no leg is across from {leg.name}")
         across, found = matches[0]
         legs.append(across)
         signs += found
@@ -60,7 +60,7 @@ def image(body: Body) -> Image:
 
 
 def _signs(leg: Leg, other: Leg, rounding: float) -> list[int] | None:
-    """The signs of the joints of two legs, if one is the mirror image of the other; else None."""
+    """Return the signs of the joints of two legs that are reflections of each other, else None."""
     if len(leg.links) != len(other.links) or not np.isclose(leg.foot.radius, other.foot.radius, _ROUNDING, 0.0):
         return None
     if not np.allclose(np.array(leg.points) * _REFLECTION, other.points, rtol=0.0, atol=rounding):
@@ -83,7 +83,7 @@ def _signs(leg: Leg, other: Leg, rounding: float) -> list[int] | None:
 
 
 def _axis(leg: Leg, link) -> np.ndarray:
-    """The direction of a link's joint in the torso's frame."""
+    """Return the direction of a link's joint in the torso's frame."""
     yaw, axis = np.radians(leg.yaw_deg), np.array(link.joint.axis)
     x = np.cos(yaw) * axis[0] - np.sin(yaw) * axis[1]
     y = np.sin(yaw) * axis[0] + np.cos(yaw) * axis[1]
@@ -95,21 +95,21 @@ def _equal(number: float | None, other: float | None) -> bool:
 
 
 def _solids_match(solid: Solid, other: Solid, rounding: float) -> bool:
-    """Whether a shape is the other's mirror image; of shapes that are turned, if their own axes are mirrored ones."""
+    """Return whether a shape is the reflection of another."""
     if solid.shape != other.shape or not np.allclose(solid.size, other.size, rtol=_ROUNDING, atol=0.0):
         return False
     if not _equal(getattr(solid, "mass", None), getattr(other, "mass", None)):
         return False
     if not np.allclose(np.array(solid.position) * _REFLECTION, other.position, rtol=0.0, atol=rounding):
         return False
-    # Every shape is its own mirror image along its axes: a ball along all, what is round about z along any beside it.
+    # Shapes are symmetric about their own axes: a sphere about any, a round one about any across its z.
     axes = {"sphere": [], "capsule": [2], "cylinder": [2]}.get(solid.shape, [0, 1, 2])
     cosines = ((_REFLECTION[:, None] * _turned(solid)) * _turned(other)).sum(axis=0)
     return bool((abs(cosines[axes]) > 1.0 - _ROUNDING).all())
 
 
 def _turned(solid: Solid) -> np.ndarray:
-    """The axes (3, 3) of a shape, in columns, in the torso's frame."""
+    """Return the axes (3, 3) of a shape, in columns, in the torso's frame."""
     axes = np.eye(3)
     for i, angle in enumerate(np.radians(solid.euler_deg)):
         turn, (j, k) = np.eye(3), ((i + 1) % 3, (i + 2) % 3)

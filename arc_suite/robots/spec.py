@@ -1,12 +1,12 @@
-"""What a legged body is, as frozen and validated data.
+"""The spec of a legged body: frozen, validated data.
 
 A `Body` is a torso, its ballast and its legs; a `Leg` is a chain of `Link`s that ends in a
 `Foot`; a `Link` is rigid or turns about one motorised `Joint`. Lengths are metres, masses
 kilograms, angles degrees (the only place where they are). Frames: x forward, y left, z up; a
 child's origin is the end of the link before it, and a body stands with all joints at zero.
 
-Every class checks its own fields and raises `SpecError`, one line that names the field. This
-module needs nothing but the standard library.
+Every class checks its own fields and raises `SpecError`, which names the field. This module needs only
+the standard library.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
 
 class SpecError(ValueError):
-    """A spec that no body can be built from; the message is one line that names the field.
+    """A spec that no body can be built from; the message names the field.
 
     Attributes:
         reason: what is wrong, without the field.
@@ -133,7 +133,7 @@ def _position(**kwargs):
 
 
 class _Spec:
-    """Base of all specs: checks every field, then what concerns several fields at once."""
+    """Base of all specs: checks every field, then conditions on several fields."""
 
     def __post_init__(self):
         for field in dataclasses.fields(self):
@@ -145,7 +145,7 @@ class _Spec:
         self._check_whole()
 
     def _check_whole(self) -> None:
-        """Check what concerns several fields; a subclass for which there is any overrides this."""
+        """Check conditions on several fields; subclasses with such conditions override this."""
 
     def _fail(self, field: str, message: str) -> NoReturn:
         raise SpecError(message, field, self._label())
@@ -177,7 +177,7 @@ class Joint(_Spec):
         range_deg: lower and upper limit; zero, the standing pose, lies within.
         armature: rotor inertia seen at the joint, kg m^2; None: sized to the body.
         damping: viscous torque, N m s/rad; None: sized to the body.
-        motor: what drives it; None: sized to the body.
+        motor: None: sized to the body.
     """
 
     name: str = _name()
@@ -227,7 +227,7 @@ class Link(_Spec):
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Foot(_Spec):
-    """A sphere, rigid at the end of the last link; its height tells stance from swing."""
+    """A sphere, rigid at the end of the last link; its height decides between stance and swing."""
 
     radius: float = _length()
     name: str = _name(default="foot")
@@ -264,12 +264,12 @@ class Leg(_Spec):
 
     @property
     def side(self) -> str:
-        """Return 'left' or 'right', by where the foot stands; 'left' on the midline."""
+        """Return 'left' or 'right', the side of the foot; 'left' on the midline."""
         return "right" if self.foot_position[1] < -1e-9 else "left"  # rounding must not tell sides
 
     @property
     def foot_position(self) -> Vector:
-        """Return where the foot is in the torso's frame with all joints at zero."""
+        """Return the position of the foot in the torso's frame with all joints at zero."""
         return self.points[-1]
 
     @property
@@ -340,7 +340,7 @@ class Torso(_Spec):
     Attributes:
         standing_height: of the origin above the floor, m; None: a body sets it so that its lowest foot
             stands on the floor.
-        solids: what it is made of.
+        solids: its shapes.
     """
 
     standing_height: float | None = _length(default=None, optional=True)

@@ -1,7 +1,7 @@
 """Bodies as JSON: the fields of `arc_suite.robots.spec` by name, tuples as lists, defaults left out.
 
-A file holds one object, the fields of a `Body`; wherever a field is a spec, its object stands
-there. Nothing else can be said in it: no includes, no paths, no markup.
+A file holds one object with the fields of a `Body`; a field that is a spec holds an object in turn.
+There are no includes, no paths and no markup.
 """
 
 import dataclasses
@@ -23,9 +23,9 @@ def load_body(path: str | os.PathLike) -> Body:
     """Read a body from a file.
 
     Raises:
-        SpecError: not JSON, or no body; one line that names the file and the field by its path
-            from the top, `legs[2].links[0].radius`.
-        OSError: the file cannot be read; one line that names it.
+        SpecError: not JSON, or no body; the message names the file and the field by its path,
+            `legs[2].links[0].radius`.
+        OSError: the file cannot be read.
     """
     try:
         with Path(path).open("rb") as file:
@@ -41,7 +41,7 @@ def load_body(path: str | os.PathLike) -> Body:
 
 
 def save_body(body: Body, path: str | os.PathLike) -> None:
-    """Write a body to a file as it is: what it leaves open stays open.
+    """Write a body to a file; fields that are left open stay open.
 
     Raises:
         OSError: the file cannot be written.
@@ -59,7 +59,7 @@ def body_from_json(text: str | bytes) -> Body:
     """Return the body that a text describes.
 
     Raises:
-        SpecError: one line that names the field.
+        SpecError: not JSON, or no body.
     """
     try:
         # Integers of any length become floats, which the field's range then refuses.

@@ -16,19 +16,19 @@ _OF_MODEL = "model_"  # with which names of models' fields begin in a snapshot
 
 
 class Batch:
-    """Many simulations of one model, bit-equal to as many `Physics`, on a thread pool.
+    """Many simulations of one model on a thread pool, bit-identical to as many `Physics`.
 
-    Pickles and copies go on to the bit.
+    Pickles and copies continue bit-identically.
 
     Attributes:
-        data: live arrays under the names of `MjData`, with a leading axis for the rows. Writing
+        data: live arrays under the names of `MjData`, with a leading axis for the simulations. Writing
             qpos, qvel or ctrl writes the simulations' state.
     """
 
     def __init__(
         self,
         model: mujoco.MjModel,
-        rows: int,
+        count: int,
         threads: int = 0,
         fields: Iterable[str] = ("qpos", "qvel", "ctrl", "cfrc_ext", "xpos"),
     ):
@@ -36,14 +36,14 @@ class Batch:
 
         Args:
             model: of them all; copied.
-            rows: how many.
+            count: number of simulations.
             threads: to step on; 0 for as many as there are CPUs.
             fields: of `MjData` that `data` has; qpos, qvel and ctrl always are among them.
         """
         self._forks = forks.count
-        self._simulations = mujoco.batch.Batch(model, rows, threads)
+        self._simulations = mujoco.batch.Batch(model, count, threads)
         forks.keep(self._simulations)
-        self._own = None  # a model of its own for each row, once one has been changed
+        self._own = None  # a model of its own for each simulation, once one has been changed
         self._changed = {}  # fields that ever were, as compiled
         self._silent = _silent(model)
         # What is bound is filled by every call, so it must be bound before the first.
@@ -52,25 +52,25 @@ class Batch:
 
     @property
     def mocap_pos(self) -> np.ndarray:
-        """Positions (rows, nmocap, 3) of the arena's movable bodies, live."""
+        """Positions (count, nmocap, 3) of the arena's movable bodies, live."""
         return self._simulations.bind("mocap_pos")
 
-    def part(self, rows: np.ndarray | int) -> types.SimpleNamespace:
-        """Return `data` of some rows alone: a copy for (rows,) booleans, views without that axis for one's index."""
-        return types.SimpleNamespace(**{name: array[rows] for name, array in vars(self.data).items()})
+    def part(self, mask: np.ndarray | int) -> types.SimpleNamespace:
+        """Return `data` of some simulations: copies for a mask (count,), views without that axis for an index."""
+        return types.SimpleNamespace(**{name: array[mask] for name, array in vars(self.data).items()})
 
-    def step(self, nstep: int, rows: np.ndarray) -> np.ndarray:
-        """Advance some rows by `nstep` substeps, as `Physics.step` does.
+    def step(self, nstep: int, mask: np.ndarray) -> np.ndarray:
+        """Advance some simulations by `nstep` substeps, as `Physics.step` does.
 
         Where these diverge, MuJoCo goes on from the model's default state, says nothing and counts
         a warning.
 
         Args:
             nstep: number of substeps, at least 2.
-            rows: mask (rows,) of those to advance.
+            mask: (count,) of those to advance.
 
         Returns:
-            Mask (rows,) of those that diverged.
+            Mask (count,) of those that diverged.
 
         Raises:
             ForkError: made before a fork.
@@ -81,83 +81,83 @@ class Batch:
         with timers.off:
             simulations.set_models(self._silent)
             try:
-                simulations.step(rows, nstep - 1)
+                simulations.step(mask, nstep - 1)
             finally:
                 simulations.set_models(self._own)
-            simulations.step(rows)
+            simulations.step(mask)
         return simulations.warning[..., 1].any(axis=-1)
 
     def reset(
         self,
-        rows: np.ndarray,
+        mask: np.ndarray,
         qpos: np.ndarray,
         qvel: np.ndarray,
         mocap_pos: np.ndarray | None = None,
         models: Sequence[Mapping[str, np.ndarray]] = (),
     ) -> None:
-        """Restart some rows, as dm_control's `reset_context` does.
+        """Restart some simulations, as dm_control's `reset_context` does.
 
         Args:
-            rows: mask (rows,) of those to restart.
+            mask: (count,) of those to restart.
             qpos: (restarted, nq) their positions.
             qvel: (restarted, nv) their velocities.
             mocap_pos: (restarted, nmocap, 3) positions of the arena's movable bodies; None for the model's.
-            models: (restarted,) fields of the model by name that differ in a row until its next reset; empty for none.
+            models: (restarted,) fields of the model by name that differ until the next reset; empty for none.
 
         Raises:
             ForkError: made before a fork.
         """
         self._check_process()
         self._simulations.set_models(None)
-        self._simulations.reset(rows)  # runs mj_forward, from whose result the solver starts next
+        self._simulations.reset(mask)  # runs mj_forward, from whose result the solver starts next
         if self._own is not None or any(models):
-            self._change(rows, models or [{}] * len(qpos))
+            self._change(mask, models or [{}] * len(qpos))
         self._simulations.set_models(self._own)
-        self.data.qpos[rows], self.data.qvel[rows] = qpos, qvel
+        self.data.qpos[mask], self.data.qvel[mask] = qpos, qvel
         if mocap_pos is not None:
-            self.mocap_pos[rows] = mocap_pos
-        self._simulations.forward(rows)
+            self.mocap_pos[mask] = mocap_pos
+        self._simulations.forward(mask)
 
-    def place(self, rows: np.ndarray, qpos: np.ndarray) -> None:
-        """Move some rows to other positions, and bring derived quantities up to date.
+    def place(self, mask: np.ndarray, qpos: np.ndarray) -> None:
+        """Move some simulations to other positions and update derived quantities.
 
         Args:
-            rows: mask (rows,) of those to move.
+            mask: (count,) of those to move.
             qpos: (moved, nq) where to.
 
         Raises:
             ForkError: made before a fork.
         """
         self._check_process()
-        self.data.qpos[rows] = qpos
-        self._simulations.forward(rows)
+        self.data.qpos[mask] = qpos
+        self._simulations.forward(mask)
 
-    def _change(self, rows: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
+    def _change(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
         model = self._simulations.model
         if self._own is None:
-            self._own, self._silent = ([copy.copy(each) for _ in rows] for each in (model, self._silent))
+            self._own, self._silent = ([copy.copy(each) for _ in mask] for each in (model, self._silent))
         self._changed |= {name: getattr(model, name) for fields in models for name in fields}
         scratch = mujoco.MjData(model)
-        for row, fields in zip(np.flatnonzero(rows), models, strict=True):
-            for own in (self._own[row], self._silent[row]):
+        for index, fields in zip(np.flatnonzero(mask), models, strict=True):
+            for own in (self._own[index], self._silent[index]):
                 change(own, self._changed | fields, scratch)
 
     def snapshot(self) -> dict[str, np.ndarray]:
-        """Return copies of the simulations' state, of `data` and of models' fields, from which `restore` goes on."""
+        """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
         fields = {name: array.copy() for name, array in vars(self.data).items()}
         models = {f"{_OF_MODEL}{name}": np.stack([getattr(own, name) for own in self._own]) for name in self._changed}
         return {"state": self._simulations.state.copy(), **fields, **models}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on, to the bit, from what `snapshot` returned.
+        """Continue bit-identically from the arrays of `snapshot`.
 
         Raises:
             KeyError, ValueError: an array is missing or does not fit.
         """
         models = {name.removeprefix(_OF_MODEL): array for name, array in arrays.items() if name.startswith(_OF_MODEL)}
         if models or self._own is not None:
-            rows = range(self._simulations.nsim)
-            self._change(np.ones(len(rows), bool), [{name: models[name][row] for name in models} for row in rows])
+            each = range(self._simulations.nsim)
+            self._change(np.ones(len(each), bool), [{name: models[name][index] for name in models} for index in each])
             self._simulations.set_models(self._own)
         self._simulations.state[...] = arrays["state"]
         for name, bound in vars(self.data).items():
@@ -178,14 +178,14 @@ class Batch:
 
 
 def _silent(model: mujoco.MjModel) -> mujoco.MjModel:
-    """A copy of a model that computes no sensors."""
+    """Return a copy of a model with sensors disabled."""
     model = copy.copy(model)
     model.opt.disableflags |= _SENSOR
     return model
 
 
 def _fill(array: np.ndarray, values: np.ndarray) -> None:
-    """Write into a bound array, be it an output, which MuJoCo hands out for reading alone."""
+    """Write into a bound array, including read-only outputs."""
     writeable = array.flags.writeable
     array.flags.writeable = True
     array[...] = values

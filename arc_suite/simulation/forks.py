@@ -1,8 +1,8 @@
-"""Forks of the process: what waits for threads is refused in a child that has none of them.
+"""Forks of the process: objects that wait for threads are refused in the child.
 
-A forked child has a copy of its parent's memory and none of its threads. What waits for those
-threads, MuJoCo's batches and OpenGL's drivers, would hang the child where it is used and even where
-it is destroyed. Whoever makes such things remembers `count` and compares it before use.
+A forked child has a copy of its parent's memory and none of its threads. Objects that wait for those
+threads, MuJoCo's batches and OpenGL's drivers, would hang the child in use and even in destruction.
+Their owner remembers `count` and compares it before use.
 """
 
 import ctypes
@@ -15,7 +15,7 @@ _threaded = weakref.WeakSet()
 
 
 class ForkError(RuntimeError):
-    """An object was used in a forked child, but made before the fork."""
+    """An object from before a fork was used in the child process."""
 
 
 def refuse(what: str):

@@ -1,4 +1,4 @@
-"""The compiled model of a body in an arena that simulations step: bit-equal to the written one, and faster."""
+"""The compiled model of a body in an arena: bit-equal to the MJCF of `models.assemble`, and faster."""
 
 import copy
 import functools
@@ -18,11 +18,10 @@ _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_DAMPER | mujoco.mjtDisableBit.mjDS
 def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
     """Compile the model that simulations of a body in an arena step.
 
-    It is that of `models.assemble`, and simulates to the same bits, with two differences. Contacts
-    are a list of pairs of geoms, so that no step has to look for what may touch; `contype` and
-    `conaffinity` are 0 then, and contacts take friction, solref, solimp, margin and gap from `pair_*`,
-    not from `geom_*`. Where the arena has many geoms, only those with its planes and height fields are
-    listed. Where it makes no difference, the integrator is Euler's.
+    Simulation results are bit-equal to those of `models.assemble`, with two differences in the model.
+    Contacts are explicit pairs, which is faster: `contype` and `conaffinity` are 0, and contacts take
+    friction, solref, solimp, margin and gap from `pair_*`, not from `geom_*`. In an arena of many geoms
+    only planes and height fields have pairs. The integrator is Euler's where results stay the same.
 
     Args:
         body: the spec; what it leaves open is sized.
@@ -46,12 +45,12 @@ def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
 
 
 def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: mujoco.MjData) -> None:
-    """Write fields of a model, by name, and bring up to date what MuJoCo has derived from them.
+    """Write fields of a model, by name, and update the constants that MuJoCo derives from them.
 
     Args:
         model: to write to.
         fields: values by name, of the shapes that the model's fields have.
-        scratch: data of such a model, which nobody needs.
+        scratch: data of such a model; overwritten.
     """
     for name, values in fields.items():
         getattr(model, name)[:] = values
@@ -59,7 +58,7 @@ def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: muj
 
 
 def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel, all_geoms: bool = True) -> None:
-    """Write explicit contact pairs in place of the masks `contype` and `conaffinity`.
+    """Replace the masks `contype` and `conaffinity` by explicit contact pairs.
 
     Args:
         spec: the model to change; every geom that touches another has a name.
@@ -82,7 +81,7 @@ def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel, all_geoms: bool = 
 
 
 def _contact(model: mujoco.MjModel, first: int, second: int) -> dict:
-    """Return the attributes of a pair of geoms whose contacts are as MuJoCo mixes them from the geoms."""
+    """Return the attributes of a contact pair, mixed from its geoms by MuJoCo's rules."""
     both = np.array((first, second))
     friction, condim, solimp = model.geom_friction[both], model.geom_condim[both], model.geom_solimp[both]
     solref, priority, share = model.geom_solref[both], model.geom_priority[both], model.geom_solmix[both]
@@ -108,7 +107,7 @@ def _contact(model: mujoco.MjModel, first: int, second: int) -> dict:
 
 
 def euler_suffices(model: mujoco.MjModel) -> bool:
-    """Return whether MuJoCo's Euler integrator steps a model to the same bits as its implicitfast, and faster.
+    """Return whether MuJoCo's Euler integrator gives the same bits as its implicitfast.
 
     Both solve (M - h D) a = f for the acceleration a, with the mass matrix M and the substep h.
     In implicitfast, D holds the derivatives of all passive and actuator forces by velocities; in

@@ -1,8 +1,8 @@
 """OpenGL: chosen on import, opened at the first picture, one context for all pictures of a process.
 
-A context is large and slow to make, so that all pictures of a process come out of one, drawn one
-after the other: in a thread of its own, where it disturbs nobody else's context and whose end
-nobody waits for. Where there is no OpenGL, everything but rendering works.
+A context is large and slow to make. So one context draws all pictures of a process, one after the
+other, in a daemon thread of its own that leaves other contexts alone. Without OpenGL everything but
+rendering works.
 """
 
 import atexit
@@ -31,7 +31,7 @@ _lock = threading.Lock()
 
 
 class RenderingUnavailable(RuntimeError):
-    """No picture can be made here; the message says why, and the remedy."""
+    """Rendering is impossible here; the message gives the cause and the remedy."""
 
 
 def select_backend() -> None:
@@ -39,7 +39,7 @@ def select_backend() -> None:
 
     `MUJOCO_GL` is set to egl if the user has not set it, there is no display and libEGL loads; a
     user's own value stays. dm_control, which would open OpenGL when it is imported and refuse to be
-    imported where that fails, does so at the first picture instead, whoever asks for it.
+    imported where that fails, does so at the first picture instead.
     """
     if "MUJOCO_GL" not in os.environ and not has_display() and _loads("libEGL.so.1"):
         os.environ["MUJOCO_GL"] = "egl"
@@ -54,7 +54,7 @@ def select_backend() -> None:
 
 
 def _postpone_backend() -> None:
-    """Put an empty module in the place of dm_control's backend; it becomes the real one when it is asked."""
+    """Replace dm_control's backend by an empty module, which loads the real one at first use."""
     import dm_control
 
     module = types.ModuleType(_BACKEND)
@@ -72,7 +72,7 @@ def _postpone_backend() -> None:
 
 @contextlib.contextmanager
 def _environment():
-    """Undo what libraries do to the environment's variables, and keep Mesa from warning on standard error."""
+    """Restore environment variables afterwards, and silence Mesa's warnings."""
     before = {name: os.environ.get(name) for name in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL")}
     os.environ.setdefault("EGL_LOG_LEVEL", "fatal")
     try:
@@ -86,7 +86,7 @@ def _environment():
 
 @contextlib.contextmanager
 def _strict_glfw():
-    """Let GLFW raise what it warns of by default, which makes dm_control go on to the next backend."""
+    """Turn GLFW's warnings into errors, so that dm_control tries the next backend."""
     import glfw
 
     before, glfw.ERROR_REPORTING = glfw.ERROR_REPORTING, "raise"
@@ -97,7 +97,7 @@ def _strict_glfw():
 
 
 def has_display() -> bool:
-    """Return whether windows can be expected to open: on macOS and Windows, elsewhere with X11 or Wayland."""
+    """Return whether a window should open: always on macOS and Windows, elsewhere with X11 or Wayland."""
     return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
@@ -105,10 +105,10 @@ def require_window(instead: str = "use render_mode 'rgb_array'") -> None:
     """Check that a window can be opened; MuJoCo's viewer would end the process if not.
 
     Args:
-        instead: what does without one, for the error.
+        instead: the alternative to a window, for the error.
 
     Raises:
-        RenderingUnavailable: it cannot; why, and the remedy.
+        RenderingUnavailable: no window opens.
     """
     import glfw
 
@@ -137,7 +137,7 @@ def call(function):
         What it returns.
 
     Raises:
-        RenderingUnavailable: no OpenGL here. Whatever the function raises.
+        RenderingUnavailable: no OpenGL here. Errors of the function pass through.
     """
     global _renderer
     with _lock:
@@ -165,7 +165,7 @@ def contexts(model):
 
 
 def driver() -> str:
-    """Return the names of OpenGL's renderer and version; after the first picture."""
+    """Return the names of OpenGL's renderer and version, after the first picture."""
 
     def ask():
         from OpenGL import GL
@@ -176,7 +176,7 @@ def driver() -> str:
 
 
 class _Renderer:
-    """One OpenGL context, in it a MuJoCo context for each body drawn lately, and the thread in which they are used."""
+    """One OpenGL context, its thread, and a MuJoCo context for each recently drawn body."""
 
     def __init__(self):
         backend = _backend()
@@ -239,7 +239,7 @@ class _Renderer:
         return engine.Contexts(gl=self._gl, mujoco=drawing)
 
     def close(self):
-        """Free the contexts in their thread, before the interpreter takes apart what that needs."""
+        """Free the contexts in their thread before the interpreter ends."""
         gl = self._gl
         if self._forks == forks.count:
             with contextlib.suppress(Exception):  # another library may have closed the display already
@@ -280,7 +280,7 @@ def _wants_glfw() -> bool:
 
 @contextlib.contextmanager
 def _errors():
-    """Turn whatever goes wrong while OpenGL is opened into one line.
+    """Turn errors from opening OpenGL into `RenderingUnavailable`.
 
     Raises:
         RenderingUnavailable: why there is no picture, and the remedy.

@@ -33,16 +33,16 @@ class Physics(dm_mujoco.Physics):
         body: what is simulated.
         arena: where.
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
-            whatever glows; None leaves it its own colour.
-        marker: returns the marks that pictures show beside the body, given this simulation; None for none.
-        divergence: how the physics diverged in the latest step, in one line, or None.
+            the material `glow`; None keeps its own colour.
+        marker: returns the debug markers of pictures, given this simulation; None for none.
+        divergence: how the physics diverged in the latest step, or None.
     """
 
     divergence: str | None = None
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> Physics:
-        """Simulate a body in an arena, in the pose in which it stands."""
+        """Simulate a body in an arena, from its standing pose."""
         physics = cls.from_model(wrapper.MjModel(compiled(body, arena)))
         physics.body, physics.arena = body, arena
         return physics
@@ -56,7 +56,7 @@ class Physics(dm_mujoco.Physics):
         self._option = self.model.ptr.opt
 
     def reset(self, keyframe_id=None) -> None:
-        """Restart from the default pose, as in dm_control, with the model as it was before `change_model`."""
+        """Restart from the default pose, as in dm_control, with the model before `change_model`."""
         self._check_process()
         if self._unchanged:
             self._change(self._unchanged)
@@ -64,7 +64,7 @@ class Physics(dm_mujoco.Physics):
         super().reset(keyframe_id)
 
     def change_model(self, fields: Mapping[str, np.ndarray]) -> None:
-        """Give fields of the model, by name, other values of the same shapes until the next reset."""
+        """Set fields of the model, by name, until the next reset."""
         model = self.model.ptr
         self._unchanged = {name: getattr(model, name).copy() for name in fields} | self._unchanged
         self._change(fields)
@@ -81,7 +81,7 @@ class Physics(dm_mujoco.Physics):
         what happened, and nothing is raised.
 
         Raises:
-            ValueError: `nstep` is no integer from 1; one line.
+            ValueError: `nstep` is no integer from 1.
             ForkError: made before a fork.
         """
         self._check_process()
@@ -111,13 +111,13 @@ class Physics(dm_mujoco.Physics):
             forks.refuse("environment")
 
     def render(self, height=480, width=640, camera_id="tracking", **kwargs) -> np.ndarray:
-        """Draw the decorated body as it stands; other arguments as in dm_control.
+        """Draw the decorated body in its present pose; other arguments as in dm_control.
 
         Returns:
             (height, width, 3) uint8; with `depth=True`, (height, width) float32, m.
 
         Raises:
-            ValueError: no such camera, or an impossible size; one line.
+            ValueError: no such camera, or an impossible size.
             RenderingUnavailable: no OpenGL here.
             ForkError: made before a fork.
         """
@@ -135,18 +135,18 @@ class Physics(dm_mujoco.Physics):
 
     def _pose(self) -> dict:
         data = self.data.ptr
-        marks = self.marker(self) if self.marker else ()
-        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos, "marks": marks}
+        markers = self.marker(self) if self.marker else ()
+        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos, "markers": markers}
 
     def free(self) -> None:
-        """Free the simulation, and what a window showed of it."""
+        """Free the simulation and the decorated body."""
         if self._decorated is not None:
             self._decorated.free()
             self._decorated = None
         super().free()
 
     def copy(self, share_model: bool = False) -> Physics:
-        """Return an independent copy of the simulation, as it stands."""
+        """Return an independent copy of the simulation in its present state."""
         copied = super().copy(share_model)
         mujoco.mj_copyData(copied.data.ptr, copied.model.ptr, self.data.ptr)
         copied.body, copied.arena, copied._unchanged = self.body, self.arena, self._unchanged

@@ -1,4 +1,4 @@
-"""Pictures of a body in an arena: the decorated model, posed as a simulation stands."""
+"""Pictures of a body in an arena: the decorated model in the pose of a simulation."""
 
 import functools
 from collections.abc import Iterable
@@ -9,9 +9,9 @@ from dm_control import mujoco as dm_mujoco
 
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.marks import Mark
-from arc_suite.models import looks
-from arc_suite.models.looks.scene import MAX_HEIGHT, MAX_WIDTH
+from arc_suite.markers import Marker
+from arc_suite.models import visuals
+from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl
 
@@ -19,13 +19,13 @@ _SHAPES = {"arrow": mujoco.mjtGeom.mjGEOM_ARROW, "cylinder": mujoco.mjtGeom.mjGE
 
 
 class Decorated(dm_mujoco.Physics):
-    """A body with its looks in an arena; it takes poses, and nothing steps it.
+    """A body with its visuals in an arena; it takes poses and is never stepped.
 
     Attributes:
-        marks: what pictures show beside it, but for those of depth or segments.
+        markers: debug markers of pictures; those of depth or segments show none.
     """
 
-    marks: Iterable[Mark] = ()
+    markers: Iterable[Marker] = ()
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> "Decorated":
@@ -33,7 +33,7 @@ class Decorated(dm_mujoco.Physics):
         decorated = cls.from_xml_string(models.assemble(body, arena, decorated=True).to_xml_string())
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
-        buffer.offwidth = buffer.offheight = 1  # it grows with the pictures that are asked for
+        buffer.offwidth = buffer.offheight = 1  # grows with the size of pictures
         return decorated
 
     def pose(
@@ -41,24 +41,24 @@ class Decorated(dm_mujoco.Physics):
         qpos: np.ndarray,
         share: float | None = None,
         mocap_pos: np.ndarray | None = None,
-        marks: Iterable[Mark] = (),
+        markers: Iterable[Marker] = (),
     ) -> None:
-        """Take a pose, and show a reward.
+        """Take a pose and show a reward.
 
         Args:
             qpos: (nq,) positions of the simulation to look at.
-            share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None
-                leaves it its own colour.
+            share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None
+                keeps its own colour.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
-            marks: to show beside it.
+            markers: debug markers to show.
         """
-        model, data, self.marks = self.model.ptr, self.data.ptr, marks
+        model, data, self.markers = self.model.ptr, self.data.ptr, markers
         data.qpos[:] = qpos
         if mocap_pos is not None:
             data.mocap_pos[:] = mocap_pos
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
             update(model, data)
-        model.material("glow").rgba = self._glow if share is None else looks.reward_colour(share)
+        model.material("glow").rgba = self._glow if share is None else visuals.reward_colour(share)
 
     def render(self, height, width, camera_id, **kwargs):
         """Draw the pose; arguments as in dm_control."""
@@ -68,9 +68,9 @@ class Decorated(dm_mujoco.Physics):
 
         def callback(physics, scene):
             if not (kwargs.get("depth") or kwargs.get("segmentation")):
-                for mark in self.marks:
+                for marker in self.markers:
                     scene.ngeom += 1
-                    geom_of(mark, scene.geoms[scene.ngeom - 1])
+                    geom_of(marker, scene.geoms[scene.ngeom - 1])
             if own is not None:
                 own(physics, scene)
 
@@ -82,15 +82,15 @@ class Decorated(dm_mujoco.Physics):
         return opengl.contexts(self.model)
 
 
-def geom_of(mark: Mark, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
-    """Return a mark as a geom of a scene, a new one or the given one."""
-    geom, kind = geom or mujoco.MjvGeom(), _SHAPES[mark.shape]
-    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(mark.colour, np.float32))
-    mujoco.mjv_connector(geom, kind, mark.radius, mark.start, mark.end)
+def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeom:
+    """Return a debug marker as a geom of a scene, a new one or the given one."""
+    geom, kind = geom or mujoco.MjvGeom(), _SHAPES[marker.shape]
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(marker.colour, np.float32))
+    mujoco.mjv_connector(geom, kind, marker.radius, marker.start, marker.end)
     return geom
 
 
-# Drawn from by whoever asks for a picture of the same body; used in OpenGL's thread alone.
+# Shared by all pictures of the same body; used in OpenGL's thread alone.
 _shared = functools.lru_cache(maxsize=8)(Decorated.from_body)
 
 
@@ -103,7 +103,7 @@ def picture(
     camera_id: int | str,
     share: float | None = None,
     mocap_pos: np.ndarray | None = None,
-    marks: Iterable[Mark] = (),
+    markers: Iterable[Marker] = (),
     **kwargs,
 ) -> np.ndarray:
     """Draw the decorated body in a pose.
@@ -115,16 +115,16 @@ def picture(
         height: pixels.
         width: pixels.
         camera_id: a camera's name or index, -1 for a free one.
-        share: of the greatest reward, 0 to 1, shown as the colour of whatever glows; None for none.
+        share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
-        marks: to show beside it, but in pictures of depth or segments.
+        markers: debug markers; pictures of depth or segments show none.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
         (height, width, 3) uint8; with `depth`, (height, width) float32, m.
 
     Raises:
-        ValueError: no such camera, or an impossible size; one line.
+        ValueError: no such camera, or an impossible size.
         RenderingUnavailable: no OpenGL here.
     """
     check_size(height, width)
@@ -132,7 +132,7 @@ def picture(
     def draw():
         decorated = _shared(body, arena)
         check_camera(decorated.model.ptr, camera_id)
-        decorated.pose(qpos, share, mocap_pos, marks)
+        decorated.pose(qpos, share, mocap_pos, markers)
         return decorated.render(height, width, camera_id, **kwargs)
 
     return opengl.call(draw)
@@ -142,7 +142,7 @@ def check_size(height: int, width: int) -> None:
     """Check the size of pictures, pixels.
 
     Raises:
-        ValueError: no integers, or too large; one line.
+        ValueError: no integers, or too large.
     """
     checks.integer("height", height, 1, MAX_HEIGHT)
     checks.integer("width", width, 1, MAX_WIDTH)
@@ -152,7 +152,7 @@ def check_camera(model: mujoco.MjModel, camera_id: int | str) -> None:
     """Check that a model has a camera: a name, an index, or -1 for the free one.
 
     Raises:
-        ValueError: it has not; one line that names the nearest.
+        ValueError: it has not.
     """
     cameras = [model.camera(index).name for index in range(model.ncam)]
     if isinstance(camera_id, str):

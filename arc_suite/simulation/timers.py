@@ -1,7 +1,7 @@
-"""MuJoCo's timers, off while our own steps run: they cost small bodies 2 to 7 % of their speed.
+"""Switch off MuJoCo's timers in our own steps: they cost small bodies 2 to 7 % of the speed.
 
-To fill `MjData.timer`, a substep reads some 30 times the clock in the C variable `mjcb_time`.
-MuJoCo itself leaves that empty, but its Python bindings install a clock when they are imported.
+To fill `MjData.timer`, a substep reads the clock of the C variable `mjcb_time` some 30 times. MuJoCo
+leaves it empty, but its Python bindings install a clock on import.
 """
 
 import contextlib
@@ -16,13 +16,13 @@ import mujoco
 class Off:
     """A context without the bindings' clock, in which steps leave `MjData.timer` at 0.
 
-    Any number of threads may be in it; the last to leave puts the clock back. Another clock, which
-    somebody has installed since (`mujoco.set_mjcb_time`), stays and serves our steps too. What
-    other threads step by other means meanwhile reads no clock either.
+    Any number of threads may enter; the last to leave restores the clock. A clock that was installed
+    since (`mujoco.set_mjcb_time`) stays, and our steps read it. Meanwhile simulations of other threads
+    read no clock either.
     """
 
     def __init__(self, variable: ctypes.c_void_p):
-        """Remember the clock that a C variable holds now; nothing changes yet."""
+        """Store the present clock of a C variable."""
         self._variable = variable
         self._clock = variable.value
         self._lock = threading.Lock()
@@ -50,13 +50,13 @@ class Off:
         self._taken = False
 
     def _leave_all(self) -> None:
-        """Begin anew in a forked child, which has none of the threads that were inside."""
+        """Reset in a forked child, which has no other threads."""
         self._lock, self._inside = threading.Lock(), 0
         self._put_back()
 
 
 def _clock_variable() -> ctypes.c_void_p | None:
-    """Return `mjcb_time` of the MuJoCo that Python uses; None where it cannot be reached."""
+    """Return `mjcb_time` of the loaded MuJoCo, or None if it cannot be reached."""
     for path in pathlib.Path(mujoco.__file__).parent.glob("*mujoco.*"):  # libmujoco.so.3.17.0, .dylib, mujoco.dll
         with contextlib.suppress(OSError, ValueError):
             return ctypes.c_void_p.in_dll(ctypes.CDLL(str(path)), "mjcb_time")

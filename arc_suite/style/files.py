@@ -18,7 +18,7 @@ from arc_suite import checks, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
-from arc_suite.tasks import terms
+from arc_suite.tasks.parameters import Parameters
 
 FORMAT = "arc_suite tracks 3"  # another number for every change of what a file holds
 
@@ -35,7 +35,7 @@ _FIELDS = {
     **dict.fromkeys(("foot_positions", "foot_velocities"), ("steps", "feet", 3)),
     **dict.fromkeys(("foot_heights", "contacts"), ("steps", "feet")),
 }
-_PARAMETERS = dict.fromkeys(terms.Parameters._fields, float) | {"phase_offsets": ("feet",), "healthy_range": (2,)}
+_PARAMETERS = dict.fromkeys(Parameters._fields, float) | {"phase_offsets": ("feet",)}
 _KINDS = {"contacts": "b"}  # of dtype; others are numbers
 
 
@@ -135,8 +135,7 @@ def _track(setup: Setup, arrays: Mapping[str, np.ndarray], index: int) -> Track:
             mapping[path[-1]] = array if array.ndim else array.item()
     _check(fields, setup.body)
     if "parameters" in fields:
-        low, high = fields["parameters"]["healthy_range"].tolist()
-        fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
+        fields["parameters"] = Parameters(**fields["parameters"])
     absent = {"phases": None, "parameters": None, "progress": {}}
     return Track(setup=setup, **absent | fields)
 

@@ -199,8 +199,8 @@ def asymmetry(track: Track) -> np.ndarray:
 def cost_of_transport(track: Track) -> float:
     """Positive work of the motors by weight and displacement, J/(N m).
 
-    See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. Braking recovers no energy.
-    Torque is constant over a control step, so that its work is torque times the turn of the joint.
+    See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. The motors do not win back
+    what they brake. Torque is constant over a control step, so its work is torque times the turn of the joint.
     """
     work = (track.torques[1:] * np.diff(track.joint_angles, axis=0)).clip(0.0).sum()
     return float(_per_metre(track, work / (track.mass * track.gravity)))

@@ -155,9 +155,6 @@ def speed(tracks: Mapping[str, Track]) -> Figure:
     axis = figure.subplots()
     first = next(iter(tracks.values()))
     if not np.isnan(target := first.target_velocity):
-        if first.parameters is not None:
-            band = first.parameters.velocity_band
-            axis.axhspan(target - band, target + band, color="#F2F2F2", linewidth=0, label="where speed is rewarded")
         axis.axhline(target, color=INK, linewidth=1, linestyle=(0, (5, 3)), label=f"target: {target:.2f} m/s")
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x = track.positions[:, 0]

@@ -47,7 +47,7 @@ def strip(environment, policy: Policy, seed: int = 0) -> np.ndarray | None:
 
     Args:
         environment: of `arc_suite.load`.
-        policy: made for one row.
+        policy: made for one environment.
         seed: of the episode's start.
 
     Returns:
@@ -76,12 +76,16 @@ def strip(environment, policy: Policy, seed: int = 0) -> np.ndarray | None:
 
 
 def _played(environment, policy: Policy, seed: int, steps: int) -> Iterator[int]:
-    """Play an episode, and yield the tick of the gait clock, which rests while a task wants no gait."""
-    commanded = environment.task.definition.commands.get("command") == len(_AHEAD)
+    """Play an episode, and yield by how many ticks the gait's clock has advanced; at a stop it rests."""
+    task, ticks, phase = environment.task.definition, 0, None
+    commanded = task.commands.get("command") == len(_AHEAD)
     for timestep in evaluation.rollout(environment, policy, seed, steps):
         if commanded and timestep.first():
             environment.command("command", _AHEAD)
-        yield int(environment.task.memory.tick)
+        now = task.phase(environment.task.memory)
+        ticks += phase is not None and now != phase
+        phase = now
+        yield ticks
 
 
 def write(path: Path, picture: np.ndarray) -> None:

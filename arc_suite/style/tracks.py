@@ -10,8 +10,9 @@ from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.clock import wanted_stance
-from arc_suite.tasks.terms import Parameters, total
+from arc_suite.tasks.clock import desired_contacts
+from arc_suite.tasks.parameters import Parameters
+from arc_suite.tasks.terms import total
 
 
 class Track(NamedTuple):
@@ -111,7 +112,7 @@ class Track(NamedTuple):
     @property
     def schedule(self) -> np.ndarray:
         """Feet that the gait wants in stance (the paper's Section 4), (steps, feet) booleans."""
-        return wanted_stance(self.phases, self.parameters.duty_factor, self.parameters.phase_offsets)
+        return desired_contacts(self.phases, self.parameters.duty_factor, self.parameters.phase_offsets)
 
     @property
     def rewards(self) -> np.ndarray:
@@ -126,7 +127,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
 
     Args:
         environment: of `arc_suite.load`.
-        policy: made for one row.
+        policy: made for one environment.
         seed: of the episode's start.
         max_steps: to stop early.
 
@@ -162,8 +163,8 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
             "foot_velocities": lowest_point_velocities(model, data, feet, radii),
             "contacts": data.cfrc_ext[feet].any(axis=-1),
         }
-        if task.clock is not None:
-            row["phases"] = task.clock.at(task.clock.phases, run.memory.tick)
+        if (phase := task.phase(run.memory)) is not None:
+            row["phases"] = phase
         rows.append({name: np.array(value) for name, value in row.items()})
         terms.append(run.terms)
     recorded = {name: np.stack([row[name] for row in rows]) for name in rows[0]}

@@ -1,4 +1,4 @@
-"""The gait's clock: an integer tick a control step, and tables of what it says at each tick.
+"""The gait's clock, an integer tick a control step with tables by tick, and how well feet follow its contact schedule.
 
 A gait's edges fall exactly on control steps, where rounding decides; so the phases are added up in
 double precision once, and every run, on a CPU or a GPU, looks them up.
@@ -20,7 +20,7 @@ class Clock(NamedTuple):
     Attributes:
         phases: (ticks,) rad in [0, 2 pi).
         circle: (ticks, 2) sine and cosine of the phases.
-        stance: (ticks, feet) which feet the gait wants on the ground.
+        stance: (ticks, feet) which feet the gait schedules on the ground.
     """
 
     phases: np.ndarray
@@ -50,16 +50,32 @@ class Clock(NamedTuple):
         return cls(
             phases=phases,
             circle=np.stack([np.sin(phases), np.cos(phases)], axis=-1),
-            stance=wanted_stance(phases, duty_factor, offsets),
+            stance=desired_contacts(phases, duty_factor, offsets),
         )
 
     def at(self, table: np.ndarray, tick):
-        """Return the rows (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
+        """Return the entries (..., n) of a table at ticks (...), integers of Python, NumPy or JAX."""
         if not isinstance(tick, int):
             table = tick.__array_namespace__().asarray(table)
         return table[tick % len(self.phases)]
 
 
-def wanted_stance(phase, duty_factor: float, offsets):
-    """Return which feet (..., feet) a gait wants on the ground at phases (...), rad (the paper's Section 4)."""
+def desired_contacts(phase, duty_factor: float, offsets):
+    """Return which feet (..., feet) a gait schedules on the ground at phases (...), rad (the paper's Section 4)."""
     return (phase[..., None] + offsets) % TWO_PI < TWO_PI * duty_factor
+
+
+def schedule_errors(foot_heights, threshold: float, desired):
+    """Return the number of contact schedule errors (...): feet on the ground that should not be, or the reverse.
+
+    Args:
+        foot_heights: (..., feet) over the ground, m.
+        threshold: m, below which a foot is on the ground.
+        desired: (..., feet) desired contacts.
+    """
+    return ((foot_heights < threshold) != desired).sum(axis=-1, dtype=float)
+
+
+def compliance(errors, steps, feet: int):
+    """Return the mean share (...) of feet that followed the schedule, given all errors (...) in control steps (...)."""
+    return 1.0 - errors / (steps * feet)

@@ -3,15 +3,17 @@
 A task says how an episode starts, what is remembered of it, what a policy observes, what a step
 earns and when it ends. It holds no state and touches no simulation: memory is a value that comes in
 and goes out, and what is to be written is returned. Arrays may carry any leading axes `...`: none
-for one environment, one for the rows of a batch. Where a function is needed it comes from the
-array's own namespace, so that the same text runs under NumPy and JAX.
+for one environment, one for a batch. Where a function is needed it comes from the
+array's own namespace, so that the same text runs under NumPy and JAX. NumPy rounds powers of scalars and
+of arrays differently: write `x * x` where `x` has only leading axes. `arc-suite check --task` finds
+what differs between one environment and a batch.
 
-An episode, as a driver runs it, for one environment or with a leading axis for all rows:
+An episode, as a driver runs it, for one environment or with a leading axis for a batch:
 
-    start = task.start(random, carry)            # all randomness of the episode
+    start = task.start(random, stream)            # all randomness of the episode
     ... the driver resets the simulation to start.qpos and start.qvel ...
     readings = task.read(data)
-    qpos = task.lift(start.memory, readings)     # if not None: written, and read again
+    qpos = task.clear_spawn(start.memory, readings)     # if not None: written, and read again
     memory = task.begin(start.memory, readings)
     while not ended:
         memory, inputs = task.before(memory, action)
@@ -20,7 +22,7 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
         memory = task.after(memory, readings)
         terms, blocks = task.terms(memory, readings), task.observe(memory, readings)
         terminated, truncated = task.ended(memory, readings)
-    carry = task.carry(memory)
+    carry = task.stream_state(memory)
 """
 
 import collections
@@ -35,15 +37,14 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.mirrors import Mirror, Symmetry
+from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Layout, Readings
-from arc_suite.tasks.terms import Parameters
 
 STEPS = 1000  # control steps of an episode
 
@@ -79,7 +80,8 @@ class Start(NamedTuple):
     Attributes:
         qpos: (nq,) positions.
         qvel: (nv,) velocities.
-        memory: a NamedTuple of numbers and arrays, replaced from step to step and never written in place.
+        memory: numbers and arrays in a NamedTuple, which may hold NamedTuples in turn; replaced from step to step
+            and never written in place.
         mocap_pos: (mocap bodies, 3) m, of obstacles that the arena has; None where it has none.
         model: fields of `MjModel` that differ in this episode, by name.
     """
@@ -114,11 +116,12 @@ class Task(ABC):
         name: by which `arc_suite.load` and ids know the task.
         version: raised with any change of dynamics, reward or observation.
         reads: fields of the simulation that `read` takes.
-        commands: what may be set from outside while an episode runs, such as by a player's stick:
-            size by name of a field of the memory; NaN stands for what the task itself would do.
+        commands: sizes of what may be set from outside while an episode runs, such as by a player's stick,
+            by name; see `commanded`.
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
+        demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
     """
 
     scene: Scene
@@ -132,10 +135,11 @@ class Task(ABC):
     own_arena: ClassVar[bool] = False
     modifiers: ClassVar[Mapping[str, Any]] = {}
     actions: ClassVar[str] = "torque"
+    demonstrators: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     @abstractmethod
-    def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Any:
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Any:
         """Return the settings for a body, some of them overridden.
 
         Raises:
@@ -152,9 +156,8 @@ class Task(ABC):
     def blocks(self) -> Mapping[str, int]:
         """The size of every block of the observation by name, in the order of the vector."""
 
-    @property
-    def clock(self) -> Clock | None:
-        """The clock of the prescribed gait, at whose `tick` the memory's field of that name stands; None for none."""
+    def phase(self, memory) -> Any:
+        """Return the phase (...) of the prescribed gait, rad in [0, 2 pi); None where the task prescribes none."""
         return None
 
     @property
@@ -185,7 +188,7 @@ class Task(ABC):
         the image walks on mirrored ground.
 
         Raises:
-            ValueError: the body is not its own mirror image, or see `mirrors`; one line.
+            ValueError: the body is not left-right symmetric, or see `mirrors`; one line.
         """
         action = mirrors.joints(mirror.image(self.scene.body))
         blocks = self.mirrors
@@ -196,7 +199,7 @@ class Task(ABC):
         return None
 
     @abstractmethod
-    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw how an episode starts, and everything else that is random in it.
 
         The number of draws is fixed and does not depend on what is drawn, so that an episode is a
@@ -211,14 +214,14 @@ class Task(ABC):
         """Take the readings of `MjData`, or of anything with its fields under leading axes."""
         return reading.read(data, self.scene.layout, self.scene.arena)
 
-    def lift(self, memory, readings: Readings) -> np.ndarray | None:
+    def clear_spawn(self, memory, readings: Readings) -> np.ndarray | None:
         """Return the positions (..., nq) that bring every foot clear of the ground at the start of an episode.
 
         None on level ground, which pushes out what starts in it; any other ground holds it fast.
         """
-        return None if self.scene.arena.is_level else self.lifted(readings)
+        return None if self.scene.arena.is_level else self.cleared(readings)
 
-    def lifted(self, readings: Readings) -> np.ndarray:
+    def cleared(self, readings: Readings) -> np.ndarray:
         """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
         radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
         clear = radii + _CLEAR * self.scene.body.torso.standing_height
@@ -240,6 +243,13 @@ class Task(ABC):
     def after(self, memory, readings: Readings) -> Any:
         """Return the memory after a control step."""
 
+    def commanded(self, memory, name: str, value) -> Any:
+        """Return the memory with a live command: one of `commands` set to (..., size) numbers from outside.
+
+        NaN stands for what the task itself would do.
+        """
+        return memory._replace(**{name: value})
+
     @abstractmethod
     def terms(self, memory, readings: Readings) -> dict:
         """Return the reward's unweighted terms by name, each (...)."""
@@ -256,11 +266,11 @@ class Task(ABC):
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""
         return {}
 
-    def marks(self, memory, readings: Readings) -> list[Mark]:
+    def markers(self, memory, readings: Readings) -> list[Marker]:
         """Return what pictures of one environment show of what is asked; no leading axes."""
         return []
 
-    def carry(self, memory) -> Any:
+    def stream_state(self, memory) -> Any:
         """Return what the next episode of the stream starts from, given the memory at an episode's end."""
         return None
 

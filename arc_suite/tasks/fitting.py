@@ -34,8 +34,8 @@ _DUTY_FACTORS = (0.6, 0.65, 0.7, 0.75, 0.8)
 _STABLE = 0.05  # of h: static stability margin that is enough throughout a cycle
 
 
-def fitted_settings(body: Body) -> dict:
-    """Return a row of walk's table for any body: units as in `terms.Parameters`, every noise by itself."""
+def fitted_parameters(body: Body) -> dict:
+    """Return parameters of walk for any body: units as in `terms.Parameters`, every noise by itself."""
     height = body.torso.standing_height
     unit, rate = math.sqrt(GRAVITY * height), math.sqrt(GRAVITY / height)
     speed = TARGET_FROUDE * unit

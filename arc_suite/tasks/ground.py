@@ -1,73 +1,121 @@
-"""Rough ground, slopes, stairs, trenches, and a course of them all: walk along a lane at the target velocity.
+"""Grounds: where a task with a command takes place, and what a body sees of it.
 
-The task is steer's on a terrain, with a command of its own: along the lane, told as the torso heads,
-and a turn back into the lane's direction. An episode starts in one of several lanes, of one
-difficulty or of a level of a curriculum.
+A ground is a frozen value with pure functions of its own memory. `place` is (..., 3): x and y of the
+torso's frame, m, and its yaw, rad.
 """
 
-import functools
+import dataclasses
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import checks
-from arc_suite.arenas import Arena, terrain
+from arc_suite import checks, rotations
+from arc_suite.arenas import FLAT, Arena, terrain
+from arc_suite.arenas.pillars import COUNT, RADIUS, Pillars
 from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import modifiers, steer, walk
-from arc_suite.tasks.contract import STEPS, Start
+from arc_suite.tasks.context import Context
+from arc_suite.tasks.contract import STEPS
+from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.mirrors import Mirror
+from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Readings
-from arc_suite.tasks.terms import Parameters
+from arc_suite.tasks.sensors import AHEAD, ASIDE, RAYS, SCAN, SIGHT
 
 LEVELS = 10  # of a curriculum, with difficulties from 0 to 1
-UP, DOWN = 0.8, 0.4  # of the distance that was asked for: above or below it, the next level is higher or lower
 STAYS = 0.75  # probability of the highest level after itself; else any
-SPREAD = 6.0  # half-width of the start across the lane, in standing heights, as are the next four
-OFF_LANE = 10.0  # from the middle of the lane, at which an episode is cut off
+SPREAD = 6.0  # half-width of the start across the lane, h, as are the next four
+OFF_LANE = 10.0  # distance from the middle of the lane at which an episode is truncated
 SUNK = 0.05  # depth of a foot's centre under the ground that a contact never reaches
-LONGEST = 300.0  # way ahead of the start
-END = 1.0  # before the end of a lane, at which an episode is cut off
-SINKING = 5  # control steps running after which a foot has sunk for good
-
-# Where ground is seen: places forward and left of the torso, in R, the mean distance of the feet from their centre.
-# They are denser along the way, where trenches lie across.
-AHEAD, ASIDE = np.linspace(-1.5, 2.1, 25), np.linspace(-1.2, 1.2, 7)
-SCAN = np.stack(np.meshgrid(AHEAD, ASIDE, indexing="ij")).reshape(2, -1)
+LONGEST = 300.0  # length of a lane ahead of the start
+END = 1.0  # before the end of a lane, at which an episode is truncated
+SINKING = 5  # consecutive control steps after which a foot has sunk for good
 
 
-class Ground(NamedTuple):
-    """Settings of the ground.
+class Nothing(NamedTuple):
+    """Memory of a ground that remembers nothing."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ground:
+    """Where a body moves.
 
     Attributes:
-        difficulty: of all lanes, from 0 to 1, without a curriculum.
-        curriculum: whether episodes climb levels of difficulty by how far they go.
-        level: from 0 to 9, at which a curriculum begins.
-        terrain_seed: of what is random in the ground.
+        settings: names of the fields that a caller may set.
+        own_arena: whether the ground is the only arena of the task.
+        blocks: sizes of the blocks that it adds to the observation, by name.
     """
 
-    difficulty: float = terrain.DIFFICULTY
-    curriculum: bool = False
-    level: int = 0
-    terrain_seed: int = 0
+    settings: ClassVar[tuple[str, ...]] = ()
+    own_arena: ClassVar[bool] = False
+    blocks: ClassVar[Mapping[str, int]] = {}
+
+    def with_settings(self, overrides: Mapping[str, Any]) -> Self:
+        """Return the ground with checked settings in place of its own.
+
+        Raises:
+            ValueError: a value that does not fit.
+        """
+        return self
+
+    def arena(self, body: Body, parameters: Parameters) -> Arena:
+        """Return the arena that suits a body."""
+        return FLAT
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """The left-right maps of the blocks."""
+        return {}
+
+    def first(self) -> Any:
+        """Return the stream state with which a new stream of episodes begins."""
+        return None
+
+    def place(self, context: Context, random: np.random.RandomState, stream) -> tuple[Any, tuple[float, float]]:
+        """Draw where the body starts: return the memory, and the displacement of the start, x and y, m."""
+        return Nothing(), (0.0, 0.0)
+
+    def obstacles(self, context: Context, random: np.random.RandomState, memory) -> tuple[Any, np.ndarray | None]:
+        """Draw where obstacles stand: return the memory, and their positions (n, 3), m; None where there are none."""
+        return memory, None
+
+    def touches(self, data):
+        """Return whether the body touches an obstacle, (...) booleans; None where there are none."""
+        return None
+
+    def after(self, context: Context, memory, place, readings, arrived) -> Any:
+        """Return the memory after a control step; `arrived` (...) says whether it reached a goal."""
+        return memory
+
+    def ended(self, memory, fell) -> tuple:
+        """Return whether the episode is terminated and whether it is truncated, given whether the body fell."""
+        return fell, False
+
+    def observe(self, context: Context, memory, place, readings: Readings) -> dict:
+        """Return the blocks that it adds to the observation."""
+        return {}
+
+    def progress(self, memory) -> dict:
+        """Return the metrics that it adds to progress."""
+        return {}
+
+    def stream_state(self, memory, outcome, fell) -> Any:
+        """Return what the next episode of the stream starts from."""
+        return None
 
 
-class Settings(NamedTuple):
-    """What a walk over ground is made of, beside the body: a walk's settings, and those of the ground."""
-
-    parameters: Parameters
-    weights: dict[str, float]
-    noise: walk.Noise
-    ground: Ground
+@dataclasses.dataclass(frozen=True)
+class Level(Ground):
+    """Any arena that a caller chooses, flat ground by default."""
 
 
-class Carry(NamedTuple):
-    """What an episode leaves to the next.
+class Stream(NamedTuple):
+    """What an episode leaves to the next one of its stream.
 
     Attributes:
         level: of a curriculum.
-        outcome: how much of what was asked for it achieved; NaN where there was none.
+        outcome: share of what was commanded that it achieved; NaN where there was no episode.
         failed: whether it ended in failure.
     """
 
@@ -76,200 +124,203 @@ class Carry(NamedTuple):
     failed: bool | np.ndarray
 
 
-_FIELDS = [(field, np.ndarray) for field in (*steer.Memory._fields, "lane", "level", "sinking")]
-
-
-class Memory(NamedTuple("Memory", _FIELDS)):
-    """What is remembered beside steer's.
+class Lane(NamedTuple):
+    """Memory of lanes.
 
     Attributes:
         lane: (...) y of its middle, m.
         level: (...) of the curriculum; 0 without one.
-        sinking: (...) control steps running for which a foot has been under ground.
+        sinking: (...) consecutive control steps for which a foot has been under ground.
+        sunk: (...) whether a foot is stuck in the ground, which contacts should never allow.
+        left: (...) whether the torso has left the lane, to a side or at an end.
     """
 
+    lane: np.ndarray
+    level: np.ndarray
+    sinking: np.ndarray
+    sunk: np.ndarray
+    left: np.ndarray
 
-def next_level(carry: Carry, stays: float, other: int, down: float = DOWN, up: float = UP) -> int:
-    """Return the level of the next episode.
+
+def next_level(stream: Stream, stays, other, down: float, up: float):
+    """Return the level (...) of the next episode, of arrays with any leading axes.
 
     Args:
-        carry: of the episode before.
-        stays: drawn from 0 to 1.
-        other: a level, drawn.
+        stream: of the episode before.
+        stays: (...) drawn from 0 to 1.
+        other: (...) a level, drawn.
         down: outcome below which the level falls.
         up: outcome above which it rises, unless the episode failed.
     """
-    if carry.outcome > up and not carry.failed:
-        if carry.level < LEVELS - 1:
-            return carry.level + 1
-        return carry.level if stays < STAYS else other
-    return max(carry.level - 1, 0) if carry.outcome < down else carry.level
+    level = np.asarray(stream.level) if isinstance(stream.level, int) else stream.level
+    numpy = level.__array_namespace__()
+    rises = (stream.outcome > up) & numpy.logical_not(stream.failed)
+    risen = numpy.where(level < LEVELS - 1, level + 1, numpy.where(stays < STAYS, level, other))
+    fallen = numpy.where(stream.outcome < down, (level - 1).clip(0), level)
+    return numpy.where(rises, risen, fallen)
 
 
-class Lanes(steer.Steer):
-    """Walking along a lane of some kind of ground.
+@dataclasses.dataclass(frozen=True)
+class Lanes(Ground):
+    """Lanes along x, one of which is drawn for an episode: of one difficulty, or of the level of a curriculum.
 
     Attributes:
         kinds: of ground, in the order of `terrain.KINDS`, one of which is drawn for an episode.
         copies: lanes of each kind, and of each kind and level of a curriculum; boxes cost time, so there are fewer.
+        middle: share of the lane's length at which a body starts.
         thresholds: outcomes below and above which a curriculum's level falls and rises.
+        difficulty: of all lanes, from 0 to 1, without a curriculum.
+        curriculum: whether episodes climb levels of difficulty by their outcomes.
+        level: from 0 to 9, at which a curriculum begins.
+        terrain_seed: of what is random in the ground.
     """
 
-    yaw, own_arena, thresholds = 0.3, True, (DOWN, UP)
     kinds: tuple[str, ...]
-    copies = (8, 2)
+    copies: tuple[int, int] = (8, 2)
+    middle: float = 0.0
+    thresholds: tuple[float, float] = (0.4, 0.8)
+    difficulty: float = terrain.DIFFICULTY
+    curriculum: bool = False
+    level: int = 0
+    terrain_seed: int = 0
 
-    @classmethod
-    def fitted(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
-        """Return steer's settings, with those of `Ground`."""
-        for name in overrides:
-            known, elsewhere = (*Ground._fields, *walk.NAMES), ("time_limit", *modifiers.NAMES)
-            checks.name(name, known, f"setting of {cls.name}", near=elsewhere)
-        own = Ground()._asdict() | {name: value for name, value in overrides.items() if name in Ground._fields}
-        ground = Ground(
-            checks.number("difficulty", own["difficulty"], 0.0, 1.0),
-            checks.boolean("curriculum", own["curriculum"]),
-            checks.integer("level", own["level"], 0, LEVELS - 1),
-            checks.integer("terrain_seed", own["terrain_seed"], 0, 2**32 - 1),
+    settings: ClassVar[tuple[str, ...]] = ("difficulty", "curriculum", "level", "terrain_seed")
+    own_arena: ClassVar[bool] = True
+    blocks: ClassVar[Mapping[str, int]] = {"scan": SCAN.shape[1]}
+
+    def with_settings(self, overrides: Mapping[str, Any]) -> Self:
+        """Return the lanes with checked settings."""
+        given = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
+        return dataclasses.replace(
+            self,
+            difficulty=checks.number("difficulty", given["difficulty"], 0.0, 1.0),
+            curriculum=checks.boolean("curriculum", given["curriculum"]),
+            level=checks.integer("level", given["level"], 0, LEVELS - 1),
+            terrain_seed=checks.integer("terrain_seed", given["terrain_seed"], 0, 2**32 - 1),
         )
-        walked = super().fitted(body, {name: overrides[name] for name in overrides if name not in Ground._fields})
-        return Settings(*walked, ground)
 
-    @classmethod
-    def arena(cls, body: Body, settings: Settings) -> Arena:
+    def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return the lanes, long enough for the distance at the target velocity, and a seventh more."""
-        ground, height = settings.ground, body.torso.standing_height
-        distance = abs(settings.parameters.target_velocity) * STEPS * control_timestep(body)
-        length = min(6.0 + np.ceil(1.15 * distance / height), LONGEST)
-        levels = np.arange(LEVELS) / (LEVELS - 1.0) if ground.curriculum else [ground.difficulty]
-        copies = dict.fromkeys(cls.kinds, cls.copies[ground.curriculum])
-        return terrain.made(body, copies, float(length), tuple(map(float, levels)), ground.terrain_seed)
-
-    @functools.cached_property
-    def blocks(self) -> Mapping[str, int]:
-        """Steer's, and the height scan."""
-        return {**super().blocks, "scan": SCAN.shape[1]}
+        distance = abs(parameters.target_velocity) * STEPS * control_timestep(body)
+        length = min(6.0 + np.ceil(1.15 * distance / body.torso.standing_height), LONGEST)
+        levels = np.arange(LEVELS) / (LEVELS - 1.0) if self.curriculum else [self.difficulty]
+        copies = dict.fromkeys(self.kinds, self.copies[self.curriculum])
+        return terrain.made(body, copies, float(length), tuple(map(float, levels)), self.terrain_seed)
 
     @property
     def mirrors(self) -> Mapping[str, Mirror]:
-        """Steer's; what is seen on the left is seen on the right, as on mirrored ground."""
+        """The left-right map of the scan, as on mirrored ground."""
         places = np.arange(SCAN.shape[1]).reshape(len(AHEAD), len(ASIDE))[:, ::-1].ravel()
-        return {**super().mirrors, "scan": Mirror(places, np.ones(len(places), np.int8))}
+        return {"scan": Mirror(places, np.ones(len(places), np.int8))}
 
-    def first(self) -> Carry:
-        """Return the level at which a stream begins, which it neither raises nor lowers."""
-        return Carry(self.settings.ground.level, np.nan, False)
+    def first(self) -> Stream:
+        """Return the level at which a stream begins, which its first episode neither raises nor lowers."""
+        return Stream(self.level, np.nan, False)
 
-    def start(self, random: np.random.RandomState, carry: Carry) -> Start:
-        """Draw kind, level (two draws), lane and place across it; then steer's start, nearly along the lane."""
+    def place(self, context: Context, random: np.random.RandomState, stream: Stream):
+        """Draw kind, level (two draws), lane and place across it."""
         kind, stays, other = random.randint(len(self.kinds)), random.uniform(), random.randint(LEVELS)
-        copies = self.copies[self.settings.ground.curriculum]
-        lane, place = random.randint(copies), random.uniform(-SPREAD, SPREAD)
-        start = super().start(random, carry)
-        level, levels = 0, 1
-        if self.settings.ground.curriculum:
-            level, levels = next_level(carry, stays, other, *self.thresholds), LEVELS
-        arena = self.scene.arena
+        copies, arena = self.copies[self.curriculum], context.arena
+        lane, aside = random.randint(copies), random.uniform(-SPREAD, SPREAD)
+        level, levels = (int(next_level(stream, stays, other, *self.thresholds)), LEVELS) if self.curriculum else (0, 1)
         middle = arena.start((kind * levels + level) * copies + lane)
-        start.qpos[1] += middle + place * arena.unit
-        return start._replace(memory=Memory(*start.memory, np.float64(middle), level, 0))
+        start = (self.middle * arena.length * arena.unit, middle + aside * arena.unit)
+        return Lane(np.float64(middle), level, 0, np.False_, np.False_), start
 
-    def after(self, memory: Memory, readings: Readings) -> Memory:
-        """Advance the walk, and count how long a foot has been under ground."""
-        under = (readings.foot_heights < -SUNK * self.scene.arena.unit).any(axis=-1)
-        return super().after(memory, readings)._replace(sinking=(memory.sinking + 1) * under)
+    def after(self, context: Context, memory: Lane, place, readings: Readings, arrived) -> Lane:
+        """Count how long a foot has been under ground, and see whether the torso is still in the lane."""
+        unit, length = context.arena.unit, context.arena.length
+        sinking = (memory.sinking + 1) * (readings.foot_heights < -SUNK * unit).any(axis=-1)
+        x, y = place[..., 0], place[..., 1]
+        beyond = (x > (length - END) * unit) | (x < (END - terrain.BACK) * unit)
+        left = beyond | (abs(y - memory.lane) > OFF_LANE * unit)
+        return Lane(memory.lane, memory.level, sinking, sinking >= SINKING, left)
 
-    def wanted(self, memory: Memory):
-        """Return the command (..., 3): along the lane at the target velocity, and a turn into its direction."""
-        heading, numpy = memory.place[..., 2], memory.place.__array_namespace__()
-        turn = (-heading * self.reach / self.scene.arena.unit).clip(-1.0, 1.0)
-        along = numpy.stack([numpy.cos(heading), -numpy.sin(heading), turn], axis=-1)
-        return numpy.where(numpy.isnan(memory.command), along, memory.command)
+    def ended(self, memory: Lane, fell) -> tuple:
+        """Terminate where the body fell or a foot sank; truncate where the torso has left the lane."""
+        return fell | memory.sunk, memory.left
 
-    def observe(self, memory: Memory, readings: Readings) -> dict:
-        """Return steer's blocks, and how high the ground about the torso is over where it would stand at ease."""
-        return super().observe(memory, readings) | {"scan": self.scan(memory, readings)}
-
-    def scan(self, memory: Memory, readings: Readings):
-        """Return the heights (..., 175) of the ground at `SCAN`, in standing heights, clipped to [-1, 1].
+    def observe(self, context: Context, memory: Lane, place, readings: Readings) -> dict:
+        """Return the heights (..., 175) of the ground at `sensors.SCAN`, in h, clipped to [-1, 1].
 
         0 is where the ground would be if the torso stood over it at its standing height.
         """
-        position, heading = readings.torso_position, memory.place[..., 2]
-        numpy, arena = position.__array_namespace__(), self.scene.arena
-        forward, left = numpy.asarray(SCAN * self.reach)
+        position, heading, arena = readings.torso_position, place[..., 2], context.arena
+        numpy = position.__array_namespace__()
+        forward, left = numpy.asarray(SCAN * context.reach)
         cosine, sine = numpy.cos(heading)[..., None], numpy.sin(heading)[..., None]
         x = position[..., 0:1] + cosine * forward - sine * left
         y = position[..., 1:2] + sine * forward + cosine * left
-        return ((arena.height(x, y) - position[..., 2:3]) / arena.unit + 1.0).clip(-1.0, 1.0)
+        return {"scan": ((arena.height(x, y) - position[..., 2:3]) / arena.unit + 1.0).clip(-1.0, 1.0)}
 
-    def ended(self, memory: Memory, readings: Readings) -> tuple:
-        """Return as terminated who fell or sank, as truncated who has left the lane or reached its end."""
-        return memory.fell | self.sunk(memory), self.left(memory)
+    def progress(self, memory: Lane) -> dict:
+        """Return whether a foot `sank`, and the `level` of a curriculum."""
+        return {"sank": memory.sunk * 1.0} | ({"level": memory.level * 1.0} if self.curriculum else {})
 
-    def sunk(self, memory: Memory):
-        """Return whether a foot is stuck in the ground, which contacts should never allow: (...) booleans."""
-        return memory.sinking >= SINKING
-
-    def left(self, memory: Memory):
-        """Return whether the torso is beside or beyond the lane: (...) booleans."""
-        x, y = memory.place[..., 0], memory.place[..., 1]
-        unit, ahead = self.scene.arena.unit, self.scene.arena.length
-        beyond = (x > (ahead - END) * unit) | (x < (END - terrain.BACK) * unit)
-        return beyond | (abs(y - memory.lane) > OFF_LANE * unit)
-
-    def progress(self, memory: Memory) -> dict:
-        """Return `distance`, as a share; steer's figures; whether a foot `sank`; and the `level` of a curriculum."""
-        figures = {"distance": self.distance(memory), **super().progress(memory), "sank": self.sunk(memory) * 1.0}
-        return figures | ({"level": memory.level * 1.0} if self.settings.ground.curriculum else {})
-
-    def distance(self, memory: Memory):
-        """Return the way along the lane (...) as a share of that at the target velocity; see `asked`."""
-        return memory.distance / (self.units[0] * self.scene.control_timestep * self.asked(memory))
-
-    def asked(self, memory: Memory):
-        """Return of how many steps (...) an episode is judged: of all where it is over, else of those so far."""
-        numpy = memory.distance.__array_namespace__()
-        over = memory.fell | self.sunk(memory) | self.left(memory)
-        return numpy.where(over, min(self.step_limit, STEPS), memory.steps + (memory.steps == 0))
-
-    def carry(self, memory: Memory) -> Carry:
-        """Return what the next level is drawn from."""
-        return Carry(memory.level, self.outcome(memory), memory.fell | self.sunk(memory))
-
-    def outcome(self, memory: Memory):
-        """Return by what a curriculum judges an episode (...)."""
-        return self.distance(memory)
+    def stream_state(self, memory: Lane, outcome, fell) -> Stream:
+        """Return what the next level follows from."""
+        return Stream(memory.level, outcome, fell | memory.sunk)
 
 
-class Rough(Lanes):
-    """Walking over rough ground."""
+class Pillared(NamedTuple):
+    """Memory of a field of pillars.
 
-    name, kinds = "rough", ("rough",)
+    Attributes:
+        pillars: (..., COUNT, 2) where they stand, m.
+        touched: (...) whether a pillar was touched on the way to the present goal.
+        collisions: (...) ways to a goal, the present one among them, on which a pillar was touched.
+    """
 
-
-class Slopes(Lanes):
-    """Walking up and down slopes."""
-
-    name, kinds = "slopes", ("slopes",)
-
-
-class Stairs(Lanes):
-    """Walking up and down flights of stairs."""
-
-    name, kinds = "stairs", ("stairs",)
-    copies = (4, 1)
+    pillars: np.ndarray
+    touched: np.ndarray
+    collisions: np.ndarray
 
 
-class Gaps(Lanes):
-    """Walking over trenches."""
+@dataclasses.dataclass(frozen=True)
+class PillarField(Ground):
+    """A floor with pillars, seen by a range sensor. Lengths are multiples of R, as bodies fit between by their legs."""
 
-    name, kinds = "gaps", ("gaps",)
-    copies = (4, 1)
+    own_arena: ClassVar[bool] = True
+    blocks: ClassVar[Mapping[str, int]] = {"ranges": RAYS.shape[1]}
 
+    def arena(self, body: Body, parameters: Parameters) -> Arena:
+        """Return a floor with pillars that suits the body's size."""
+        return Pillars(reach(body), 2.0 * body.torso.standing_height)
 
-class Course(Lanes):
-    """Walking over one of the four kinds of ground, drawn for every episode."""
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """The left-right map of the ranges."""
+        rays = np.arange(RAYS.shape[1])
+        return {"ranges": Mirror(-rays % len(rays), np.ones(len(rays), np.int8))}
 
-    name, kinds = "course", terrain.KINDS
-    copies = (2, 1)
+    def obstacles(self, context: Context, random: np.random.RandomState, memory) -> tuple[Pillared, np.ndarray]:
+        """Draw where pillars stand."""
+        pillars = context.arena.places(random.uniform(-1.0, 1.0, (COUNT, 2)))
+        return Pillared(pillars[:, :2], np.False_, 0), pillars
+
+    def touches(self, data):
+        """Return whether a force acts on a pillar."""
+        return (data.cfrc_ext[..., -COUNT:, :] != 0.0).any(axis=(-2, -1))
+
+    def after(self, context: Context, memory: Pillared, place, readings, arrived) -> Pillared:
+        """Count the ways on which a pillar was touched."""
+        collided = readings.touches & ~memory.touched
+        touched = (memory.touched | readings.touches) & ~arrived
+        return Pillared(memory.pillars, touched, memory.collisions + collided)
+
+    def observe(self, context: Context, memory: Pillared, place, readings: Readings) -> dict:
+        """Return the distances (..., 24) of pillars along `sensors.RAYS`, as shares of `SIGHT`, at most 1."""
+        numpy, unit = place.__array_namespace__(), context.arena.unit
+        apart = memory.pillars - place[..., None, :2]
+        apart = rotations.headed(apart, place[..., 2:]) / unit
+        x, y = apart[..., None, :, 0], apart[..., None, :, 1]
+        forward, left = numpy.asarray(RAYS)[..., None]
+        along = x * forward + y * left
+        # Half of the chord that the ray cuts off the pillar, squared.
+        chord = RADIUS * RADIUS - (x * left - y * forward) ** 2
+        hit = numpy.where((chord >= 0.0) & (along >= 0.0), along - numpy.sqrt(chord.clip(0.0)), SIGHT)
+        return {"ranges": (hit.min(axis=-1) / SIGHT).clip(0.0, 1.0)}
+
+    def progress(self, memory: Pillared) -> dict:
+        """Return on how many ways a pillar was touched."""
+        return {"collisions": memory.collisions * 1.0}

@@ -1,10 +1,9 @@
 """Tasks with modifiers: any task, disturbed, or with other motors or senses.
 
-A modified task is a task around another. Its memory is that of the other with more fields, so that
-all functions of the other work on it.
+A modified task wraps another, which may come from another package: it changes actions and observations,
+adds kicks, and changes fields of the model. Its memory holds that of the other.
 """
 
-import collections
 import dataclasses
 import functools
 import math
@@ -13,14 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots import mirror
 from arc_suite.tasks import noise
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Mirror
-from arc_suite.tasks.modifiers import LIMP_FROM, Modifiers, checked
+from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
 from arc_suite.tasks.readings import Readings
 
 KICKS, SHORTEST, LONGEST = 25, 40, 121  # of a schedule, and control steps from one to the next
@@ -30,7 +29,7 @@ _FRICTIONS, _MASSES = ("pair_friction", "geom_friction"), ("body_mass", "body_in
 
 
 class Changes(NamedTuple):
-    """What the memory of a modified task holds behind that of the task itself.
+    """Memory of the modifiers.
 
     Attributes:
         elapsed: (..., 1) uint32, control steps since the start.
@@ -38,7 +37,7 @@ class Changes(NamedTuple):
         kick_steps: (..., KICKS) control steps, counted from 1, before which kicks come.
         kicks: (..., KICKS, 2) changes of the torso's velocity in the world, m/s.
         strength: (..., joints) of the motors, a share.
-        limp: (..., joints) whether they are those of the limp leg.
+        failing: (..., joints) whether they are those of the leg whose motors fail.
         noise_key: (..., 1) uint32, from which the noise of the episode follows.
         delay: (...) of actions, control steps.
         waiting: (..., longest delay, joints) the latest actions, the newest first.
@@ -51,12 +50,24 @@ class Changes(NamedTuple):
     kick_steps: np.ndarray
     kicks: np.ndarray
     strength: np.ndarray
-    limp: np.ndarray
+    failing: np.ndarray
     noise_key: np.ndarray
     delay: np.ndarray
     waiting: np.ndarray
     angles: np.ndarray
     speeds: np.ndarray
+
+
+class Memory(NamedTuple):
+    """Memory of a modified task.
+
+    Attributes:
+        task: memory of the task that it wraps.
+        changes: memory of the modifiers.
+    """
+
+    task: Any
+    changes: Changes
 
 
 class Draws(NamedTuple):
@@ -128,13 +139,13 @@ class Modified(Task):
     version = property(lambda self: self.task.version)
     reads = property(lambda self: self.task.reads)
     commands = property(lambda self: self.task.commands)
+    demonstrators = property(lambda self: self.task.demonstrators)
     actions = property(lambda self: self.changes.actions)
-    clock = property(lambda self: self.task.clock)
     parameters = property(lambda self: self.task.parameters)
     target_velocity = property(lambda self: self.task.target_velocity)
 
     @classmethod
-    def fitted(cls, body, overrides):
+    def settings_for(cls, body, overrides):
         """Refuse, as the other task fits its own settings."""
         raise TypeError("a modified task is made by tasks.modified.modified, of a task that is fitted")
 
@@ -143,17 +154,17 @@ class Modified(Task):
         """The other task's; what is drawn is as likely on either side.
 
         Raises:
-            ValueError: a leg of one side is limp in every episode, or as the other task; one line.
+            ValueError: a leg of one side fails in every episode, or as the other task; one line.
         """
-        leg = self.changes.limp
+        leg = self.changes.actuator_failure
         if not isinstance(leg, bool) and mirror.image(self.scene.body).legs[leg] != leg:
-            raise ValueError(f"limp: expected a leg that is drawn, or one on the midline, got {leg}")
+            raise ValueError(f"actuator_failure: expected a leg that is drawn, or one on the midline, got {leg}")
         return self.task.mirrors
 
     @functools.cached_property
     def blocks(self) -> Mapping[str, int]:
         """Those of the other task, but for what is left out."""
-        return {name: size for name, size in self.task.blocks.items() if name not in self.changes.without}
+        return {name: size for name, size in self.task.blocks.items() if name not in self.changes.exclude_blocks}
 
     @functools.cached_property
     def members(self) -> np.ndarray:
@@ -187,22 +198,22 @@ class Modified(Task):
         """Return the other task's."""
         return self.task.first()
 
-    def start(self, random: np.random.RandomState, carry: Any) -> Start:
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the other task's start, then what is random in the modifiers; see `Draws`."""
-        start, body, changes = self.task.start(random, carry), self.scene.body, self.changes
+        start, body, changes = self.task.start(random, stream), self.scene.body, self.changes
         drawn = draw(random, len(body.legs))
         joints = len(body.joint_names)
         directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
         unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
         low, high = changes.delay
-        leg = drawn.leg if changes.limp is True else changes.limp
+        leg = drawn.leg if changes.actuator_failure is True else changes.actuator_failure
         own = Changes(
             elapsed=np.zeros(1, np.uint32),
             terminated=np.False_,
             kick_steps=drawn.kick_steps,
             kicks=unit * drawn.kick_sizes[:, None] * directions,
             strength=np.full(joints, _within(changes.motor_strength, drawn.strength)),
-            limp=np.zeros(joints, bool) if changes.limp is False else self.members[leg],
+            failing=np.zeros(joints, bool) if changes.actuator_failure is False else self.members[leg],
             noise_key=np.array([drawn.noise_key], np.uint32),
             delay=low + int(drawn.delay * (high - low + 1)),
             waiting=np.zeros((high, joints)),
@@ -216,42 +227,42 @@ class Modified(Task):
         ):
             if span != (1.0, 1.0):
                 model |= {name: _within(span, share) * model.get(name, self.scene.model[name]) for name in names}
-        return start._replace(memory=extended(type(start.memory))(*start.memory, *own), model=model)
+        return start._replace(memory=Memory(start.memory, own), model=model)
 
     def read(self, data) -> Readings:
         """Take the other task's readings."""
         return self.task.read(data)
 
-    def lift(self, memory, readings: Readings) -> np.ndarray | None:
+    def clear_spawn(self, memory: Memory, readings: Readings) -> np.ndarray | None:
         """Return the other task's qpos (..., nq) of the start, or None."""
-        return self.task.lift(memory, readings)
+        return self.task.clear_spawn(memory.task, readings)
 
-    def begin(self, memory, readings: Readings) -> Any:
-        """Return the other task's memory, and how the joints are."""
-        return self._felt(self.task.begin(memory, readings), readings)
+    def begin(self, memory: Memory, readings: Readings) -> Memory:
+        """Return the other task's memory, and the state of the joints."""
+        return Memory(self.task.begin(memory.task, readings), self._sensed(memory.changes, readings))
 
-    def before(self, memory, action) -> tuple[Any, Inputs]:
+    def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
         """Return the memory, and what the other task writes as motors and kicks change it.
 
-        What the other task is given, and judges by its reward, is what is asked of the motors as
-        torques, when it arrives; what they give of it is less.
+        The other task is given, and its reward judges, the torques commanded of the motors when they
+        arrive; weak and failing motors give less.
         """
-        changes, asked = self.changes, action
+        changes, own = self.changes, memory.changes
         if changes.delay[1]:
-            memory, asked = _delayed(memory, action)
+            own, action = _delayed(own, action)
         if changes.actions == "position":
-            asked = self.torques(memory, asked)
-        memory, inputs = self.task.before(memory, asked)
-        ctrl = memory.strength * inputs.ctrl
-        if changes.limp is not False:
-            ctrl = ctrl * ~(memory.limp & (memory.elapsed >= LIMP_FROM))
-        kick = self._kick(memory, inputs.kick) if changes.kicks else inputs.kick
-        return memory._replace(elapsed=memory.elapsed + np.uint32(1)), Inputs(ctrl, kick)
+            action = self.torques(own, action)
+        inner, inputs = self.task.before(memory.task, action)
+        ctrl = own.strength * inputs.ctrl
+        if changes.actuator_failure is not False:
+            ctrl = ctrl * ~(own.failing & (own.elapsed >= FAILS_FROM))
+        kick = self._kick(own, inputs.kick) if changes.kicks else inputs.kick
+        return Memory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick)
 
-    def torques(self, memory, action):
+    def torques(self, changes: Changes, action):
         """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
         stiffness, damping = self.gains
-        return (stiffness * (self.reach * action - memory.angles) - damping * memory.speeds).clip(-1.0, 1.0)
+        return (stiffness * (self.reach * action - changes.angles) - damping * changes.speeds).clip(-1.0, 1.0)
 
     def positions(self, torques, angles, speeds):
         """Return the action (..., joints) for which motors that hold positions give torques, as far as joints reach.
@@ -259,78 +270,70 @@ class Modified(Task):
         Args:
             torques: (..., joints) in [-1, 1].
             angles: (..., joints) of the joints, rad.
-            speeds: (..., joints) likewise, rad/s.
+            speeds: (..., joints) of the joints, rad/s.
         """
         stiffness, damping = self.gains
         return ((angles + (torques + damping * speeds) / stiffness) / self.reach).clip(-1.0, 1.0)
 
-    def after(self, memory, readings: Readings) -> Any:
-        """Return the other task's memory, how the joints are, and whether the body has fallen."""
-        memory = self._felt(self.task.after(memory, readings), readings)
-        terminated, _ = self.task.ended(memory, readings)
-        return memory._replace(terminated=(memory.terminated & False) | terminated)  # in every row, were it one for all
+    def after(self, memory: Memory, readings: Readings) -> Memory:
+        """Return the other task's memory, the state of the joints, and whether the body has fallen."""
+        inner, own = self.task.after(memory.task, readings), self._sensed(memory.changes, readings)
+        terminated, _ = self.task.ended(inner, readings)
+        # With the leading axes of the memory, even where the task returns one boolean for all environments.
+        return Memory(inner, own._replace(terminated=(own.terminated & False) | terminated))
 
-    def terms(self, memory, readings: Readings) -> dict:
+    def commanded(self, memory: Memory, name: str, value) -> Memory:
+        """Return the memory with a live command of the other task."""
+        return memory._replace(task=self.task.commanded(memory.task, name, value))
+
+    def terms(self, memory: Memory, readings: Readings) -> dict:
         """Return the other task's terms."""
-        return self.task.terms(memory, readings)
+        return self.task.terms(memory.task, readings)
 
-    def observe(self, memory, readings: Readings) -> dict:
-        """Return the other task's blocks, with noise, but for what is left out."""
-        observed = self.task.observe(memory, readings)
-        blocks = {name: observed[name] for name in observed if name not in self.changes.without}
+    def observe(self, memory: Memory, readings: Readings) -> dict:
+        """Return the other task's blocks with noise, without those that are left out."""
+        observed, own = self.task.observe(memory.task, readings), memory.changes
+        blocks = {name: observed[name] for name in observed if name not in self.changes.exclude_blocks}
         if self.noises:
             count = max(part.stop for part, _ in self.noises.values())
-            drawn = noise.noise(memory.noise_key, memory.elapsed, count)
+            drawn = noise.noise(own.noise_key, own.elapsed, count)
             blocks |= {name: blocks[name] + widths * drawn[..., part] for name, (part, widths) in self.noises.items()}
         return blocks
 
-    def ended(self, memory, readings: Readings) -> tuple:
+    def ended(self, memory: Memory, readings: Readings) -> tuple:
         """Return whether the other task has ended."""
-        return self.task.ended(memory, readings)
+        return self.task.ended(memory.task, readings)
 
-    def progress(self, memory) -> dict:
-        """Return the other task's figures, and whether the body `fell`, 0 or 1."""
-        figures = self.task.progress(memory)
-        return figures if "fell" in figures else figures | {"fell": memory.terminated * 1.0}
+    def progress(self, memory: Memory) -> dict:
+        """Return the other task's metrics, and whether the body `fell`, 0 or 1."""
+        metrics = self.task.progress(memory.task)
+        return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
-    def marks(self, memory, readings: Readings) -> list[Mark]:
+    def markers(self, memory: Memory, readings: Readings) -> list[Marker]:
         """Return the other task's."""
-        return self.task.marks(memory, readings)
+        return self.task.markers(memory.task, readings)
 
-    def carry(self, memory) -> Any:
+    def phase(self, memory: Memory):
+        """Return the other task's phase (...) of the gait, rad."""
+        return self.task.phase(memory.task)
+
+    def stream_state(self, memory: Memory) -> Any:
         """Return the other task's."""
-        return self.task.carry(memory)
+        return self.task.stream_state(memory.task)
 
-    def _felt(self, memory, readings: Readings):
+    def _sensed(self, changes: Changes, readings: Readings) -> Changes:
         if self.changes.actions == "torque":
-            return memory
-        return memory._replace(angles=readings.joint_angles + 0.0, speeds=readings.velocities[..., 6:] + 0.0)
+            return changes
+        return changes._replace(angles=readings.joint_angles + 0.0, speeds=readings.velocities[..., 6:] + 0.0)
 
-    def _kick(self, memory, kick):
+    def _kick(self, changes: Changes, kick):
         """The kick (..., nv) of a step; a schedule that has run out begins again."""
-        numpy, last = memory.kicks.__array_namespace__(), memory.kick_steps[..., -1:]
-        due = memory.elapsed % last + 1 == memory.kick_steps
-        push = (due[..., None] * memory.kicks).sum(axis=-2)
+        numpy, last = changes.kicks.__array_namespace__(), changes.kick_steps[..., -1:]
+        due = changes.elapsed % last + 1 == changes.kick_steps
+        push = (due[..., None] * changes.kicks).sum(axis=-2)
         rest = numpy.zeros((*push.shape[:-1], len(self.scene.standing) - 3))
         push = numpy.concatenate([push, rest], axis=-1)
         return push if kick is None else kick + push
-
-
-@functools.cache
-def extended(kind: type) -> type:
-    """Return the memory of a task, a NamedTuple, with the fields of `Changes` behind."""
-
-    class Memory(collections.namedtuple(kind.__name__, (*kind._fields, *Changes._fields))):
-        __slots__ = ()
-
-        def __reduce__(self):
-            return _remembered, (kind, *self)
-
-    return Memory
-
-
-def _remembered(kind: type, *fields):
-    return extended(kind)(*fields)
 
 
 def _within(span: tuple[float, float], share: float) -> float:
@@ -338,10 +341,10 @@ def _within(span: tuple[float, float], share: float) -> float:
     return low + share * (high - low)
 
 
-def _delayed(memory, action):
+def _delayed(changes: Changes, action):
     """The memory, with an action among those that wait, and the one that arrives (..., joints)."""
     numpy = action.__array_namespace__()
-    under_way = numpy.concatenate([action[..., None, :], memory.waiting], axis=-2)
-    delay = numpy.asarray(memory.delay)[..., None, None]
+    under_way = numpy.concatenate([action[..., None, :], changes.waiting], axis=-2)
+    delay = numpy.asarray(changes.delay)[..., None, None]
     arrived = numpy.take_along_axis(under_way, delay, axis=-2)[..., 0, :]
-    return memory._replace(waiting=under_way[..., :-1, :]), arrived
+    return changes._replace(waiting=under_way[..., :-1, :]), arrived

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from arc_suite import checks
 from arc_suite.robots.spec import Body
 
-LIMP_FROM = 40  # control steps after which a limp leg is limp
+FAILS_FROM = 40  # control steps after which the motors of a leg fail
 LONGEST_DELAY = 100  # control steps
 ACTIONS = ("torque", "position")
 
@@ -23,7 +23,7 @@ class Modifiers(NamedTuple):
         kicks: the greatest change of the torso's velocity by a kick, sqrt(g h): each of a schedule is
             uniform from 0 up to it, in any horizontal direction, 40 to 120 control steps apart.
         motor_strength: of the torque of all motors, a share, or two of them.
-        limp: True for a leg that is drawn, or the index of one: its motors do nothing from step 40 on.
+        actuator_failure: True for a leg that is drawn, or the index of one: its motors do nothing from step 40 on.
         friction: of all contacts, a multiple, or two of them.
         mass: and inertia of all parts, a multiple, or two of them.
         observation_noise: level of uniform noise on what is measured, for all blocks that
@@ -31,18 +31,18 @@ class Modifiers(NamedTuple):
         delay: of actions, control steps, or two of them.
         actions: "torque", or "position": an action is then the joints' wanted angles, 0 for the standing
             pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains.
-        without: names of blocks that the observation leaves out.
+        exclude_blocks: names of blocks that the observation leaves out: the vector gets shorter.
     """
 
     kicks: float = 0.0
     motor_strength: tuple[float, float] = (1.0, 1.0)
-    limp: bool | int = False
+    actuator_failure: bool | int = False
     friction: tuple[float, float] = (1.0, 1.0)
     mass: tuple[float, float] = (1.0, 1.0)
     observation_noise: Mapping[str, float] = {}
     delay: tuple[int, int] = (0, 0)
     actions: str = "torque"
-    without: tuple[str, ...] = ()
+    exclude_blocks: tuple[str, ...] = ()
 
 
 NAMES = Modifiers._fields
@@ -66,18 +66,18 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], 
     return Modifiers(
         kicks=checks.number("kicks", values["kicks"], 0.0, 100.0),
         motor_strength=checks.span("motor_strength", values["motor_strength"], 0.0, 1.0),
-        limp=_limp(values["limp"], body),
+        actuator_failure=_actuator_failure(values["actuator_failure"], body),
         friction=checks.span("friction", values["friction"], 0.0, 100.0),
         mass=checks.span("mass", values["mass"], 0.01, 100.0),
         observation_noise=_noise(values["observation_noise"], list(noisy)),
         delay=_delay(values["delay"]),
         actions=checks.name(values["actions"], ACTIONS, "actions"),
-        without=_without(values["without"], blocks),
+        exclude_blocks=_exclude_blocks(values["exclude_blocks"], blocks),
     )
 
 
-def _limp(value, body: Body) -> bool | int:
-    return value if isinstance(value, bool) else checks.integer("limp", value, 0, len(body.legs) - 1)
+def _actuator_failure(value, body: Body) -> bool | int:
+    return value if isinstance(value, bool) else checks.integer("actuator_failure", value, 0, len(body.legs) - 1)
 
 
 def _noise(value, noisy: list[str]) -> dict[str, float]:
@@ -94,11 +94,11 @@ def _delay(value) -> tuple[int, int]:
     return low, checks.integer("delay", high, low, LONGEST_DELAY)
 
 
-def _without(value, blocks: Mapping[str, int]) -> tuple[str, ...]:
+def _exclude_blocks(value, blocks: Mapping[str, int]) -> tuple[str, ...]:
     names = (value,) if isinstance(value, str) else value
     if not isinstance(names, tuple | list):
-        raise ValueError(f"without: expected names of blocks, got {value!r}")
+        raise ValueError(f"exclude_blocks: expected names of blocks, got {value!r}")
     names = tuple(checks.name(name, blocks, "block") for name in names)
     if set(names) == set(blocks):
-        raise ValueError(f"without: expected to leave a block, got all of them: {', '.join(names)}")
+        raise ValueError(f"exclude_blocks: expected to leave a block, got all of them: {', '.join(names)}")
     return names

@@ -1,6 +1,6 @@
 """Noise of senses: numbers that follow from an episode's key and its step alone.
 
-A generator that counts gives the same numbers to one environment, to the rows of a batch and under
+A generator that counts gives the same numbers to one environment, to a batch and under
 JAX, and once more when an episode is played again, without a state that steps would have to carry.
 """
 

@@ -125,10 +125,12 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         The readings; arrays may be views of `data`.
     """
     qpos, xpos = data.qpos, data.xpos
-    pose, position = qpos[..., layout.pose], qpos[..., 0:3]
-    if not arena.is_level:
+    pose, position, feet = qpos[..., layout.pose], qpos[..., 0:3], xpos[..., layout.feet, :]
+    foot_heights = feet[..., 2]
+    if not arena.is_level:  # a subtraction of 0 would change bits on level ground
         numpy = qpos.__array_namespace__()
         pose = numpy.concatenate([arena.torso_clearance(position)[..., None], pose[..., 1:]], axis=-1)
+        foot_heights = foot_heights - arena.height(feet[..., 0], feet[..., 1])
     forces = data.cfrc_ext[..., layout.parts, :] if forces is None else forces
     return Readings(
         posture=pose,
@@ -138,5 +140,5 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         velocities=data.qvel[..., layout.velocities],
         contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),
         frame_position=xpos[..., layout.parts.start, :],
-        foot_heights=arena.clearance(xpos[..., layout.feet, :]),
+        foot_heights=foot_heights,
     )

@@ -6,9 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.cpg.demonstrator import Prescribed
-from arc_suite.cpg.law import felt
-from arc_suite.cpg.presets import Preset
+from arc_suite.cpg.law import Clocked, checked, proprioception
+from arc_suite.cpg.prescribed import Prescribed, Preset
 from arc_suite.envs.setup import Setup
 
 TERMS = ("posture", "smoothness")  # of the reward, unweighted
@@ -63,17 +62,19 @@ class Evaluator:
         controls = [Prescribed.fit(self._body, preset) for preset in presets]
         control = Prescribed.stacked([control for control in controls for _ in range(episodes)])
         observations, _ = self._environment.reset(seed=[*seeds] * count)
+        sensed = proprioception(checked(split(observations), Clocked.reads, joints))
         upright = np.ones(count * episodes, bool)
         totals, lengths, tipping = np.zeros((3, upright.size))
         style = dict.fromkeys(STYLE, 0.0)
         for step in range(self._steps):
-            actions = control(np.full(upright.size, step), *felt(split(observations), joints))
+            actions = control(np.full(upright.size, step), *sensed)
             observations, rewards, fallen, _, info = self._environment.step(actions)
             counted = upright & (step >= self._skipped)
             totals += rewards * counted
             lengths += counted
-            uprightness = rotations.upright(felt(split(observations), joints)[0])
-            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all rows start anew
+            sensed = proprioception(checked(split(observations), Clocked.reads, joints))
+            uprightness = rotations.upright(sensed[0])
+            costs = {name: info.get(f"reward_{name}", 0.0) for name in TERMS}  # not there if all start anew
             costs["tilt"] = 1.0 - uprightness**2
             for name, cost in costs.items():
                 style[name] += cost * counted

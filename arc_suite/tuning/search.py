@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.cpg.presets import TUNINGS, Preset
+from arc_suite.cpg.prescribed import Preset
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.tuning.evaluator import STYLE, Evaluator, Score
 from arc_suite.tuning.space import SPACES
@@ -79,7 +80,7 @@ class Search:
         """
         import cma  # of the extra "tune"
 
-        tuning, kind = TUNINGS[setup.body.name], SPACES[space]
+        tuning, kind = PRESETS[setup.body.name], SPACES[space]
         self._medium = tuning["medium"]
         self._space, self._episodes = kind.space(setup.body, tuning[kind.preset]), episodes
         self._first = _SEEDS * (1 + seed)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.cpg.presets import Bend, ByRank, Preset
+from arc_suite.cpg.prescribed import Bend, ByRank, Preset
 from arc_suite.robots.spec import Body
 
 

@@ -6,24 +6,52 @@ import os
 os.environ.setdefault("NPROC", "1")  # one thread, as the program does; read when JAX is imported
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
 
+import inspect
+
 import pytest
 
 from arc_suite import data
 from arc_suite.agents import algorithms
-from arc_suite.agents.learner import Stage
+from arc_suite.agents.learner import RunContext
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import ROBOTS
 
-SMALL = {"hidden": 16, "batch": 8, "random_steps": 20}
+SMALL = {"hidden": 16, "batch": 8, "start_steps": 20}
 SHORT = {"time_limit": 2.0}  # s: episodes of 40 steps
 PHASES = {"phase_every": 100, "phase_updates": 60, "check_every": 20, "patience": 40, "scored_batches": 1}
 
 
 def small(name, **changes):
-    """An algorithm of the table with small networks, batches and phases."""
-    definition = algorithms.algorithm(name)
-    phases = PHASES if definition.row.phase_updates else {}
-    return definition.with_row(SMALL | phases | changes)
+    """Hyperparameters of small networks, batches and phases."""
+    phases = PHASES if algorithms.algorithm(name).hyperparameters.phase_updates else {}
+    return SMALL | phases | changes
+
+
+class Learning:
+    """A learner's generator; the attributes are the local variables of `learn` after the latest slice."""
+
+    def __init__(self, slices):
+        self.slices, self.latest = slices, None
+
+    def advance(self):
+        """Learn a slice, and return it."""
+        self.latest = next(self.slices)
+        return self.latest
+
+    def until(self, step):
+        """Learn up to an environment step, phases included, and return the latest slice."""
+        while self.latest is None or self.latest.step < step:
+            self.advance()
+        return self.latest
+
+    def __getattr__(self, name):
+        return inspect.getgeneratorlocals(self.slices)[name]
+
+
+def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_every=1, **context):
+    """Begin to learn; slices end after every step unless told otherwise."""
+    definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters)
+    fields = {"seed": 0, "steps": steps, "evaluate_every": evaluate_every, "folder": folder} | context
+    return Learning(definition.module.learn(definition.hyperparameters, RunContext(setup, **fields)))
 
 
 @pytest.fixture(autouse=True)
@@ -44,20 +72,19 @@ def prior(tmp_path_factory):
     patch = pytest.MonkeyPatch()
     patch.setenv("MINARI_DATASETS_PATH", str(tmp_path_factory.mktemp("datasets")))
     settings = data.Settings(Setup.of("tick", "walk", SHORT), "cpg", ("medium",))
-    data.collect(settings.dataset_id(), settings, 30, rows=15, threads=1)
+    data.collect(settings.dataset_id(), settings, 30, num_envs=15, threads=1)
     yield settings.dataset_id()
     patch.undo()
 
 
 @pytest.fixture
 def learner(tmp_path, prior):
-    """A function that begins a learner of a definition."""
+    """A function that begins to learn by an algorithm, with changed hyperparameters."""
 
-    def begin(definition, steps=10_000, seed=0, **stage):
-        needs = definition.row.prior != "none"
-        stage = {"folder": tmp_path / "run", "prior": prior if needs else None, "task_kwargs": SHORT} | stage
-        return definition.module.begin(
-            definition.row, Stage(body=ROBOTS["tick"], task="walk", seed=seed, steps=steps, **stage)
-        )
+    def begin(name, hyperparameters, **context):
+        needs = algorithms.algorithm(name).hyperparameters.prior != "none"
+        context = {"folder": tmp_path / "run", "prior": prior if needs else None} | context
+        context = {"setup": Setup.of("tick", "walk", SHORT)} | context
+        return learning(name, hyperparameters, **context)
 
     return begin

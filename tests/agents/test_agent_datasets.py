@@ -22,7 +22,7 @@ silent = functools.partial(tqdm, disable=True)
 def run(tmp_path_factory):
     """Folder of a run with checkpoints at 100, 200 and 300, of rising return."""
     folder = tmp_path_factory.mktemp("runs") / "climb"
-    train(tiny_studies.WITH_NUMPY.rows[0].run(), folder, progress=silent)
+    train(tiny_studies.WITH_NUMPY.runs[0].configuration, folder, progress=silent)
     return folder
 
 
@@ -38,6 +38,7 @@ def collected(run, tmp_path, monkeypatch):
     return collect
 
 
+@pytest.mark.slow
 def test_a_run_keeps_the_policy_of_each_evaluation(run):
     table = run_folder.table(run, "evaluations")
     agents = checkpoints.agents(run / "checkpoints")
@@ -51,11 +52,11 @@ def test_a_run_keeps_the_policy_of_each_evaluation(run):
 
 def test_checkpoints_take_turns(run):
     """From seed to seed, and each does what it does alone."""
-    both = policies.policy(run / "checkpoints", "tick", rows=3)
-    alone = [policies.policy(checkpoints.at(run, step), "tick", rows=3) for step in (100, 200, 300)]
+    both = policies.policy(run / "checkpoints", "tick", num_envs=3)
+    alone = [policies.policy(checkpoints.at(run, step), "tick", num_envs=3) for step in (100, 200, 300)]
     sizes = alone[0].blocks
     observation = {name: np.full((3, size), 0.3) for name, size in sizes.items()}
-    both.begin(range(3), [4, 2, 0])
+    both.reset(range(3), [4, 2, 0])
     actions = both.act(observation, np.zeros(3))
     for row, turn in enumerate((1, 2, 0)):
         np.testing.assert_array_equal(actions[row], alone[turn].act(observation, np.zeros(3))[row])
@@ -89,6 +90,7 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
         assert summary["return"] == pytest.approx(table["return"][index], abs=1e-6), "of the evaluation, seed by seed"
 
 
+@pytest.mark.slow
 def test_random_is_a_quality_too(collected):
     assert collected("--quality=random").returncode == 0
     (dataset_id,) = data.ids.existing()

@@ -1,4 +1,4 @@
-"""The first updates of every row, beside an independent computation in float64 with gradients by hand."""
+"""The first updates of every algorithm, compared with a computation in float64 with gradients by hand."""
 
 import numpy as np
 import pytest
@@ -10,10 +10,10 @@ import jax.numpy as jnp
 
 from arc_suite.agents import algorithms, off_policy
 from arc_suite.agents import soft_actor_critic as sac
+from arc_suite.agents.hyperparameters import SoftActorCritic
 from arc_suite.agents.replay import Transitions
-from arc_suite.agents.rows import SoftActorCritic
 
-ROWS = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.row, SoftActorCritic)]
+NAMES = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.hyperparameters, SoftActorCritic)]
 STEPS = 3
 
 
@@ -31,15 +31,15 @@ def of_policy(policy):
 
 @pytest.fixture
 def recorded(monkeypatch):
-    """What the learner's updates are given."""
-    calls, update = [], off_policy._update
+    """The inputs of the learner's updates: the state, and the arrays of batch and noise."""
+    calls, update = [], off_policy.update
 
-    def recording(row, state, sums, batch, noise, following):
+    def recording(hp, state, sums, batch, noise, next_actions):
         copies = [None if part is None else np.array(part) for part in (*batch, *noise)]
-        calls.append(copies)
-        return update(row, state, sums, batch, noise, following)
+        calls.append((jax.tree.map(np.array, state), copies))
+        return update(hp, state, sums, batch, noise, next_actions)
 
-    monkeypatch.setattr(off_policy, "_update", recording)
+    monkeypatch.setattr(off_policy, "update", recording)
     return calls
 
 
@@ -62,32 +62,30 @@ def cast(parts, kind):
     return [part if part is None or part.dtype == bool else part.astype(kind) for part in parts]
 
 
-@pytest.mark.parametrize("name", ROWS)
+@pytest.mark.parametrize("name", NAMES)
 def test_first_three_updates(name, learner, recorded):
     """What it learns, in single precision, and the text of an update in double precision.
 
-    Of a phase too, where the row has any; it follows the update of the third step.
+    Of a phase too, where the hp has any; it follows the update of the third step.
     """
-    definition = algorithms.algorithm(name)
-    row = definition.row
-    phases = {"phase_every": STEPS, "phase_updates": STEPS} if row.phase_updates else {}
-    agent = learner(definition.with_row(phases))
-    first = jax.tree.map(np.asarray, agent._state)
-    reference = ByHand(of_policy(first.policy), [by_hand(critic) for critic in first.critics], row.dropout)
-    for _ in range(1 + bool(phases)):
-        agent.advance(STEPS)
-    assert agent.step == STEPS
-    assert len(recorded) == STEPS * (row.updates_per_step + bool(phases))
-    assert len(recorded[0][2]) == (512 if row.prior == "beside" else 256)
+    hp = algorithms.algorithm(name).hyperparameters
+    phases = {"phase_every": STEPS, "phase_updates": STEPS} if hp.phase_updates else {}
+    agent = learner(name, phases)
+    agent.until(STEPS)
+    first = recorded[0][0]
+    recorded = [parts for _, parts in recorded]
+    reference = ByHand(of_policy(first.policy), [by_hand(critic) for critic in first.critics], hp.dropout)
+    assert len(recorded) == STEPS * (hp.utd_ratio + bool(phases))
+    assert len(recorded[0][2]) == (512 if hp.prior == "symmetric_sampling" else 256)
 
     with jax.enable_x64(True):
         state = jax.tree.map(lambda a: jnp.asarray(a, float if a.dtype.kind == "f" else None), first)
         for index, parts in enumerate(recorded):
             *batch, next_noise, noise, kept = cast(parts, float)
-            is_last_of_step = (index + 1) % row.updates_per_step == 0
-            assert (noise is None) == (index >= STEPS * row.updates_per_step or not is_last_of_step)
-            assert (kept is None) == (row.dropout == 0.0)
-            state, ours = sac.update(row, state, Transitions(*batch), sac.Noise(next_noise, noise, kept))
+            is_last_of_step = (index + 1) % hp.utd_ratio == 0
+            assert (noise is None) == (index >= STEPS * hp.utd_ratio or not is_last_of_step)
+            assert (kept is None) == (hp.dropout == 0.0)
+            state, ours = sac.update(hp, state, Transitions(*batch), sac.Noise(next_noise, noise, kept))
             reference.update(*batch, next_noise, noise, kept)
             assert float(ours["critic_loss"]) == pytest.approx(reference.critic_loss, rel=1e-9)
             if noise is not None:
@@ -95,39 +93,38 @@ def test_first_three_updates(name, learner, recorded):
         assert of_state(state, reference).max() < 1e-6
         assert float(state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-12)
     if len(recorded) <= 2 * STEPS:  # more steps of Adam make of rounding what they like
-        assert of_state(agent._state, reference).max() < 1e-5
-    assert float(agent._state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-6)
+        assert of_state(agent.state, reference).max() < 1e-5
+    assert float(agent.state.log_alpha) == pytest.approx(float(reference.log_alpha["a"][0]), abs=1e-6)
 
 
 def test_losses_in_single_precision(learner, recorded):
     """Of one update, from the same numbers."""
-    row = algorithms.ALGORITHMS["speq"].row
-    agent = learner(algorithms.ALGORITHMS["speq"])
-    first = jax.tree.map(np.asarray, agent._state)
-    agent.advance(1)
-    reference = ByHand(of_policy(first.policy), [by_hand(critic) for critic in first.critics], row.dropout)
-    reference.update(*cast(recorded[0], float))
-    figures = {name: float(value) for name, value in agent._sums.items()}
-    assert figures["critic_loss"] == pytest.approx(reference.critic_loss, rel=1e-5)
-    assert figures["policy_loss"] == pytest.approx(reference.policy_loss, rel=1e-5)
+    hp = algorithms.ALGORITHMS["speq"].hyperparameters
+    agent = learner("speq", {})
+    agent.until(1)
+    first, parts = recorded[0]
+    reference = ByHand(of_policy(first.policy), [by_hand(critic) for critic in first.critics], hp.dropout)
+    reference.update(*cast(parts, float))
+    metrics = {name: float(value) for name, value in agent.sums.items()}
+    assert metrics["critic_loss"] == pytest.approx(reference.critic_loss, rel=1e-5)
+    assert metrics["policy_loss"] == pytest.approx(reference.policy_loss, rel=1e-5)
 
 
 def test_what_an_update_leaves_out_shows(learner, recorded):
     """Each choice of the published code that others make otherwise moves the numbers by more than the tolerance."""
-    row = algorithms.ALGORITHMS["speq"].row
-    agent = learner(algorithms.ALGORITHMS["speq"])
-    first = jax.tree.map(np.asarray, agent._state)
-    agent.advance(2)
+    hp = algorithms.ALGORITHMS["speq"].hyperparameters
+    learner("speq", {}).until(2)
+    first, parts = recorded[0][0], recorded[1][1]
     with jax.enable_x64(True):
         state = jax.tree.map(lambda a: jnp.asarray(a, float if a.dtype.kind == "f" else None), first)
-        *batch, next_noise, noise, kept = cast(recorded[1], float)
+        *batch, next_noise, noise, kept = cast(parts, float)
         batch, noise = Transitions(*batch), sac.Noise(next_noise, noise, kept)
 
-        def after(batch=batch, noise=noise, state=state, row=row):
-            flat = jax.tree.leaves(sac.update(row, state, batch, noise)[0][:4])
+        def after(batch=batch, noise=noise, state=state, hp=hp):
+            flat = jax.tree.leaves(sac.update(hp, state, batch, noise)[0][:4])
             return np.concatenate([np.ravel(leaf) for leaf in flat])
 
-        moved_critics = sac.update(row, state, batch, noise._replace(action=None))[0].critics
+        moved_critics = sac.update(hp, state, batch, noise._replace(action=None))[0].critics
         usual = after()
         for other in (
             after(batch=batch._replace(goes_on=0.0 * batch.goes_on)),

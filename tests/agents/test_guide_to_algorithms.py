@@ -12,14 +12,14 @@ import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "adding_an_algorithm.md").read_text()
-MY_ROWS, RANDOM_SEARCH = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
-TRAIN_ROW, TRAIN_SEARCH, EVALUATE = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
+MY_ALGORITHMS, RANDOM_SEARCH = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+TRAIN_PATIENT, TRAIN_SEARCH, EVALUATE = re.findall(r"^arc-suite .*$", GUIDE, re.MULTILINE)
 
 
 @pytest.fixture
 def run(tmp_path):
     """Runs the guide's commands beside its files, with other flags at the end."""
-    (tmp_path / "my_rows.py").write_text(MY_ROWS)
+    (tmp_path / "my_algorithms.py").write_text(MY_ALGORITHMS)
     (tmp_path / "random_search.py").write_text(RANDOM_SEARCH)
     environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
 
@@ -33,9 +33,9 @@ def run(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_learner_of_its_own(run, tmp_path):
-    """It needs no JAX, goes on to the same bits, and every program takes its policy."""
-    short = ["--row=directions=2", "--row=horizon=20", "--evaluate_every=80", "--set", "time_limit=2"]
+def test_a_new_learner(run, tmp_path):
+    """It needs no JAX, resumes bit-exactly, and every program takes its policy."""
+    short = ["--hp=directions=2", "--hp=horizon=20", "--evaluate_every=80", "--set", "time_limit=2"]
     for folder, steps in (("whole", []), ("broken", ["--minutes=0"]), ("broken", [])):
         run(TRAIN_SEARCH, *short, "--steps=160", "-o", f"runs/{folder}", *steps)
     whole, broken = ((tmp_path / "runs" / name / "checkpoint.npz") for name in ("whole", "broken"))
@@ -47,6 +47,6 @@ def test_a_learner_of_its_own(run, tmp_path):
 
 
 @pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="of the extra agents: make check-agents")
-def test_a_row(run, tmp_path):
-    out = run(TRAIN_ROW, "--steps=50", "--row=hidden=8", "--row=batch=4", "--set", "time_limit=2")
+def test_new_hyperparameters(run, tmp_path):
+    out = run(TRAIN_PATIENT, "--steps=50", "--hp=hidden=8", "--hp=batch=4", "--set", "time_limit=2")
     assert out.startswith("runs/patient: finished, return ")

@@ -1,4 +1,4 @@
-"""What the rows have the learner do: exploration, phases, what is held out of them, and the fence around prior data."""
+"""Algorithms by soft actor-critic: exploration, phases, their validation sets, and prior data."""
 
 import numpy as np
 import pytest
@@ -10,156 +10,150 @@ from conftest import SHORT, small
 from arc_suite import data
 from arc_suite.agents import algorithms, off_policy
 from arc_suite.agents import soft_actor_critic as sac
-from arc_suite.agents.learner import Stage
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 
 
 @pytest.fixture
 def batches(monkeypatch):
     """The observations of every update, and whether the policy learned in it."""
-    calls, update = [], off_policy._update
+    calls, update = [], off_policy.update
 
-    def recording(row, state, sums, batch, noise, following):
+    def recording(hp, state, sums, batch, noise, next_actions):
         calls.append((np.array(batch.observations), noise.action is not None))
-        return update(row, state, sums, batch, noise, following)
+        return update(hp, state, sums, batch, noise, next_actions)
 
-    monkeypatch.setattr(off_policy, "_update", recording)
+    monkeypatch.setattr(off_policy, "update", recording)
     return calls
 
 
 @pytest.fixture
-def drawn(monkeypatch):
-    """The environment steps at which the policy acted."""
-    steps, act = [], off_policy._act
-    monkeypatch.setattr(off_policy, "_act", lambda *inputs: steps.append(1) or act(*inputs))
+def acted(monkeypatch):
+    """An entry for each action of the policy."""
+    steps, act = [], off_policy.act
+    monkeypatch.setattr(off_policy, "act", lambda *inputs: steps.append(1) or act(*inputs))
     return steps
 
 
-def rows_of(observations):
-    return {row.tobytes() for row in observations}
+def set_of(observations):
+    return {each.tobytes() for each in observations}
 
 
-def play(agent, steps):
-    """Advance to a step, phases included."""
-    while agent.step < steps:
-        agent.advance(steps)
+def every(source):
+    return source.at(np.arange(len(source)))
 
 
-def test_actions_are_uniform_while_the_buffer_is_small(learner, drawn):
-    """With 5000 in the row, in the steps 1 to 5001; here 20."""
-    agent = learner(small("sac"))
-    play(agent, 21)
-    assert not drawn
-    play(agent, 22)
-    assert len(drawn) == 1
-    actions = agent._replay.at(np.arange(21)).actions
+def test_actions_are_uniform_while_the_buffer_is_small(learner, acted):
+    """With 5000 start steps in the steps 1 to 5001; here 20."""
+    agent = learner("sac", small("sac"))
+    agent.until(21)
+    assert not acted
+    agent.until(22)
+    assert len(acted) == 1
+    actions = agent.buffer.at(np.arange(21)).actions
     assert np.abs(actions).max() > 0.9 and abs(actions.mean()) < 0.1
 
 
-def test_prior_data_in_the_same_buffer_end_exploration(learner, drawn):
-    agent = learner(small("sacfd"))
-    play(agent, 1)
-    assert len(drawn) == 1
+def test_prior_data_in_the_same_buffer_end_exploration(learner, acted):
+    learner("sacfd", small("sacfd")).until(1)
+    assert len(acted) == 1
 
 
-def test_the_fence(learner, batches):
-    """Batches are uniform over prior and online data; however many steps, no prior transition is lost."""
-    agent = learner(small("sacfd", batch=64, capacity=50), steps=10_000)
-    prior = agent._prior.at(np.arange(len(agent._prior))).observations
+def test_protected_prior_data(learner, batches):
+    """Batches are uniform over prior and online data; no prior transition is overwritten."""
+    agent = learner("sacfd", small("sacfd", batch=64, buffer_size=50))
+    agent.advance()
+    prior = every(agent.prior).observations
     assert len(prior) == 1200
-    play(agent, 120)
-    assert len(agent._sources[0]) == len(prior) + 50
-    assert np.array_equal(agent._prior.at(np.arange(len(prior))).observations, prior)
-    known = rows_of(prior)
-    shares = np.array([np.mean([row.tobytes() in known for row in batch]) for batch, _ in batches[60:]])
+    agent.until(120)
+    assert len(agent.sources[0]) == len(prior) + 50
+    assert np.array_equal(every(agent.prior).observations, prior)
+    known = set_of(prior)
+    shares = np.array([np.mean([each.tobytes() in known for each in batch]) for batch, _ in batches[60:]])
     expected = len(prior) / (len(prior) + 50)
     assert shares.mean() == pytest.approx(expected, abs=4.0 * np.sqrt(expected / len(shares) / 64))
 
 
-def test_a_batch_of_each_source(learner, batches):
-    agent = learner(small("speq_o2o"))
-    play(agent, 30)
-    known = rows_of(agent._prior.at(np.arange(len(agent._prior))).observations)
+def test_symmetric_sampling_takes_a_batch_of_each_source(learner, batches):
+    agent = learner("speq_o2o", small("speq_o2o"))
+    agent.until(30)
+    known = set_of(every(agent.prior).observations)
     for batch, _ in batches:
-        assert [row.tobytes() in known for row in batch] == [False] * 8 + [True] * 8
+        assert [each.tobytes() in known for each in batch] == [False] * 8 + [True] * 8
 
 
 @pytest.mark.parametrize("name", ["speq", "sope_eo", "speq_o2o", "sope"])
 def test_phases_follow_the_update_of_their_step(name, learner, batches):
-    agent = learner(small(name), steps=200)
-    agent.advance(200)
-    assert agent.step == 99, "the phase of step 100 is to come"
+    agent = learner(name, small(name), steps=200)
+    agent.until(99)
+    agent.advance()
+    assert agent.latest.step == 99, "the phase of step 100 is to come"
     assert [with_policy for _, with_policy in batches] == [True] * 100
-    policy = np.array(agent._state.policy["mean"]["weight"])
-    targets = np.array(agent._state.targets[0][0]["weight"])
-    alpha = float(agent._state.log_alpha)
-    play(agent, 100)
+    policy = np.array(agent.state.policy["mean"]["weight"])
+    targets = np.array(agent.state.targets[0][0]["weight"])
+    alpha = float(agent.state.log_alpha)
+    agent.until(100)
     count = len(batches) - 100
     assert not any(with_policy for _, with_policy in batches[100:])
     assert count == 60 or ("sope" in name and 40 <= count < 60)
-    assert np.array_equal(policy, agent._state.policy["mean"]["weight"])
-    assert alpha == float(agent._state.log_alpha)
-    assert not np.array_equal(targets, agent._state.targets[0][0]["weight"])
-    play(agent, 200)
-    assert agent._phase is None, "the last phase comes before the end"
+    assert np.array_equal(policy, agent.state.policy["mean"]["weight"])
+    assert alpha == float(agent.state.log_alpha)
+    assert not np.array_equal(targets, agent.state.targets[0][0]["weight"])
+    agent.until(200)
+    assert agent.phase is None, "the last phase comes before the end"
     assert len(batches) >= 2 * (100 + 40)
 
 
 @pytest.mark.parametrize("name", ["sope_eo", "sope"])
-def test_what_is_held_out(name, learner, batches):
+def test_validation_set(name, learner, batches):
     """A tenth of the online transitions, and as many of the prior ones; updates of the phase never see them."""
-    agent = learner(small(name, phase_every=200, batch=16))
-    agent.advance(200)
-    held_out = agent._phase.held_out
+    agent = learner(name, small(name, phase_every=200, batch=16), evaluate_every=200)
+    agent.advance()
+    held_out = agent.phase.held_out
     assert held_out == 20
-    kept_apart = [source.at(order[:held_out]) for source, order in zip(agent._sources, agent._orders, strict=True)]
-    assert len(kept_apart) == (2 if name == "sope" else 1)
-    unseen = rows_of(np.concatenate([part.observations for part in kept_apart]))
-    assert len(unseen) >= 0.9 * held_out * len(kept_apart)  # a start may occur twice
-    play(agent, 200)
-    seen = rows_of(np.concatenate([batch for batch, with_policy in batches if not with_policy]))
+    parts = [source.at(order[:held_out]) for source, order in zip(agent.sources, agent.phase.orders, strict=True)]
+    assert len(parts) == (2 if name == "sope" else 1)
+    unseen = set_of(np.concatenate([part.observations for part in parts]))
+    assert len(unseen) >= 0.9 * held_out * len(parts)  # a start may occur twice
+    agent.until(200)
+    seen = set_of(np.concatenate([batch for batch, with_policy in batches if not with_policy]))
     assert not seen & unseen
     batches.clear()
-    play(agent, 399)
-    assert rows_of(np.concatenate([batch for batch, _ in batches])) & unseen, "afterwards they are there again"
+    agent.until(399)
+    assert set_of(np.concatenate([batch for batch, _ in batches])) & unseen, "they are sampled again afterwards"
 
 
 def test_at_least_a_batch_is_held_out_and_at_least_one_is_not(learner):
-    agent = learner(small("sope_eo", phase_every=30, batch=16, random_steps=100))
-    agent.advance(30)
-    assert agent._phase.held_out == 0, "30 transitions are not two batches: nothing judges the phase"
-    agent = learner(small("sope_eo", phase_every=40, batch=16, random_steps=100))
-    agent.advance(40)
-    assert agent._phase.held_out == 16
+    for every_step, held_out in ((30, 0), (40, 16)):  # 30 transitions are not two batches
+        hyperparameters = small("sope_eo", phase_every=every_step, batch=16, start_steps=100)
+        agent = learner("sope_eo", hyperparameters, evaluate_every=100)
+        agent.advance()
+        assert agent.phase.held_out == held_out
 
 
 def test_a_phase_ends_by_the_rule(learner, monkeypatch):
-    looks = iter([-10.0, -11.0, -10.99, -10.98, -10.97, -20.0])
-    monkeypatch.setattr(off_policy.OffPolicy, "_look", lambda self: next(looks))
-    agent = learner(small("sope_eo", early_stop="sign_safe", phase_updates=1000))
-    agent.advance(100)
-    for updates in (20, 40):
-        agent.advance(100)
-        assert agent._phase.updates == updates
-    agent.advance(100)
-    assert agent._phase is None and agent._count["updates"] == 100 + 60
+    losses = iter([-10.0, -11.0, -10.99, -10.98, -10.97, -20.0])
+    monkeypatch.setattr(off_policy, "validation_loss", lambda *inputs: next(losses))
+    agent = learner("sope_eo", small("sope_eo", early_stop="sign_safe", phase_updates=1000), evaluate_every=100)
+    for updates in (0, 20, 40):
+        agent.advance()
+        assert agent.phase.updates == updates
+    agent.advance()
+    assert agent.phase is None and agent.updates == 100 + 60
 
 
-def test_what_the_policy_does_next_is_computed_once(learner, batches):
-    """In a phase the policy rests, so that its distributions of all next observations are looked up."""
-    agent = learner(small("sope"))
-    agent.advance(100)
-    for source, (mean, log_std) in zip(agent._sources, agent._following, strict=True):
-        every = source.at(np.arange(len(source))).next_observations
-        expected = sac.distribution(agent._state.policy, every)
+def test_the_policys_next_actions_are_cached_in_a_phase(learner):
+    agent = learner("sope", small("sope"), evaluate_every=100)
+    agent.advance()
+    for source, (mean, log_std) in zip(agent.sources, agent.phase.next_actions, strict=True):
+        expected = sac.distribution(agent.state.policy, every(source).next_observations)
         assert np.allclose(mean, expected[0], atol=1e-6)
         assert np.allclose(log_std, expected[1], atol=1e-6)
 
 
 def test_networks_begin_as_published():
     """Xavier-uniform weights, zero biases, a layer norm that changes nothing, copies as targets, temperature 1."""
-    row, size, joints = algorithms.algorithm("sac").row, 199, 18
-    state = sac.begin(row, np.random.default_rng(0), size, joints)
+    hp, size, joints = algorithms.algorithm("sac").hyperparameters, 199, 18
+    state = sac.begin(hp, np.random.default_rng(0), size, joints)
     shapes = [[(size + joints, 256), (256, 256), (256, 1)]] * 2 + [[(size, 256), (256, 256), (256, joints)]]
     policy = (*state.policy["trunk"], state.policy["mean"])
     for layers, expected in zip((*state.critics, policy), shapes, strict=True):
@@ -192,42 +186,42 @@ def test_dropout_keeps_the_right_share_each_on_its_own(dropout):
 
 
 @pytest.mark.parametrize(
-    ("name", "stage", "line"),
+    ("name", "context", "line"),
     [
         ("sac", {"prior": "arc_suite/tick/walk/x-v0"}, r"^prior: the algorithm takes no prior data, got 'arc_suite/"),
         ("sope", {"prior": None}, r"^prior: the algorithm takes prior data, the id of a dataset, got None$"),
-        ("sope", {"task_kwargs": {"target_velocity": 0.2}}, r"^prior '.*': of the task \{.*\}, and not of \{.*0\.2\}$"),
+        (
+            "sope",
+            {"setup": Setup.of("tick", "walk", {"target_velocity": 0.2})},
+            r"^prior '.*': of tick, walk, \{.*\}, and not of tick, walk, \{.*0\.2\}$",
+        ),
+        ("sope", {"setup": Setup.of("queen", "walk", SHORT)}, r"^prior '.*': of tick, and not of queen$"),
         ("sope", {"prior": "arc_suite/tick/walk/none-v0"}, r"none-v0"),
     ],
 )
-def test_prior_data_that_do_not_fit(name, stage, line, learner):
+def test_prior_data_that_do_not_fit(name, context, line, learner):
     with pytest.raises(ValueError, match=line) as caught:
-        learner(small(name), **stage)
+        learner(name, small(name), **context).advance()
     assert "\n" not in str(caught.value)
 
 
-def test_prior_data_of_another_robot(prior, tmp_path):
-    stage = Stage(ROBOTS["queen"], "walk", SHORT, 0, 100, tmp_path / "run", prior)
-    with pytest.raises(ValueError, match=rf"^prior '{prior}': of tick, and not of queen$"):
-        small("sope").module.begin(small("sope").row, stage)
-
-
 def test_runs_share_the_files_of_prior_data(learner, tmp_path):
-    """Read once, beside the folders of the runs."""
-    first = learner(small("sope"), folder=tmp_path / "one")
+    first = learner("sope", small("sope"), folder=tmp_path / "one")
+    first.advance()
     (folder,) = tmp_path.glob("prior-*")
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
-    second = learner(small("sacfd"), folder=tmp_path / "two")
+    second = learner("sacfd", small("sacfd"), folder=tmp_path / "two")
+    second.advance()
     assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
-    every = np.arange(len(first._prior))
-    for mine, theirs in zip(first._prior.at(every), second._prior.at(every), strict=True):
-        assert np.array_equal(mine, theirs)
+    for one, other in zip(every(first.prior), every(second.prior), strict=True):
+        assert np.array_equal(one, other)
 
 
 def test_prior_data_are_those_of_the_dataset(learner, prior):
-    """Every transition, with its next observation; time limits go on, falls do not."""
-    found = learner(small("sope"))._prior
-    batch, start = found.at(np.arange(len(found))), 0
+    """Every transition, with its next observation; time limits bootstrap, falls do not."""
+    agent = learner("sope", small("sope"))
+    agent.advance()
+    batch, start = every(agent.prior), 0
     for episode in data.open(prior):
         part = slice(start, start + episode.length)
         assert np.array_equal(batch.observations[part], episode.observations[:-1])
@@ -236,4 +230,4 @@ def test_prior_data_are_those_of_the_dataset(learner, prior):
         assert np.array_equal(batch.rewards[part], episode.rewards.astype(np.float32))
         assert np.array_equal(batch.goes_on[part], 1.0 - episode.terminations)
         start += episode.length
-    assert start == len(found)
+    assert start == len(agent.prior)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arc_suite.agents.replay import Fenced, Replay
+from arc_suite.agents.replay import Protected, Replay
 
 SIZE, JOINTS = 3, 2
 
@@ -73,7 +73,7 @@ def test_a_fence(tmp_path):
     """Two sources as one: the first keeps all it has, however often the second comes round."""
     prior, online = (Replay(tmp_path / name, 4, SIZE, JOINTS) for name in ("prior", "online"))
     first, second = fill(prior, [(4, True)]), fill(online, [(30, False)], start=100)
-    both = Fenced(prior, online)
+    both = Protected(prior, online)
     assert len(both) == 8
     indices = np.array([7, 0, 5, 3, 0, 4, 6])
     steps = [step for step, _ in (*first[-4:], *second[-4:])]

@@ -8,7 +8,7 @@ import pytest
 from arc_suite.agents import run_folder
 from arc_suite.agents.run_folder import opened
 
-CONFIG = {"robot": "tick", "row": {"hidden": 4, "batch": 8}, "seed": 0, "versions": {"numpy": "2"}}
+CONFIG = {"robot": "tick", "hyperparameters": {"hidden": 4, "batch": 8}, "seed": 0, "versions": {"numpy": "2"}}
 ARRAYS = {"state/weight": np.arange(6.0, dtype=np.float32).reshape(2, 3), "count": np.array([3, 4])}
 
 
@@ -79,7 +79,7 @@ def test_tables_are_read_also_while_a_line_is_written(path):
     ("changed", "named"),
     [
         ({"seed": 1}, r"whose seed is 0, and not 1; write to another folder$"),
-        ({"row": {"hidden": 4, "batch": 9}}, r"whose row\.batch is 8, and not 9;"),
+        ({"hyperparameters": {"hidden": 4, "batch": 9}}, r"whose hyperparameters\.batch is 8, and not 9;"),
         ({"versions": {"numpy": "3"}}, r"whose versions\.numpy is '2', and not '3';"),
         ({"prior": "a"}, r"whose prior is None, and not 'a';"),
     ],

@@ -1,4 +1,4 @@
-"""Training: a tiny run of every row, broken off anywhere and resumed to the bit, and what goes wrong in one line."""
+"""Training: a tiny run of every algorithm, interrupted anywhere and resumed bit-exactly, and errors of one line."""
 
 import json
 import os
@@ -16,13 +16,14 @@ from conftest import SHORT, small
 
 import arc_suite
 from arc_suite import evaluation, policies
-from arc_suite.agents import algorithms, off_policy, priors, run_folder
+from arc_suite.agents import algorithms, configuration, off_policy, priors, run_folder
+from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.learner import Diverged
 from arc_suite.agents.run_folder import RunFolder
-from arc_suite.agents.training import Run, train
-from arc_suite.robots import ROBOTS
+from arc_suite.agents.training import train
+from arc_suite.envs.setup import Setup
 
-ROWS = [name for name, each in algorithms.ALGORITHMS.items() if each.learner == "arc_suite.agents.off_policy"]
+NAMES = [name for name, each in algorithms.ALGORITHMS.items() if each.learner == "arc_suite.agents.off_policy"]
 STEPS, EVERY = 250, 100
 
 
@@ -35,19 +36,18 @@ def silent(*arguments, **keywords):
 
 @pytest.fixture
 def tiny(prior):
-    """A function that makes a tiny run of an algorithm."""
+    """A function that returns the configuration of a tiny run of an algorithm."""
 
     def make(name, **changes):
-        definition = small(name)
-        fields = {"definition": definition, "steps": STEPS, "evaluate_every": EVERY, "task_kwargs": SHORT}
-        fields["prior"] = None if definition.row.prior == "none" else prior
-        return Run(ROBOTS["tick"], name, **(fields | changes))
+        needs = algorithms.algorithm(name).hyperparameters.prior != "none"
+        fields = {"steps": STEPS, "evaluate_every": EVERY, "prior": prior if needs else None} | changes
+        return Configuration.of(Setup.of("tick", "walk", SHORT), name, small(name), **fields)
 
     return make
 
 
 def contents(folder):
-    """Everything of a run that must not depend on how often it was broken off."""
+    """Everything of a run that must not depend on interruptions."""
     files = {path.name: path.read_bytes() for path in (*folder.glob("*.csv"), folder / "config.json")}
     del files["times.csv"]
     arrays = {}
@@ -80,7 +80,7 @@ def fragile(method):
     return broken
 
 
-@pytest.mark.parametrize("name", ROWS)
+@pytest.mark.parametrize("name", NAMES)
 def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     """It writes what it should, and goes on to the same bits wherever it is broken off."""
     run = tiny(name)
@@ -89,7 +89,7 @@ def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     table = run_folder.table(tmp_path / "whole", "evaluations")
     assert table["step"].tolist() == sorted([*range(EVERY, STEPS, EVERY), STEPS] * 10)
     assert table["seed"].tolist() == [*range(10)] * 3
-    if run.definition.row.phase_updates:
+    if run.hyperparameters.phase_updates:
         assert run_folder.table(tmp_path / "whole", "training")["phase_updates"].sum() >= 80
 
     random = np.random.default_rng(sum(name.encode()))
@@ -111,9 +111,11 @@ import sys
 sys.path[:0] = sys.argv[2:]
 from conftest import SHORT, small
 from test_training import EVERY, STEPS, silent
-from arc_suite.agents.training import Run, train
-from arc_suite.robots import ROBOTS
-run = Run(ROBOTS["tick"], "sope_eo", small("sope_eo"), steps=3 * STEPS, evaluate_every=EVERY, task_kwargs=SHORT)
+from arc_suite.agents.configuration import Configuration
+from arc_suite.agents.training import train
+from arc_suite.envs.setup import Setup
+setup = Setup.of("tick", "walk", SHORT)
+run = Configuration.of(setup, "sope_eo", small("sope_eo"), steps=3 * STEPS, evaluate_every=EVERY)
 train(run, sys.argv[1], progress=silent)
 """
 
@@ -157,19 +159,20 @@ def test_the_policy_of_a_run_earns_what_its_table_says(tiny, tmp_path):
     run = tiny("sac")
     train(run, tmp_path / "run", progress=silent)
     table = run_folder.table(tmp_path / "run", "evaluations")
-    environment = arc_suite.load("tick", "walk", run.task_kwargs)
+    environment = arc_suite.load("tick", "walk", SHORT)
     policy = policies.policy(str(tmp_path / "run"), "tick")
     for index, episode in enumerate(evaluation.episodes(environment, policy, range(3))):
         row = len(table["step"]) - 10 + index
         assert (table["return"][row], table["length"][row]) == (episode.total, episode.length)
 
 
-def test_config_tells_all_that_a_run_depends_on(tiny, tmp_path):
+def test_the_record_of_a_run(tiny, tmp_path):
     train(tiny("sac"), tmp_path / "run", minutes=0.0, progress=silent)
     config = json.loads((tmp_path / "run" / "config.json").read_text())
-    assert config["row"]["batch"] == 8 and config["task_kwargs"] == {"time_limit": 2.0}
+    assert config["hyperparameters"]["batch"] == 8 and config["task_kwargs"] == {"time_limit": 2.0}
     assert {"arc_suite", "mujoco", "numpy", "jax", "jaxlib", "optax"} <= config["versions"].keys()
     assert len(config["model_sha256"]) == len(config["body_sha256"]) == 64
+    assert configuration.read(tmp_path / "run" / "config.json") == tiny("sac")
 
 
 def test_other_prior_data_under_the_same_id_are_another_run(tiny, tmp_path, prior, monkeypatch):
@@ -199,23 +202,23 @@ def test_another_seed_is_another_run(tiny, tmp_path):
 
 def test_a_learner_that_diverges_stops_with_one_line_and_its_last_checkpoint(tiny, tmp_path, monkeypatch):
     run = tiny("sac", steps=200)
-    update, calls = off_policy._update, []
+    update, calls = off_policy.update, []
 
-    def poisoned(row, state, *rest):
+    def poisoned(hp, state, *rest):
         calls.append(1)
-        state, sums = update(row, state, *rest)
+        state, sums = update(hp, state, *rest)
         if len(calls) == 150:
             state = state._replace(log_alpha=state.log_alpha * np.nan)
         return state, sums
 
-    monkeypatch.setattr(off_policy, "_update", poisoned)
+    monkeypatch.setattr(off_policy, "update", poisoned)
     with pytest.raises(Diverged, match=r"^the learner diverged: .* at step 1[5-9]\d") as caught:
         train(run, tmp_path / "run", progress=silent)
     assert "\n" not in str(caught.value)
     with np.load(tmp_path / "run" / "checkpoint.npz") as stored:
         assert stored["count"][0] == 100
         assert all(np.isfinite(stored[name]).all() for name in stored.files if name.startswith("state"))
-    monkeypatch.setattr(off_policy, "_update", update)
+    monkeypatch.setattr(off_policy, "update", update)
     assert train(run, tmp_path / "run", progress=silent), "the checkpoint is good"
 
 

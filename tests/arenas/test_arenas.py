@@ -13,8 +13,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS, generator
 
 BODIES = {**ROBOTS, "small": generator.scaled(generator.generate(6, 3), 0.1)}
-every_arena = pytest.mark.parametrize("arena", ARENAS)
-every_body = pytest.mark.parametrize("body", BODIES)
+every_body = pytest.mark.parametrize("body", tiers(BODIES, lambda body: body in ("bastion", "small")))
 
 
 @pytest.mark.parametrize(
@@ -40,7 +39,6 @@ def test_height_is_that_of_rays(arena, body):
         assert abs(above - distance - place.height(np.float64(x), np.float64(y))) < 1e-6 * height
     heights = place.height(points[:, 0], points[:, 1])
     assert_array_equal(heights, [place.height(x, y) for x, y in points])
-    assert_array_equal(place.clearance(np.c_[points, np.ones(1000)]), 1.0 - heights)
     assert place.is_level == (np.ptp(heights) == 0.0)
 
 

@@ -1,4 +1,4 @@
-"""tools/check.py tells what is wrong with a body in a spec file."""
+"""`arc-suite check` tells what is wrong with a body in a spec file."""
 
 import json
 from pathlib import Path
@@ -7,13 +7,13 @@ import programs
 import pytest
 
 from arc_suite.robots import generator, spec_files
+from arc_suite.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]
-TOOL = ROOT / "tools" / "check.py"
 
 
 def check(*arguments):
-    return programs.run(TOOL, *arguments)
+    return programs.arc_suite("check", *arguments)
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
     done = check(path)
     line = f"{path}: feet hang 0.8 m above the floor: standing_height 0.4 fits\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, line, "")
-    summary = programs.run(ROOT / "tools" / "build_model.py", "--spec", path, "--summary").stdout
+    summary = programs.arc_suite("build_model", "--spec", path, "--summary").stdout
     assert summary.splitlines()[-1].split(maxsplit=1) == [
         "flaw",
         "feet hang 0.8 m above the floor: standing_height 0.4 fits",
@@ -53,18 +53,33 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ((), "expected a spec file; see --help"),
+        ((), "expected a spec file or --task; see --help"),
+        (("--task=wlak",), "unknown task 'wlak'; did you mean 'walk'? (there are: " + ", ".join(TASKS) + ")"),
         (("missing.json",), "cannot read missing.json: no such file or directory"),
         (("a.json", "b.json"), "unexpected argument 'b.json'; see --help"),
     ],
 )
 def test_bad_arguments_are_one_line(arguments, message):
     done = check(*arguments)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"check.py: {message}\n")
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite check: {message}\n")
 
 
 def test_a_file_that_holds_no_body_is_one_line(path):
     write(path, standing_height=-1)
     done = check(path)
-    line = f"check.py: {path}: torso.standing_height: expected a number from 1e-06 to 100, got -1\n"
+    line = f"arc-suite check: {path}: torso.standing_height: expected a number from 1e-06 to 100, got -1\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
+
+
+@pytest.mark.slow
+def test_a_task_that_rounds_otherwise_alone_is_told_by_its_term(tmp_path):
+    (tmp_path / "squaring.py").write_text(
+        "import arc_suite\nfrom arc_suite.tasks.walk import Walk\n\n"
+        "class Squaring(Walk):\n    name = 'squaring'\n\n"
+        "    def terms(self, memory, readings):\n"
+        "        return super().terms(memory, readings) | {'forward': memory.forward_velocity**2}\n\n"
+        "arc_suite.register(module=__name__, tasks=(Squaring,))\n"
+    )
+    done = programs.arc_suite("check", "--task=squaring:squaring", "--robot=tick", cwd=tmp_path, path=tmp_path)
+    assert done.returncode == 1 and done.stdout.startswith("tick, squaring: a batch of environments differs from one")
+    assert done.stdout.endswith(": term forward\n")

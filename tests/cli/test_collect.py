@@ -1,6 +1,5 @@
-"""tools/collect.py, run as a user runs it."""
+"""`arc-suite collect`, run as a user runs it."""
 
-import os
 import pathlib
 import subprocess
 import sys
@@ -9,8 +8,8 @@ import programs
 import pytest
 
 from arc_suite import data
+from arc_suite.robots import ROBOTS
 
-TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
 ID = "arc_suite/queen/walk/cpg-medium-20steps-v0"
 
 
@@ -23,9 +22,7 @@ def root(tmp_path, monkeypatch):
 
 
 def run(*arguments, path=""):
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(path), os.environ.get("PYTHONPATH", "")])}
-    command = [sys.executable, TOOL, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, env=environment)
+    return programs.arc_suite("collect", *arguments, path=path)
 
 
 @pytest.mark.slow
@@ -55,23 +52,13 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     assert done.stdout.startswith(f"{dataset_id}: 2 episodes")
     assert len(data.open(dataset_id).settings.setup.body.legs) == 4
     done = run(f"--verify={dataset_id}", "--robot=queen")
-    assert done.stderr == f"collect.py: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
+    assert done.stderr == f"arc-suite collect: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ["--robot=quen"],
-            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper, all)",
-        ),
-        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
-        (
-            ["--policy=zero", "--preset=slow,fats"],
-            "unknown preset 'fats'; did you mean 'fast'? "
-            "(there are: slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced)",
-        ),
-        (["--robot=all", "--id=some-v0"], "--id=some-v0: names one dataset, and --robot=all makes 4"),
+        (["--robot=all", "--id=some-v0"], f"--id=some-v0: names one dataset, and --robot=all makes {len(ROBOTS)}"),
         (
             ["--id=arc_suite/queen/mine"],
             "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between and a "
@@ -82,27 +69,27 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
-    done = programs.run(TOOL, "--episodes=2", *arguments)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"collect.py: {message}\n")
+    done = programs.arc_suite("collect", "--episodes=2", *arguments)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite collect: {message}\n")
     assert not root.exists()
 
 
 def test_an_unknown_dataset_is_one_line_with_the_nearest(root):
     done = run("--verify=arc_suite/queen/cpg-v0")
     assert done.returncode == 1
-    assert done.stderr == f"collect.py: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
+    assert done.stderr == f"arc-suite collect: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
 
 
+@pytest.mark.slow
 def test_without_minari_a_line_says_what_to_install(tmp_path):
-    (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
-    done = run("--episodes=1", path=tmp_path)
-    line = "collect.py: datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')\n"
+    done = programs.without("minari", tmp_path, "collect", "--episodes=1")
+    line = "arc-suite collect: datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 
 
 def test_help_shows_examples_and_the_flags():
     done = run("--help")
-    assert f"python {TOOL} --robot queen --policy cpg --preset medium --episodes 1000\n" in done.stdout
+    assert "arc-suite collect --robot queen --policy cpg --preset medium --episodes 1000\n" in done.stdout
     for flag in (
         "--preset",
         "--noise",

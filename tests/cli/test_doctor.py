@@ -17,7 +17,7 @@ def doctor(*path, **variables):
     """Runs the doctor with further folders in front of Python's path; returns status, findings by subject, verdict."""
     environ = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environ |= {"PYTHONPATH": os.pathsep.join([*map(str, path), str(ROOT)])} | variables
-    command = [sys.executable, "-m", "arc_suite.doctor"]
+    command = [sys.executable, "-m", "arc_suite", "doctor"]
     done = subprocess.run(command, env=environ, capture_output=True, text=True)
     assert done.stderr == ""
     *lines, verdict = done.stdout.splitlines()
@@ -45,17 +45,17 @@ def test_healthy():
 
 @pytest.mark.slow
 def test_it_goes_on_where_nobody_reads_on():
-    line = f"{sys.executable} -m arc_suite.doctor | head -n 1; exit ${{PIPESTATUS[0]}}"
+    line = f"{sys.executable} -m arc_suite doctor | head -n 1; exit ${{PIPESTATUS[0]}}"
     environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
     done = subprocess.run(["bash", "-c", line], env=environ, capture_output=True, text=True)
     assert (done.returncode, done.stdout.count("\n"), done.stderr) == (0, 1, "")
 
 
 def test_a_wrong_flag_is_one_line():
-    command = [sys.executable, "-m", "arc_suite.doctor", "--verbose=1"]
+    command = [sys.executable, "-m", "arc_suite", "doctor", "--verbose=1"]
     done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith("doctor.py: Unknown command line flag 'verbose'")
+    assert done.stderr.startswith("arc-suite doctor: Unknown command line flag 'verbose'")
 
 
 @pytest.mark.slow
@@ -84,6 +84,7 @@ def test_no_picture(variables, line):
     assert (status, verdict, found["picture"]) == (1, "1 problem", ("PROBLEM", line))
 
 
+@pytest.mark.slow
 def test_a_driver_that_crashes_takes_only_the_picture_along(tmp_path):
     (tmp_path / "sitecustomize.py").write_text(
         "import os, sys\nif 'doctor' in sys.orig_argv[-1] and '-c' in sys.orig_argv: os.abort()\n"

@@ -6,37 +6,34 @@ from pathlib import Path
 
 import gymnasium
 import numpy as np
-import programs
 import pytest
+from programs import arc_suite as arc_suite_program
 
 import arc_suite
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.gym import Env
-from arc_suite.robots import generator
+from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import load_body
 
 ROOT = Path(__file__).parents[2]
 SPIDER = ROOT / "examples" / "spider.json"
 
 
-def run(tool, *arguments, cwd=None):
-    return programs.run(ROOT / "tools" / tool, *arguments, cwd=cwd)
-
-
 @pytest.mark.slow
 def test_evaluate_takes_a_spec_and_a_body_made_to_order():
-    done = run("evaluate.py", "--spec", SPIDER, "--episodes=1")
+    done = arc_suite_program("evaluate", "--spec", SPIDER, "--episodes=1")
     fields = done.stdout.splitlines()[-1].split()
     assert fields[0] == "spider"
     assert float(fields[3]) > 2500.0
     assert fields[-1] == "-"  # the paper knows nothing of it
-    done = run("evaluate.py", "--legs=4", "--links=2", "--policy=zero", "--episodes=1")
+    done = arc_suite_program("evaluate", "--legs=4", "--links=2", "--policy=zero", "--episodes=1")
     assert done.stdout.splitlines()[-1].split()[0] == "walker_4x2"
 
 
 @pytest.mark.slow
 def test_render_takes_a_body_made_to_order(tmp_path):
     path = tmp_path / "walker.png"
-    done = run("render.py", "--legs=5", "--steps=5", "--width=64", "--height=48", "--output", path)
+    done = arc_suite_program("render", "--legs=5", "--steps=5", "--width=64", "--height=48", "--output", path)
     if "cannot render" in done.stderr:
         pytest.skip("no OpenGL here")
     assert done.returncode == 0, done.stderr
@@ -44,7 +41,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
     assert path.read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("tool", ["evaluate.py", "render.py", "style.py"])
+@pytest.mark.parametrize("program", ["evaluate", "render", "style", "collect"])
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -53,18 +50,19 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--links=4"], "--links=4: goes with --legs"),
         (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
+        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
+        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
+        (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(PRESETS)})"),
     ],
 )
-def test_bad_arguments_are_one_line(tool, arguments, message, tmp_path):
-    output = [f"--output={tmp_path / 'a.png'}"] if tool == "render.py" else []
-    done = run(tool, *arguments, *output)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"{tool}: {message}\n")
+def test_bad_arguments_are_one_line(program, arguments, message, tmp_path):
+    output = [f"--output={tmp_path / 'a.png'}"] if program == "render" else []
+    done = arc_suite_program(program, *arguments, *output)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite {program}: {message}\n")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "tool", ["evaluate.py", "render.py", "style.py", "collect.py", "tune_cpg.py", "walk_census.py"]
-)
+@pytest.mark.parametrize("program", ["evaluate", "render", "style", "collect", "tune_cpg", "survey"])
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -79,11 +77,11 @@ def test_bad_arguments_are_one_line(tool, arguments, message, tmp_path):
         (["--set", "target_velocity=fast"], "target_velocity: expected a number from -1e+06 to 1e+06, got 'fast'"),
     ],
 )
-def test_bad_tasks_and_settings_are_one_line(tool, arguments, message, tmp_path):
-    where = {"render.py": ["--output=a.png"], "tune_cpg.py": ["--output=tune"], "walk_census.py": ["--processes=1"]}
-    done = run(tool, *arguments, *where.get(tool, []), cwd=tmp_path)
+def test_bad_tasks_and_settings_are_one_line(program, arguments, message, tmp_path):
+    where = {"render": ["--output=a.png"], "tune_cpg": ["--output=tune"], "survey": ["--processes=1"]}
+    done = arc_suite_program(program, *arguments, *where.get(program, []), cwd=tmp_path)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith(f"{tool}: {message}")
+    assert done.stderr.startswith(f"arc-suite {program}: {message}")
     assert not (tmp_path / "a.png").exists()
 
 

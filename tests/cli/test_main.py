@@ -17,8 +17,7 @@ VERSION = f"arc_suite {arc_suite.__version__}\n"
 TASKED = ("build_model", "render", "animate", "view", "evaluate", "style", "collect", "tune_cpg", "train", "survey")
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
-TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS}
-TOOLS |= {"survey": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_suite" / "doctor.py"}
+TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS} | {"survey": ROOT / "tools" / "walk_census.py"}
 
 
 def run(*arguments):
@@ -94,7 +93,5 @@ def test_errors_of_a_program_name_it(program):
 
 @pytest.mark.parametrize("program", TOOLS)
 def test_a_tool_is_the_program(program):
-    tool = TOOLS[program]
-    done = programs.run(tool, "--help")
-    expected = help_of(program).replace(f"arc-suite {program}", f"python {tool}")
-    assert (done.returncode, done.stdout, done.stderr) == (0, expected, "")
+    done = programs.run(TOOLS[program], "--help")
+    assert (done.returncode, done.stdout, done.stderr) == (0, help_of(program), "")

@@ -1,14 +1,15 @@
 """Tools fail with one line, and leave whole files or none."""
 
 import collections
+import functools
 import json
 import os
 import pty
-import shlex
 import subprocess
 import sys
 import termios
 
+import programs
 import pytest
 
 import arc_suite
@@ -16,7 +17,7 @@ from arc_suite.files import writing, writing_json
 
 TOOL = '''"""Count.
 
-arc-suite __main__ --count 3
+python count.py --count 3
 """
 import signal, sys
 from absl import flags
@@ -52,7 +53,7 @@ if __name__ == "__main__":
 def tool(tmp_path_factory):
     path = tmp_path_factory.mktemp("tool") / "count.py"
     path.write_text(TOOL)
-    return lambda *arguments: subprocess.run([sys.executable, path, *arguments], capture_output=True, text=True)
+    return functools.partial(programs.run, path)
 
 
 def test_run_calls_main_with_flags_parsed(tool):
@@ -82,7 +83,7 @@ def test_an_interrupt_is_one_line_and_exit_status_130(tool, kind, message):
 @pytest.mark.parametrize("redirection", ["", "2>&1"])
 def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
     target = tmp_path / "a.json"
-    line = f"{shlex.join(map(str, tool().args))} --output={target} {redirection} | head -n 1; exit ${{PIPESTATUS[0]}}"
+    line = f"{sys.executable} {tool.args[0]} --output={target} {redirection} | head -n 1; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
     assert (done.returncode, done.stdout.count("\n")) == (0, 1)
     assert "Error" not in done.stderr
@@ -107,7 +108,7 @@ def test_wrong_arguments_are_one_line(tool, argument, message):
 def test_help_shows_docstring_and_flags_of_the_program_alone(tool, flag):
     done = tool(flag)
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("Count.\n\npython ")  # the example calls this very script
+    assert done.stdout.startswith("Count.\n\npython count.py ")
     assert [line.split(":")[0] for line in done.stdout.splitlines() if line.startswith("-")] == [
         "--count",
         "-h,--[no]help",
@@ -120,7 +121,7 @@ def test_help_shows_docstring_and_flags_of_the_program_alone(tool, flag):
 
 @pytest.mark.slow
 def test_help_is_cut_short_without_complaint(tool):
-    line = f"{shlex.join(map(str, tool().args))} --help | head -n 1"
+    line = f"{sys.executable} {tool.args[0]} --help | head -n 1"
     done = subprocess.run(["bash", "-c", line], capture_output=True, text=True)
     assert (done.stdout, done.stderr) == ("Count.\n", "")
 
@@ -135,7 +136,7 @@ def test_progress_is_shown_on_terminals_alone(tool):
     assert tool("--count=3").stderr == ""
     ours, theirs = pty.openpty()
     termios.tcsetwinsize(theirs, (24, 80))
-    done = subprocess.run([*tool().args, "--count=3"], stdout=subprocess.DEVNULL, stderr=theirs)
+    done = subprocess.run([sys.executable, tool.args[0], "--count=3"], stdout=subprocess.DEVNULL, stderr=theirs)
     os.close(theirs)
     shown = os.read(ours, 10_000).decode()
     os.close(ours)

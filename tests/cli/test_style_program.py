@@ -1,10 +1,7 @@
-"""tools/style.py, run as a user runs it."""
+"""`arc-suite style`, run as a user runs it."""
 
 import json
-import os
 import pathlib
-import subprocess
-import sys
 
 import programs
 import pytest
@@ -15,7 +12,7 @@ from arc_suite.robots import ROBOTS
 from arc_suite.style import METRICS
 
 ROOT = pathlib.Path(__file__).parents[2]
-TOOL, SPIDER = ROOT / "tools" / "style.py", ROOT / "examples" / "spider.json"
+SPIDER = ROOT / "examples" / "spider.json"
 FROZEN = """
 import numpy as np
 def frozen(robot): return lambda time_step: np.zeros({"tick": 18, "leaper": 12}[robot])
@@ -24,8 +21,7 @@ def broken(robot): return lambda time_step: np.full(12, np.nan)
 
 
 def run(*arguments, path=""):
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(path), os.environ.get("PYTHONPATH", "")])}
-    return subprocess.run([sys.executable, TOOL, *arguments], capture_output=True, text=True, env=environment)
+    return programs.arc_suite("style", *arguments, path=path)
 
 
 @pytest.mark.slow
@@ -88,8 +84,8 @@ def test_a_saved_body_beside_a_policy(tmp_path):
     assert twins.stdout.splitlines()[1].split()[-2:] == [str(saved), str(twin)]
     for robot in ("tick", "all"):
         other = run(f"--policy={saved}", f"--robot={robot}")
-        message = f"style.py: {saved}: expected tracks of {'queen' if robot == 'all' else robot}, got those of spider\n"
-        assert (other.returncode, other.stdout, other.stderr) == (1, "", message)
+        message = f"{saved}: expected tracks of {'queen' if robot == 'all' else robot}, got those of spider"
+        assert (other.returncode, other.stdout, other.stderr) == (1, "", f"arc-suite style: {message}\n")
 
 
 @pytest.mark.long
@@ -106,11 +102,11 @@ def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     assert float(change[0]) > float(change[1]) + 0.05
 
 
+@pytest.mark.slow
 def test_datasets_without_minari_say_what_to_install(tmp_path):
-    (tmp_path / "minari.py").write_text("raise ModuleNotFoundError(\"No module named 'minari'\")")
-    done = run("--policy=arc_suite/tick/noisy-v0", path=tmp_path)
+    done = programs.without("minari", tmp_path, "style", "--policy=arc_suite/tick/noisy-v0")
     message = "datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')"
-    assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
+    assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 
 @pytest.mark.slow
@@ -121,9 +117,7 @@ def test_other_tasks(tmp_path, task):
     (tmp_path / "staying.py").write_text(fixtures + registering)
     saved, figures, folder = tmp_path / "tick.npz", tmp_path / "style.json", tmp_path / "pictures"
     asked = (f"--task={task}", "--set=time_limit=2", "--set=arena=bumps", "--episodes=1")
-    done = programs.run(
-        TOOL, "--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", path=tmp_path
-    )
+    done = run("--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", path=tmp_path)
     assert done.returncode == 0, done.stderr
     report = json.loads(figures.read_text(), parse_constant=pytest.fail)
     assert (report["task"], report["task_kwargs"]) == (task, {"time_limit": 2, "arena": "bumps"})
@@ -140,7 +134,9 @@ def test_other_tasks(tmp_path, task):
     assert sorted(path.name for path in folder.iterdir()) == names
 
     # What was saved tells its task and settings; the same episode again gives the same figures.
-    again = programs.run(TOOL, f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", path=tmp_path)
+    again = programs.arc_suite(
+        "style", f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", path=tmp_path
+    )
     if task == "steer":
         assert again.returncode == 0, again.stderr
         report = json.loads(figures.read_text())
@@ -149,15 +145,17 @@ def test_other_tasks(tmp_path, task):
     else:  # a file imports nothing
         assert (again.returncode, again.stdout) == (1, "")
         refusal = f"task {task!r}: files import nothing; import 'staying' first"
-        assert again.stderr == f"style.py: {saved}: {refusal}\n"
-        again = programs.run(TOOL, f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path)
+        assert again.stderr == f"arc-suite style: {saved}: {refusal}\n"
+        again = programs.arc_suite(
+            "style", f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path
+        )
         assert again.returncode == 0, again.stderr
         assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]
-    other = programs.run(TOOL, f"--policy={saved}", "--set=arena=flat", f"--task={task}", path=tmp_path)
+    other = run(f"--policy={saved}", "--set=arena=flat", f"--task={task}", path=tmp_path)
     assert (other.returncode, other.stdout) == (1, "")
     name = task.rpartition(":")[2]
     assert other.stderr == (
-        f'style.py: {saved}: expected tracks of tick, {name}, {{"arena": "flat"}}, '
+        f'arc-suite style: {saved}: expected tracks of tick, {name}, {{"arena": "flat"}}, '
         f'got those of tick, {name}, {{"arena": "bumps", "time_limit": 2}}\n'
     )
 
@@ -173,25 +171,21 @@ def test_all_robots(tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
-    (tmp_path / "matplotlib.py").write_text("raise ModuleNotFoundError(\"No module named 'matplotlib'\")")
-    done = run(f"--output={tmp_path}", path=tmp_path)
+    done = programs.without("matplotlib", tmp_path, "style", f"--output={tmp_path}")
     message = "pictures need matplotlib: pip install 'arc_suite[plot]' (No module named 'matplotlib')"
-    assert (done.returncode, done.stderr) == (1, f"style.py: {message}\n")
+    assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ["--robot=quen"],
-            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper, all)",
-        ),
         (["--compare=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
         (["--compare=cpg"], "--compare: expected another one than 'cpg medium'"),
         (["--compare=none.npz"], "cannot read none.npz: no such file or directory"),
         (["--save=tracks.json"], "--save=tracks.json: expected a file that ends in .npz"),
-        (["--save=a.npz", "--robot=all"], "--save=a.npz: expected one robot, got queen, bastion, tick, leaper"),
+        (["--save=a.npz", "--robot=all"], f"--save=a.npz: expected one robot, got {', '.join(ROBOTS)}"),
         (["--save=nowhere/a.npz"], "cannot write nowhere/a.npz: no such file or directory"),
         ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
@@ -202,21 +196,21 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         ),
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
-        ([f"--output={TOOL}"], f"cannot make folder {TOOL}: file exists"),
+        ([f"--output={SPIDER}"], f"cannot make folder {SPIDER}: file exists"),
         (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
-    done = programs.run(TOOL, *arguments, path=tmp_path)
+    done = run(*arguments, path=tmp_path)
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1] == f"style.py: {message}"  # on a line that a progress bar has left
+    assert done.stderr.splitlines()[-1] == f"arc-suite style: {message}"  # on a line that a progress bar has left
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
 
 
 def test_help_shows_an_example_and_the_flags():
     done = run("--help")
-    assert f"python {TOOL} --robot queen" in done.stdout
+    assert "arc-suite style --robot queen" in done.stdout
     for flag in ("robot", "spec", "policy", "preset", "compare", "episodes", "seed", "json", "output", "save"):
         assert f"--{flag}" in done.stdout

@@ -1,16 +1,13 @@
-"""tools/walk_census.py surveys random bodies and tells those that walk from those that do not."""
-
-from pathlib import Path
+"""`arc-suite survey` lets random bodies walk and tells those that do from those that do not."""
 
 import programs
 import pytest
 
-TOOL = Path(__file__).parents[2] / "tools" / "walk_census.py"
 BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
 
 
 def survey(*arguments):
-    return programs.run(TOOL, "--processes=1", *arguments)
+    return programs.arc_suite("survey", "--processes=1", *arguments)
 
 
 def test_bodies_walk():
@@ -48,7 +45,7 @@ def test_a_reversed_sweep_walks_backwards():
 def test_bad_arguments_are_one_line(argument, message):
     done = survey(argument)
     assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.splitlines()[-1] == f"walk_census.py: {message}"
+    assert done.stderr.splitlines()[-1] == f"arc-suite survey: {message}"
 
 
 @pytest.mark.slow

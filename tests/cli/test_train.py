@@ -13,11 +13,13 @@ import time
 import programs
 import pytest
 
+from arc_suite.agents import configuration
+
 HAS_JAX = importlib.util.find_spec("jax") is not None
 ROOT = pathlib.Path(__file__).parents[2]
 TINY = ["--robot=tick", "--algorithm=sope_eo", "--set", "time_limit=2", "--steps=200", "--evaluate_every=100"]
-for number in ("hidden=16", "batch=8", "random_steps=20", "phase_every=100", "phase_updates=60", "check_every=20"):
-    TINY += ["--row", number]
+for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "phase_updates=60", "check_every=20"):
+    TINY += ["--hp", number]
 FINISHED = re.compile(r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d \+- \d+\.\d\n")
 
 
@@ -36,8 +38,9 @@ def one_line(done, line):
     [
         (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
-        (["--row=batsch=3"], "arc-suite train: unknown number of the row 'batsch'; did you mean 'batch'? "),
-        (["--row=batch"], "arc-suite train: --row batch: expected name=value"),
+        (["--hp=batsch=3"], "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'batch'? "),
+        (["--hp=batch"], "arc-suite train: --hp batch: expected name=value"),
+        (["--config=a.json", "--seed=3"], "arc-suite train: --seed: expected none with --config, which has the whole "),
         (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
         (["--task=wlak"], "arc-suite train: unknown task 'wlak'; did you mean 'walk'?"),
     ],
@@ -45,6 +48,26 @@ def one_line(done, line):
 def test_errors_are_one_line(flags, line, tmp_path):
     one_line(run("train", *flags, cwd=tmp_path), line)
     assert not list(tmp_path.rglob("*.csv"))
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("{", "Expecting property name"),
+        ("[]", "configuration: expected a mapping of names to values, got []"),
+        ("{}", "expected a robot, got none"),
+        ('{"robot": "tik"}', "unknown domain 'tik'; did you mean 'tick'?"),
+        ('{"robot": "tick", "stops": 3}', "unknown field of a configuration 'stops'; did you mean 'steps'?"),
+        ('{"robot": "tick", "steps": "many"}', "steps: expected an integer from 1, got 'many'"),
+        ('{"robot": "tick", "hyperparameters": {"batsch": 3}}', "unknown hyperparameter 'batsch'; did you mean "),
+        ('{"robot": "tick", "prior": 3}', "prior: expected the id of a dataset, got 3"),
+    ],
+)
+def test_configurations_that_do_not_fit_are_one_line(text, line, tmp_path):
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(ValueError) as error:
+        configuration.read(tmp_path / "run.json")
+    assert str(error.value).startswith(f"{tmp_path / 'run.json'}: {line}") and "\n" not in str(error.value)
 
 
 @pytest.mark.skipif(HAS_JAX, reason="JAX is installed")
@@ -75,7 +98,7 @@ class TestRun:
         names = {path.name for path in folder.iterdir()}
         assert names >= {"config.json", "checkpoint.npz", "policy.npz", "policy.onnx", "curve.png", "tensorboard"}
         assert names >= {"evaluations.csv", "training.csv", "times.csv"}
-        assert json.loads((folder / "config.json").read_text())["row"]["phase_updates"] == 60
+        assert json.loads((folder / "config.json").read_text())["hyperparameters"]["phase_updates"] == 60
 
     def test_the_same_command_has_nothing_left_to_do(self, folder):
         before = (folder / "evaluations.csv").read_bytes()
@@ -83,9 +106,16 @@ class TestRun:
         assert done.returncode == 0 and FINISHED.fullmatch(done.stdout)
         assert (folder / "evaluations.csv").read_bytes() == before
 
+    def test_its_configuration_trains_the_same_run(self, folder, tmp_path):
+        done = run("train", f"--config={folder / 'config.json'}", cwd=tmp_path)
+        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout), done.stderr
+        again = tmp_path / "runs" / folder.name
+        for name in ("config.json", "evaluations.csv", "training.csv"):
+            assert (again / name).read_text() == (folder / name).read_text()
+
     def test_another_command_is_refused(self, folder):
-        done = run("train", *TINY, "--row=dropout=0.02", cwd=folder.parents[1])
-        line = "runs/tick-walk-sope_eo-0: of another run, whose row.dropout is 0.01, and not 0.02;"
+        done = run("train", *TINY, "--hp=dropout=0.02", cwd=folder.parents[1])
+        line = "runs/tick-walk-sope_eo-0: of another run, whose hyperparameters.dropout is 0.01, and not 0.02;"
         one_line(done, f"arc-suite train: {line} write to another folder")
 
     @pytest.mark.parametrize(
@@ -117,7 +147,7 @@ class TestRun:
         size = (tmp_path / "tick.onnx").stat().st_size
         assert done.stdout == f"wrote tick.onnx: 199 observations, 18 actions, {size} bytes\n"
 
-    def test_ctrl_c_is_one_line_and_goes_on(self, tmp_path):
+    def test_ctrl_c_is_one_line_and_the_run_resumes(self, tmp_path):
         command = [sys.executable, "-m", "arc_suite", "train", *TINY, "--steps=100000", "-o", "run"]
         process = subprocess.Popen(
             command, cwd=tmp_path, text=True, stderr=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)}
@@ -132,4 +162,4 @@ class TestRun:
             process.kill()
             process.wait()
         assert process.returncode == 130
-        assert errors.splitlines()[-1] == "arc-suite train: interrupted; the same command goes on with run"
+        assert errors.splitlines()[-1] == "arc-suite train: interrupted; the same command resumes run"

@@ -1,22 +1,20 @@
-"""tools/tune_cpg.py searches, goes on when it was broken off, and judges what it found."""
+"""`arc-suite tune_cpg` searches, goes on when it was broken off, and judges what it found."""
 
 import json
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import imageio.v3 as imageio
 import programs
 import pytest
 
-TOOL = Path(__file__).parents[2] / "tools" / "tune_cpg.py"
 QUICK = ("--robot=bastion", "--steps=20", "--starts=8", "--resets=2")
 
 
 def command(*arguments):
-    return [sys.executable, TOOL, *QUICK, *map(str, arguments)]
+    return [sys.executable, "-m", "arc_suite", "tune_cpg", *QUICK, *map(str, arguments)]
 
 
 def tune(*arguments):
@@ -47,7 +45,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     found, medium = result["metrics"]["found"], result["metrics"]["medium"]
     worse = [cost for cost in ("posture", "smoothness", "tilt") if found[cost] > medium[cost]]
     assert done.returncode == (1 if worse or found["falls"] else 0)
-    broken = "tune_cpg.py: the result breaks its constraints: "
+    broken = "arc-suite tune_cpg: the result breaks its constraints: "
     assert [cost for cost in worse if cost not in done.stderr.partition(broken)[2]] == []
     assert (result["robot"], result["generations"], result["resets"]) == ("bastion", 4, 2)
     assert found["return"]["mean"] > medium["return"]["mean"]
@@ -74,9 +72,9 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     ],
 )
 def test_bad_input_is_one_line(arguments, message):
-    done = programs.run(TOOL, *QUICK, *arguments)
+    done = programs.arc_suite("tune_cpg", *QUICK, *arguments)
     assert done.returncode == 1
-    assert done.stderr.startswith(f"tune_cpg.py: {message}")
+    assert done.stderr.startswith(f"arc-suite tune_cpg: {message}")
     assert done.stderr.count("\n") == 1
     assert done.stdout == ""
 
@@ -89,5 +87,5 @@ def test_another_search_in_the_folder_is_refused(tmp_path):
     done = tune("--generations=2", "--seed=7", f"--output={tmp_path}")
     assert done.returncode == 1
     message = "of a search with seed 0, not 7; delete it or write to another folder"
-    assert done.stderr == f"tune_cpg.py: {tmp_path}/journal.jsonl: {message}\n"
+    assert done.stderr == f"arc-suite tune_cpg: {tmp_path}/journal.jsonl: {message}\n"
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.cpg import footholds
 from arc_suite.cpg.footholds import View
-from arc_suite.tasks.ground import AHEAD, ASIDE
+from arc_suite.tasks.sensors import AHEAD, ASIDE
 
 REACH, HEIGHT = 1.3, 1.0  # m
 PLACES = np.array([(1.0, 1.0), (0.0, 1.3), (-1.0, 1.0), (1.0, -1.0), (0.0, -1.3), (-1.0, -1.0)])

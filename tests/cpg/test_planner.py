@@ -9,12 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 import arc_suite
 from arc_suite.arenas.pillars import RADIUS
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.planner import PLANS, along, seen, toward, way
+from arc_suite.cpg.planner import along, path, seen, toward
+from arc_suite.cpg.presets import DEFAULTS
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks.navigate import RAYS, SIGHT
+from arc_suite.tasks.sensors import RAYS, SIGHT
 
-PLAN = PLANS["planned"]
+PLAN = DEFAULTS["planned"]
 
 
 def ranges_of(circles):
@@ -59,20 +60,20 @@ def length(corners):
 
 def test_ways_are_straight_where_nothing_is_between_and_short_around_what_is():
     goal, none = np.array([5.0, 0.0]), np.zeros((0, 2))
-    assert_array_equal(way(goal, none, 1.1, PLAN), [goal])
-    assert_array_equal(way(goal, np.array([[2.5, 3.0]]), 1.1, PLAN), [goal])
+    assert_array_equal(path(goal, none, 1.1, PLAN), [goal])
+    assert_array_equal(path(goal, np.array([[2.5, 3.0]]), 1.1, PLAN), [goal])
     for side in (0.3, -0.3):
         circles = np.array([[2.5, side]])
-        corners = way(goal, circles, 1.1, PLAN)
+        corners = path(goal, circles, 1.1, PLAN)
         assert_array_equal(corners[-1], goal)
         assert nearest(corners, circles) > RADIUS + 1.1
         assert all(np.sign(corner[1]) == -np.sign(side) for corner in corners[:-1]), "around the nearer side"
         assert 5.0 < length(corners) < 6.5
     gate = np.array([[2.5, 1.8], [2.5, -1.8], [2.5, 5.4], [2.5, -5.4]])
-    through = way(goal, gate, 1.3, PLAN)
+    through = path(goal, gate, 1.3, PLAN)
     assert length(through) < 5.1 and nearest(through, gate) > 1.7
     wall = np.stack([np.full(21, 2.5), np.arange(-10.0, 11.0)], axis=-1)
-    assert way(goal, wall, 1.1, PLAN) == [] or length(way(goal, wall, 1.1, PLAN)) > 20.0
+    assert path(goal, wall, 1.1, PLAN) == [] or length(path(goal, wall, 1.1, PLAN)) > 20.0
 
 
 def test_the_point_that_is_steered_for_lies_along_the_way():

@@ -76,16 +76,16 @@ def test_what_the_caller_names_is_imported(module):
     named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")
     assert run(*named).returncode == 0
     assert run(f"--verify={ID}").stderr == (
-        f"collect.py: dataset {ID!r}: metadata.json: task 'strolling:stroll': files import nothing; "
+        f"arc-suite collect: dataset {ID!r}: metadata.json: task 'strolling:stroll': files import nothing; "
         "import 'strolling' first\n"
     )
     assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, all bit-equal\n"
     assert run(f"--verify={ID}", "--set=arena=strolling:lawn", "--task=walk").stderr == (
-        f"collect.py: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
+        f"arc-suite collect: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
     )
 
 
-@pytest.mark.parametrize("value", ["1\n2", "x" * 10_000, ["\n"] * 1000])
+@pytest.mark.parametrize("value", tiers(["1\n2", "x" * 10_000, ["\n"] * 1000], lambda value: value == "1\n2"))
 def test_versions_are_told_in_one_line(root, value):
     collect(ID, SETTINGS, 1)
     edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=value))
@@ -124,7 +124,7 @@ def test_settings_of_another_type_are_named(root, name, value):
         refused(use, f"metadata.json: {name}" if name in ("seed", "steps", "noise") else f"expected {name} ")
 
 
-@pytest.mark.parametrize("value", ["1", -1, 2**70, 1.0, None])
+@pytest.mark.parametrize("value", tiers(["1", -1, 2**70, 1.0, None], lambda value: value == -1))
 @pytest.mark.parametrize("name", ["total_episodes", "total_steps"])
 def test_counts_of_another_type_are_named(root, name, value):
     collect(ID, SETTINGS, 1)
@@ -216,6 +216,7 @@ ALTERED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", tiers(ALTERED, lambda name: name in ("group", "complex", "other joints", "seed"), never)
 )
@@ -229,6 +230,7 @@ def test_episodes_that_are_stored_otherwise_are_one_line(root, name):
     assert verify(ID) == 2
 
 
+@pytest.mark.slow
 def test_an_array_of_one_place_many_times_is_not_read(root):
     collect(ID, SETTINGS, 1)
 
@@ -291,6 +293,7 @@ def test_author_and_code_are_in_the_metadata_where_they_are_said(root):
     assert (metadata["author"], metadata["code_permalink"]) == ({"A. Walker"}, "file:///walks/1")
 
 
+@pytest.mark.slow
 def test_a_full_disk_keeps_every_episode_that_fits(root, monkeypatch):
     settings = data.Settings(TICK, "random", (), steps=20)
     collect("arc_suite/test/whole-v0", settings, 6)

@@ -11,7 +11,7 @@ import pytest
 from datasets import ID, QUEEN, SHORT, SPIDER, TICK, collect, digests, quiet, verify
 
 from arc_suite import data, evaluation, policies
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 
 OWN = """
@@ -55,8 +55,14 @@ def replay(environment, seed, actions):
     return np.array(observations), np.array(rewards), terms, np.array(terminations), np.array(truncations)
 
 
-MODIFIERS = {"kicks": 1.0, "motor_strength": [0.5, 1.0], "limp": True, "friction": [0.3, 1.0], "mass": [0.8, 1.5]}
-MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "without": "contact_forces"}
+MODIFIERS = {
+    "kicks": 1.0,
+    "motor_strength": [0.5, 1.0],
+    "actuator_failure": True,
+    "friction": [0.3, 1.0],
+    "mass": [0.8, 1.5],
+}
+MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "exclude_blocks": "contact_forces"}
 BUMPS = Setup.of("queen", "walk", {"arena": "bumps"})
 RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
 
@@ -127,7 +133,7 @@ class Rounded:
 
     def __init__(self, policy):
         self.policy = policy
-        self.begin = policy.begin
+        self.reset = policy.reset
 
     def act(self, observation, rewards):
         return self.policy.act(observation, rewards).astype(np.float32)
@@ -153,10 +159,10 @@ def test_an_episode_is_what_the_single_environment_plays():
     ids=["presets and noise", "spider", "random", "own"],
 )
 def test_episodes_depend_on_seed_and_settings_alone(settings):
-    collect(ID, settings, 7, rows=7, threads=1)
+    collect(ID, settings, 7, num_envs=7, threads=1)
     expected = digests()
     for name, rows, threads in (("a", 1, 1), ("b", 3, 2), ("c", 100, 4)):
-        collect(f"{ID[:-3]}-{name}-v0", settings, 7, rows=rows, threads=threads)
+        collect(f"{ID[:-3]}-{name}-v0", settings, 7, num_envs=rows, threads=threads)
         assert digests(f"{ID[:-3]}-{name}-v0") == expected
     later = settings._replace(seed=settings.seed + 4)
     collect(f"{ID[:-3]}-later-v0", later, 3)
@@ -164,6 +170,7 @@ def test_episodes_depend_on_seed_and_settings_alone(settings):
     assert len(set(expected)) == 7
 
 
+@pytest.mark.slow
 def test_every_setting_matters():
     base = data.Settings(QUEEN, **SHORT)
     changes = ({}, {"noise": 0.1}, {"presets": ("fast",)}, {"policy": "zero", "presets": ()})
@@ -199,6 +206,7 @@ def test_more_episodes_continue_and_a_finished_dataset_stays_as_it_is(root):
         assert {type(opened.get(name, getlink=True)) for name in opened} == {h5py.HardLink}
 
 
+@pytest.mark.slow
 def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
     settings = data.Settings(QUEEN, **SHORT)
     collect(ID, settings, 2)
@@ -229,20 +237,21 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
     assert [path.name for path in (root / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
 
 
+@pytest.mark.slow
 def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch):
     settings = data.Settings(QUEEN, presets=("slow", "medium"), **SHORT)
     collect(ID, settings, 2)
-    before, medium = digests(), TUNINGS["queen"]["medium"]
+    before, medium = digests(), PRESETS["queen"]["medium"]
     for changed in (medium._replace(stiffness=0.81), medium._replace(centre=medium.centre | {"ankle": (15, 30, -14)})):
-        monkeypatch.setitem(TUNINGS["queen"], "medium", changed)
+        monkeypatch.setitem(PRESETS["queen"], "medium", changed)
         with pytest.raises(ValueError) as error:
             collect(ID, settings, 3)
         message = f"dataset {ID!r} is another: its presets slow and medium had other numbers; --overwrite replaces it"
         assert str(error.value) == message
         assert digests() == before
         assert verify(ID) == 2  # what was done can still be done
-    monkeypatch.setitem(TUNINGS["queen"], "medium", medium)
-    monkeypatch.setitem(TUNINGS["queen"], "fast", changed)  # which is none of the dataset's
+    monkeypatch.setitem(PRESETS["queen"], "medium", medium)
+    monkeypatch.setitem(PRESETS["queen"], "fast", changed)  # which is none of the dataset's
     assert collect(ID, settings, 3) == 1
 
 

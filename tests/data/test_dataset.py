@@ -7,9 +7,10 @@ import minari
 import numpy as np
 import pytest
 from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
+from tiers import tiers
 
 from arc_suite import data, style, versions
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 
 
 def test_metadata():
@@ -31,7 +32,7 @@ def test_metadata():
         "task_kwargs": {},
         "task_version": 0,
     }
-    numbers = [repr(TUNINGS["queen"][name]) for name in ("slow", "fast")]
+    numbers = [repr(PRESETS["queen"][name]) for name in ("slow", "fast")]
     assert about["presets_sha256"] == [hashlib.sha256(text.encode()).hexdigest() for text in numbers]
     summaries = dataset.summaries()
     assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 7, 8, 9
@@ -56,6 +57,7 @@ def test_style_records_a_dataset():
     assert not after.actions[20:].any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["versions", "model_sha256"])
 def test_metadata_that_do_not_tell_all_are_damage(root, name):
     settings = data.Settings(QUEEN, **SHORT)
@@ -75,7 +77,7 @@ def test_episodes_without_metadata_are_not_continued_as_others(root):
 
 
 @pytest.mark.parametrize("name", ["main_data.hdf5", "metadata.json"])
-@pytest.mark.parametrize("length", [0, 100])
+@pytest.mark.parametrize("length", tiers([0, 100], lambda length: length == 100))
 def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length):
     settings = data.Settings(QUEEN, **SHORT)
     collect(ID, settings, 2)

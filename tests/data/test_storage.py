@@ -79,7 +79,7 @@ def killed_at(count, **arguments):
 
         pathlib.Path.replace, pathlib.Path.rename = guard(pathlib.Path.replace), guard(pathlib.Path.rename)
         os.link, os.unlink, os.rmdir = guard(os.link), guard(os.unlink), guard(os.rmdir)
-        collect(ID, rows=2, threads=1, **arguments)
+        collect(ID, num_envs=2, threads=1, **arguments)
         os._exit(0)
 
     process = multiprocessing.get_context("fork").Process(target=work)
@@ -165,7 +165,7 @@ def last_line(text):
     ],
 )
 def test_finished_episodes_are_kept(accident, status, line):
-    done = run(f"--policy=own:{accident}", "--episodes=8", "--rows=1")
+    done = run(f"--policy=own:{accident}", "--episodes=8", "--num_envs=1")
     assert done.returncode == status
     if line:
         assert last_line(done.stderr) == line
@@ -176,9 +176,9 @@ def test_finished_episodes_are_kept(accident, status, line):
     while done.returncode == -signal.SIGKILL:
         assert len(digests()) > kept
         kept = len(digests())
-        done = run(f"--policy=own:{accident}", "--episodes=8", "--rows=1")
+        done = run(f"--policy=own:{accident}", "--episodes=8", "--num_envs=1")
     assert (done.returncode, done.stdout.split(",")[0]) == (0, f"{ID}: 8 episodes"), done.stderr
-    run("--policy=own:nan", "--episodes=4", "--rows=1", f"--id={ID[:-3]}-b-v0")
+    run("--policy=own:nan", "--episodes=4", "--num_envs=1", f"--id={ID[:-3]}-b-v0")
     assert digests()[:4] == digests(f"{ID[:-3]}-b-v0")
 
 
@@ -187,7 +187,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
     def full():
         resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
-    few = ("--policy=random", "--episodes=8", "--rows=1")
+    few = ("--policy=random", "--episodes=8", "--num_envs=1")
     done = run(*few, preexec_fn=full)
     assert done.returncode == 1
     line = last_line(done.stderr)
@@ -238,6 +238,7 @@ def test_a_dataset_that_is_moved_to_its_place_meanwhile_is_gone_on_with(root, mo
     assert not new.exists()
 
 
+@pytest.mark.slow
 def test_a_damaged_part_is_named_and_overwrite_mends_it(root):
     for place, overwrite in ((root / ID, False), (root / "arc_suite/test/.some-v0.new", True)):
         assert killed_at(10, settings=SETTINGS, episodes=6, overwrite=overwrite)

@@ -64,7 +64,7 @@ def test_calls_of_rows(both):
     assert rows.get_attr("note") == [7] * 3
     assert len(rows.env_method("render", indices=[0, 1, 2])) == 3
     for use in (lambda: rows.set_attr("note", 8, indices=0), lambda: rows.env_method("note", indices=[0])):
-        with pytest.raises(ValueError, match=r"^note: rows share it; expected all 3 rows, got "):
+        with pytest.raises(ValueError, match=r"^note: environments share it; expected all 3, got "):
             use()
 
 

@@ -93,7 +93,7 @@ def test_before_a_reset_there_is_none():
 def test_of_another_task_or_body(other):
     environment = rows()
     environment.reset()
-    with pytest.raises(ValueError, match=r"^snapshot: of other rows or another task: ") as caught:
+    with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: ") as caught:
         rows(**other).restore(environment.snapshot())
     assert "\n" not in str(caught.value)
 
@@ -103,5 +103,5 @@ def test_something_is_missing():
     environment.reset()
     arrays = environment.snapshot()
     del arrays["random/keys"]
-    with pytest.raises(ValueError, match=r"^snapshot: of other rows or another task: 'random/keys'$"):
+    with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: 'random/keys'$"):
         rows().restore(arrays)

@@ -33,8 +33,8 @@ def test_policies_get_named_rows_and_the_reward_of_the_step_before():
         def __init__(self):
             self.begun, self.rewards = [], []
 
-        def begin(self, rows, seeds):
-            self.begun.append((list(rows), list(seeds)))
+        def reset(self, indices, seeds):
+            self.begun.append((list(indices), list(seeds)))
 
         def act(self, observation, rewards):
             assert {name: block.shape for name, block in observation.items()} == {

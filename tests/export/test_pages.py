@@ -83,6 +83,7 @@ def test_the_ground_of_an_uneven_arena_comes_along():
     assert x[0] < -2.0 < 2.0 < x[-1] and np.ptp(field["heights"]) > 0.01
 
 
+@pytest.mark.slow
 def test_steps_come_along():
     found, environment = scenery_of("stairs", {}, 2)
     place, arena = environment.physics.data.qpos[:2], environment.task.definition.scene.arena
@@ -105,7 +106,7 @@ def test_obstacles_and_goals_come_along():
     assert places >= {tuple(place) for place in data.mocap_pos if abs(place - data.qpos[:3]).max() < near}
     assert {solid["kind"] for solid in found["solids"]} == {"capsule"} and found["planes"] == [0.0]
     assert len(found["marks"]) == 12
-    wanted = run.marks(environment.physics)
+    wanted = run.markers(environment.physics)
     for (style, *ends), mark in zip(found["marks"][-1], wanted, strict=True):
         assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "colour": tuple(mark.colour)}
         np.testing.assert_allclose(ends, [*mark.start, *mark.end])

@@ -6,7 +6,7 @@ import digests
 import numpy as np
 import pytest
 
-QUICK = ("queen walk", "tick steer", "leaper roam", "queen steer, kicks")
+QUICK = ("tick steer", "leaper roam")
 
 
 @functools.cache
@@ -29,7 +29,10 @@ def test_every_case_is_stored():
     assert accepted()["cases"].keys() == digests.cases().keys()
 
 
-@pytest.mark.parametrize(("name", "case"), [marked(*item) for item in digests.cases().items()])
+# Cases of a new robot or task have no digest yet: the test above alone tells.
+@pytest.mark.parametrize(
+    ("name", "case"), [marked(*item) for item in digests.cases().items() if item[0] in accepted()["cases"]]
+)
 def test_digests_are_the_accepted_ones(name, case):
     now, before = digests.digested(case), dict(accepted()["cases"][name])
     if same_arithmetic():

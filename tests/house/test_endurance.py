@@ -55,6 +55,7 @@ def accidents(count, size, seed=0):
         yield field, random.randint(size), value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("on_divergence", ["raise", "terminate"])
 def test_500_divergences_of_a_single_environment_are_all_reported(on_divergence):
     environment = arc_suite.load("tick", "walk", {"random": 0, "on_divergence": on_divergence})

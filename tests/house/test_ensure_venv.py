@@ -54,5 +54,5 @@ def test_without_one_a_line_says_what_to_install(run, pythons, found):
     assert (status, made_by) == (1, None)
     assert error == (
         f"arc_suite needs Python 3.11 or 3.12, found {found}: install one, such as by 'uv python install 3.12', "
-        "or see 'Python 3.13' in the README\n"
+        "or see 'Python 3.13' in docs/install.md\n"
     )

@@ -16,7 +16,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 # From the ground up: a module imports its own room and those above it in this list. What stands in
 # one row leans on nothing in it.
 ROOMS = (
-    ("checks", "rotations", "marks", "files", "versions"),
+    ("checks", "rotations", "markers", "files", "versions"),
     ("robots",),  # what moves
     ("arenas",),  # where
     ("models",),  # spec -> MJCF
@@ -33,8 +33,9 @@ ROOMS = (
     ("tuning",),
     ("export",),  # to take away
     ("agents",),  # who learns
+    ("studies",),  # tables of runs
     ("cli",),  # programs
-    ("doctor", "__main__"),  # that Python starts by name
+    ("__main__",),  # that Python starts by name
 )
 HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 
@@ -42,7 +43,7 @@ HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 THIRD_PARTY = {
     "checks": {"numpy"},
     "rotations": set(),
-    "marks": {"numpy"},
+    "markers": {"numpy"},
     "files": set(),
     "versions": {"packaging"},
     "robots": set(),
@@ -57,7 +58,6 @@ THIRD_PARTY = {
     "envs": {"numpy", "mujoco", "dm_control", "dm_env", "gymnasium", "shimmy", "glfw"},
     "envs.sb3": {"numpy", "gymnasium", "stable_baselines3"},
     "cpg": {"numpy"},
-    "cpg.presets": set(),
     "registration": {"gymnasium"},
     "policies": {"numpy", "dm_env"},
     "policies.network": {"numpy"},
@@ -67,22 +67,17 @@ THIRD_PARTY = {
     "agents": {"numpy", "gymnasium", "tqdm"},
     "agents.networks": {"numpy", "jax"},
     "agents.plots": {"numpy", "matplotlib"},
-    "agents.calls": set(),
-    "agents.together": {"numpy", "jax"},
     "agents.off_policy": {"numpy", "jax"},
     "agents.soft_actor_critic": {"numpy", "jax", "optax"},
-    "agents.imitation": {"numpy", "jax", "optax"},
-    "agents.cloning": {"numpy", "jax", "optax"},
+    "agents.dagger": {"numpy", "jax", "optax"},
+    "agents.bc": {"numpy", "jax", "optax"},
     "agents.on_policy": {"numpy", "jax"},
     "agents.proximal_policy": {"numpy", "jax", "optax"},
-    "agents.rows": set(),
-    "agents.studies": set(),
-    "agents.cluster": {"submitit"},
-    "agents.study_states": {"numpy"},
-    "agents.study_runner": {"numpy", "gymnasium", "tqdm"},
-    "agents.study_results": {"numpy"},
-    "agents.study_report": {"numpy"},
-    "agents.study_strips": set(),
+    "agents.hyperparameters": set(),
+    "studies": {"numpy"},
+    "studies.cluster": {"submitit"},
+    "studies.publication": {"numpy", "gymnasium"},
+    "studies.runner": {"numpy", "tqdm"},
     "style.metrics": {"numpy"},
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},
@@ -105,16 +100,21 @@ INSIDE = {
     "arenas.arena": set(),
     "tasks.clock": set(),
     "tasks.readings": {"arenas"},
+    "tasks.sensors": set(),
     "tasks.terms": {"tasks.readings"},
     "tasks.mirrors": {"robots.mirror"},
     "tasks.contract": {
-        *("arenas", "marks", "robots.mirror", "robots.spec"),
-        *("tasks.clock", "tasks.mirrors", "tasks.readings", "tasks.terms"),
+        *("arenas", "markers", "robots.mirror", "robots.spec"),
+        *("tasks.mirrors", "tasks.parameters", "tasks.readings"),
     },
     "tasks.modifiers": {"checks", "robots.spec"},
     "tasks.noise": {"models.sizing", "robots.spec"},
     "cpg.law": set(),
-    "cpg.presets": {"robots.gaits"},
+    "cpg.kinematics": {"robots.spec"},
+    "cpg.presets": {
+        *("cpg.balancing", "cpg.planner", "cpg.prescribed", "cpg.sighted", "cpg.steering"),
+        "robots.gaits",
+    },
     "evaluation.statistics": set(),
     "style.metrics": {"rotations", "style.tracks"},
     "style.colours": set(),
@@ -202,17 +202,18 @@ def test_tables_name_what_is_there():
 
 
 def test_only_tasks_and_registration_know_one_task_from_another():
-    """Whoever drives tasks gets them from the registry; registration and demonstrators know walk's rows of numbers.
+    """Whoever drives tasks gets them from the registry; registration knows walk's tables of parameters.
 
-    Those that see know where the ground is scanned.
+    Demonstrators that see know where ground is scanned and in which directions ranges are.
     """
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
+    contract |= {"tasks.parameters", "tasks.sensors"}
     particular = texts - contract
-    assert particular == {"tasks.walk", "tasks.steer", "tasks.ground", "tasks.disturbed", "tasks.navigate"}
+    assert {"tasks.walk", "tasks.commanded", "tasks.following"} <= particular
     for name in modules():
-        know = ("registration", "cpg.steering", "cpg.balancing", "cpg.sighted", "cpg.footholds", "cpg.planner")
+        know = ("registration", "cpg.sighted", "cpg.footholds", "cpg.planner")
         if room(name) != "tasks" and name not in know:
             assert not particular & set(inside(trees()[name])), name
 

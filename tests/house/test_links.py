@@ -1,4 +1,4 @@
-"""Pages refer to files that are there."""
+"""Pages refer to files and headings that exist, and the index lists every page."""
 
 import pathlib
 import re
@@ -6,17 +6,33 @@ import re
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
-PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("studies/**/*.md")]
-LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
-NAMED = re.compile(r"\b(?:docs|examples|tools|tests)/[a-z_\d/]+\.(?:md|json|py)\b")
+PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/*.md"), *ROOT.glob("studies/**/*.md")]
+LINK = re.compile(r"\]\(([^):#]*)(?:#([^)]*))?\)")
+NAMED = re.compile(r"\b(?:docs|examples|tools|tests)/[a-z_\d/]+\.(?:md|json|py|sh)\b")
+
+
+def anchors(page):
+    """Return the anchors of a page's headings, as GitHub makes them."""
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_links_of_pages(page):
     text = page.read_text()
-    missing = [link for link in LINK.findall(text) if not (page.parent / link).exists()]
-    missing += [name for name in NAMED.findall(text) if not (ROOT / name).exists()]
+    missing = [name for name in NAMED.findall(text) if not (ROOT / name).exists()]
+    for link, anchor in LINK.findall(text):
+        target = page.parent / link if link else page
+        if not target.exists() or (anchor and anchor not in anchors(target)):
+            missing.append(f"{link}#{anchor}")
     assert missing == []
+
+
+def test_the_index_lists_every_page():
+    index = ROOT / "docs" / "README.md"
+    listed = {(index.parent / link).resolve() for link, _ in LINK.findall(index.read_text()) if link}
+    assert set(ROOT.glob("docs/*.md")) - {index} <= listed
 
 
 def test_pages_that_the_code_names():

@@ -97,4 +97,3 @@ def test_programs(run):
     table = run("arc-suite", "evaluate", "--robot", "tick", "--episodes", "1")
     assert table.splitlines()[-1].startswith("tick ")
     assert "arc-suite doctor" in run("python", "-m", "arc_suite", "doctor", "--help")
-    assert "Flags:" in run("python", "-m", "arc_suite.doctor", "--help")

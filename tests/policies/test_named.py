@@ -66,7 +66,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
         (
             ("zero", "quen"),
-            "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
         ),
         (
             ("cpg", "queen", "midium"),
@@ -124,7 +124,7 @@ def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_an
     body, denser = generate(4, 2), ROBOTS["tick"].replace(density=1000.0)
     for robot, told in (("tick", "tick"), (ROBOTS["tick"], "tick"), (body, body), (denser, denser)):
         made = policy("own_policies:told", robot)
-        made.begin([0], [0])
+        made.reset([0], [0])
         assert sys.modules["own_policies"].robots.count(told) >= 2
         assert sys.modules["own_policies"].robots[-1] == told
 

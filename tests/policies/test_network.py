@@ -92,7 +92,7 @@ def test_is_a_policy_of_every_program(saved, name, monkeypatch):
     """By the folder of a run, or the file; in rows and alone it does the same."""
     policy = policies.policy(str(saved / name), "tick")
     rows = VectorEnv("tick", "walk", 3, 1, "Disabled")
-    assert evaluation.episodes_in_rows(rows, policy, range(3)) == evaluation.episodes(
+    assert evaluation.episodes_in_batch(rows, policy, range(3)) == evaluation.episodes(
         arc_suite.load("tick", "walk"), policy, range(3)
     )
     monkeypatch.chdir(saved.parent)

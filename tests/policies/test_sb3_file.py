@@ -49,7 +49,7 @@ def test_does_what_the_agent_does(name, saved):
 def test_in_rows_it_does_the_same(saved):
     policy, task = policies.policy(str(saved[0] / "SAC.zip"), "tick"), {"time_limit": 1.0}
     rows = VectorEnv("tick", "walk", 3, 1, "Disabled", task_kwargs=task)
-    assert evaluation.episodes_in_rows(rows, policy, range(3)) == evaluation.episodes(
+    assert evaluation.episodes_in_batch(rows, policy, range(3)) == evaluation.episodes(
         arc_suite.load("tick", "walk", task), policy, range(3)
     )
 

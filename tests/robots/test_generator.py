@@ -11,8 +11,8 @@ from arc_suite import models
 from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import SpecError
-from arc_suite.tasks import walk
-from arc_suite.tasks.fitting import fitted_settings
+from arc_suite.tasks.fitting import fitted_parameters
+from arc_suite.tasks.walk import Walk
 
 
 def compiled(body):
@@ -176,7 +176,7 @@ def test_generated_bodies_do_not_take_the_names_of_robots():
         scaled, mutated = generator.scaled(robot, 1.0), generator.mutated(robot, 0)
         assert (scaled.name, mutated.name) == (f"{name}_scaled", f"{name}_mutated")
         assert generator.mutated(scaled, 0).name == generator.mutated(mutated, 0).name == f"{name}_mutated"
-        assert walk.settings(scaled, {}).parameters.target_velocity == fitted_settings(scaled)["target_velocity"]
+        assert Walk.settings_for(scaled, {}).parameters.target_velocity == fitted_parameters(scaled)["target_velocity"]
     long = ROBOTS["queen"].replace(name="q" * 32)
     assert generator.scaled(long, 2.0).name == "q" * 25 + "_scaled"
     assert generator.mutated(long, 0).name == "q" * 24 + "_mutated"

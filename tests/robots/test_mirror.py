@@ -1,4 +1,4 @@
-"""Bodies in a mirror."""
+"""Left-right symmetry of bodies."""
 
 import numpy as np
 import pytest
@@ -87,7 +87,7 @@ def test_solids(solids, mirrored):
     if mirrored:
         image(body)
     else:
-        with pytest.raises(ValueError, match=r"^other is not its own mirror image: no solid is across from b"):
+        with pytest.raises(ValueError, match=r"^other is not left-right symmetric: no solid is across from b"):
             image(body)
 
 
@@ -117,7 +117,7 @@ def relinked(**fields):
     ],
 )
 def test_any_difference_between_left_and_right_is_noticed(body):
-    with pytest.raises(ValueError, match=r"^other is not its own mirror image: no leg is across from l1$"):
+    with pytest.raises(ValueError, match=r"^other is not left-right symmetric: no leg is across from l1$"):
         image(body)
 
 

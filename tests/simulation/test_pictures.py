@@ -7,7 +7,7 @@ from numpy.testing import assert_array_equal
 from tiers import never, tiers
 
 from arc_suite.arenas import ARENAS, FLAT
-from arc_suite.marks import Mark
+from arc_suite.markers import Marker
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.simulation.physics import Physics
@@ -39,6 +39,7 @@ def test_the_ground_and_the_reward_are_seen():
         assert not np.array_equal(view, views[index - 1])
 
 
+@pytest.mark.slow
 def test_obstacles_are_seen_where_they_stand():
     def drawn(*place):
         return picture(BODY, Obstacle(), qpos, 60, 80, "tracking", mocap_pos=np.array([place]))
@@ -57,11 +58,11 @@ def test_marks_are_seen_and_have_no_depth():
     foot, way = np.array([0.0, 0.0, 1.2]), np.array([0.0, 0.8, 0.0])
     views = {None: picture(BODY, FLAT, qpos, 60, 80, "tracking")}
     for shape in ("arrow", "cylinder"):
-        marks = [Mark(shape, foot, foot + way, 0.1, (1.0, 0.0, 0.0, 1.0))]
-        views[shape] = picture(BODY, FLAT, qpos, 60, 80, "tracking", marks=marks)
+        marks = [Marker(shape, foot, foot + way, 0.1, (1.0, 0.0, 0.0, 1.0))]
+        views[shape] = picture(BODY, FLAT, qpos, 60, 80, "tracking", markers=marks)
         red = (views[shape].astype(int) - views[None]).max(axis=(0, 1))
         assert red[0] > 50 and (views[shape] != views[None]).any(axis=-1).mean() < 0.2
-        depths = [picture(BODY, FLAT, qpos, 60, 80, "tracking", depth=True, marks=shown) for shown in (marks, ())]
+        depths = [picture(BODY, FLAT, qpos, 60, 80, "tracking", depth=True, markers=shown) for shown in (marks, ())]
         assert_array_equal(*depths)
     assert not np.array_equal(views["arrow"], views["cylinder"])
     assert_array_equal(picture(BODY, FLAT, qpos, 60, 80, "tracking"), views[None])

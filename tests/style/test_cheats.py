@@ -10,9 +10,9 @@ from tiers import tiers
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.demonstrator import pattern
-from arc_suite.cpg.law import felt, joint_targets, torques
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.law import joint_targets, proprioception, torques
+from arc_suite.cpg.prescribed import pattern
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
 
@@ -21,17 +21,17 @@ class Scripted:
     """A demonstrator that cheats: `stand`, `hop` with all feet at once, `drag` the first leg, or walk `back`."""
 
     def __init__(self, robot, cheat):
-        body, self.preset, self.cheat = ROBOTS[robot], TUNINGS[robot]["medium"], cheat
+        body, self.preset, self.cheat = ROBOTS[robot], PRESETS[robot]["medium"], cheat
         honest = pattern(body, self.preset)
         changes = {"hop": {"offset": 0.0 * honest.offset}, "back": {"sweep": -honest.sweep}}
         self.pattern = honest._replace(**changes.get(cheat, {}))
         self.limp = len(body.legs[0].joints)
 
-    def begin(self, rows, seeds):
+    def reset(self, indices, seeds):
         self.clock = 0
 
     def act(self, observation, rewards):
-        _, angles, velocities = felt(observation, len(self.pattern.offset))
+        _, angles, velocities = proprioception(observation)
         targets = joint_targets(self.pattern, np.full(1, DT * self.clock))
         self.clock += 1
         if self.cheat == "stand":
@@ -89,6 +89,7 @@ def test_dragging_one_leg_shows(robot):
     assert drag["asymmetry"].legs["fl"] > 0.05
 
 
+@pytest.mark.slow
 @ONE
 def test_walking_backwards_shows(robot):
     honest, cheat = measured(robot), measured(robot, "back")

@@ -64,6 +64,7 @@ def test_gait_diagram_shows_stance_and_schedule():
     assert "duty factor\n(0.50 wanted)" in texts
 
 
+@pytest.mark.slow
 def test_pictures_of_a_track_of_one_step():
     from arc_suite.style.plots import PICTURES
 
@@ -72,6 +73,7 @@ def test_pictures_of_a_track_of_one_step():
         draw({"a": track})
 
 
+@pytest.mark.slow
 def test_metrics_come_without_matplotlib():
     code = "import sys, arc_suite.style; print('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"

@@ -87,7 +87,8 @@ def test_what_is_no_source_is_refused_before_any_work(saved):
 
 def test_stored_tracks_tell_their_setup(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    setup = Setup.of("tick", "steer", {"healthy_range": (0.05, 0.5), "arena": "bumps"})
+    offsets = (0.0, 3.0, 0.0, 3.0, 0.0, 3.0)
+    setup = Setup.of("tick", "steer", {"phase_offsets": offsets, "arena": "bumps"})
     style.save(tmp_path / "tick.npz", [record(setup.load(), policy("cpg", "tick"), 0, 5)])
     data.collect("arc_suite/tick/steers-v0", data.Settings(setup, steps=5), episodes=1)
     for name in (str(tmp_path / "tick.npz"), "arc_suite/tick/steers-v0"):
@@ -109,7 +110,7 @@ def test_datasets_are_replayed(dataset):
 
 
 def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
-    monkeypatch.setitem(walk.BONUSES, "healthy", 0.5)
+    monkeypatch.setitem(walk.WEIGHTS, "healthy", 0.5)
     with pytest.raises(ValueError) as error:
         take(source(dataset.id), LEAPER, range(1))
     assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")

@@ -54,6 +54,7 @@ def test_a_strip_shows_the_walk_at_its_ticks(tmp_path):
     assert (tmp_path / "strip.png").stat().st_size < 60_000
 
 
+@pytest.mark.slow
 def test_what_an_episode_has_not_is_white():
     """Seven steps are the first half of a cycle of 13."""
     environment = load("tick", "walk", {"time_limit": 0.35})
@@ -61,13 +62,14 @@ def test_what_an_episode_has_not_is_white():
     assert [bool((frame == 255).all()) for frame in frames] == [False] * 4 + [True] * 2
 
 
+@pytest.mark.slow
 def test_whoever_follows_commands_is_told_to_go_ahead():
     """The schedule of seed 0 begins with a stop, at which the gait clock rests."""
     environment = load("queen", "steer")
     frames = frames_of(strips.strip(environment, policy("cpg", "queen", "steered", task=environment.task.definition)))
     assert len({frame.tobytes() for frame in frames}) == strips.FRAMES
-    memory = environment.task.memory
-    assert memory.command.tolist() == [1.0, 0.0, 0.0]
+    memory = environment.task.memory.core
+    assert memory.desired.tolist() == [1.0, 0.0, 0.0]
     assert memory.tick == strips.ticks(1.5, environment.control_timestep(), 1000)[-1]
     assert np.hypot(*memory.place[:2]) > 0.5
 

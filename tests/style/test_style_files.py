@@ -181,7 +181,7 @@ BAD_ARRAYS = {
     "weight of no term": ("1/weights/height", np.float64(1.0)),
     "array of weights": ("1/weights/forward", np.zeros(4)),
     "offsets": ("1/parameters/phase_offsets", np.zeros(3)),
-    "range": ("1/parameters/healthy_range", np.array(["low", "high"])),
+    "texts": ("1/parameters/phase_offsets", np.array(["low"] * 4)),
     "parameter": ("1/parameters/speed", np.float64(1.0)),
     "field": ("1/altitude", np.zeros(12)),
     "setup": ("setup", np.zeros(3)),

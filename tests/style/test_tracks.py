@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from synthetic import synthetic
+from tiers import tiers
 
 import arc_suite
 from arc_suite import evaluation
@@ -13,12 +14,13 @@ from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.arenas.bumps import Bumps
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
+from arc_suite.models import standing as poses
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
 from arc_suite.style.tracks import lowest_point_velocities
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "bastion"))
 def test_tracks_agree_with_the_reward(robot):
     environment = arc_suite.load(robot, "walk", {"time_limit": 5.0})
     track = record(environment, Demonstrator(robot), seed=3)
@@ -37,9 +39,7 @@ def test_tracks_agree_with_the_reward(robot):
     assert_array_equal(track.joint_velocities[-1], environment.physics.data.qvel[6:])
     gears = environment.physics.model.ptr.actuator_gear[:, 0]
     assert_allclose(track.torques, track.actions * gears)
-    assert track.mass == pytest.approx(
-        {"queen": 12.0866, "bastion": 5.3677, "leaper": 0.2224, "tick": 0.0814}[robot], 1e-3
-    )
+    assert track.mass == pytest.approx(poses.standing(ROBOTS[robot]).mass, 1e-9)
     assert 0.05 < track.contacts.mean() < 0.95
     assert (track.foot_positions[track.contacts][:, 2] < track.foot_radii[0] + 0.011).all()  # within the contact margin
 
@@ -61,10 +61,10 @@ def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
     assert track.progress == episode.progress
     assert track.progress.keys() == ({"tracking", "fell", "gait_compliance"} if task == "steer" else set())
     assert np.isnan(track.target_velocity)
-    for points in (track.foot_positions, track.positions):
-        assert arena.height(points[..., 0], points[..., 1]).any() == (arena != FLAT)
-    assert_array_equal(track.foot_heights, arena.clearance(track.foot_positions))
-    assert_array_equal(track.torso_heights, arena.clearance(track.positions))
+    for points, heights in ((track.foot_positions, track.foot_heights), (track.positions, track.torso_heights)):
+        ground = arena.height(points[..., 0], points[..., 1])
+        assert ground.any() == (arena != FLAT)
+        assert_array_equal(heights, points[..., 2] - ground)
     if task == "steer":
         assert measure(track)["gait_compliance"].value == pytest.approx(track.progress["gait_compliance"], rel=1e-12)
         assert_array_equal(track.phases, definition.clock.phases[1:41])

@@ -8,7 +8,7 @@ from numpy.testing import assert_array_equal
 
 from arc_suite.envs.prepare import prepared
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks.clock import Clock, wanted_stance
+from arc_suite.tasks.clock import Clock, desired_contacts
 
 TWO_PI = 2.0 * math.pi
 
@@ -20,7 +20,7 @@ def test_phases_are_summed_step_by_step(robot):
     for tick in range(1001):
         assert task.clock.phases[tick] == phase
         assert_array_equal(task.clock.at(task.clock.circle, tick), [np.sin(phase), np.cos(phase)])
-        wanted = wanted_stance(np.float64(phase), task.parameters.duty_factor, task.parameters.phase_offsets)
+        wanted = desired_contacts(np.float64(phase), task.parameters.duty_factor, task.parameters.phase_offsets)
         assert_array_equal(task.clock.at(task.clock.stance, tick), wanted)
         phase = (phase + turn) % TWO_PI
 
@@ -29,7 +29,7 @@ def test_edges_fall_where_summed_phases_put_them():
     """The tables of any other way to compute a phase differ: that is why it is added up once."""
     task, _ = prepared("queen", "walk")
     ticks = np.arange(1001)
-    multiplied = wanted_stance(ticks * (TWO_PI * 1.5 * 0.05) % TWO_PI, 0.6, task.parameters.phase_offsets)
+    multiplied = desired_contacts(ticks * (TWO_PI * 1.5 * 0.05) % TWO_PI, 0.6, task.parameters.phase_offsets)
     assert (multiplied != task.clock.stance).any(axis=-1).sum() == 44
 
 

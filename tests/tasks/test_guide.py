@@ -14,21 +14,6 @@ GUIDE = (ROOT / "docs" / "adding_a_task.md").read_text()
 CROUCHING, USING_A_TASK, RAMPS, USING_AN_ARENA = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 COMMANDS = [line for line in re.search(r"```sh\n(.*?)```", GUIDE, re.DOTALL)[1].splitlines() if line]
 
-SAME_IN_ROWS = """
-import gymnasium, numpy as np
-for threads in (1, 2, 3):
-    envs = gymnasium.make_vec(ENV_ID, num_envs=3, num_threads=threads, task_kwargs=KWARGS)
-    env = gymnasium.make(ENV_ID, task_kwargs=KWARGS)
-    assert np.array_equal(envs.reset(seed=1)[0][1], env.reset(seed=2)[0])
-    actions = np.random.RandomState(0).uniform(-0.3, 0.3, (40, *envs.action_space.shape)).astype(np.float32)
-    for action in actions:
-        observations, rewards, *_ = envs.step(action)
-        observation, reward, *_ = env.step(action[1])
-        assert np.array_equal(observations[1], observation) and rewards[1] == reward
-    envs.close()
-print("same")
-"""
-
 
 @pytest.fixture
 def package(tmp_path):
@@ -49,6 +34,7 @@ def package(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_task(package):
     out = package("-c", USING_A_TASK + "print(observations.shape, [block.shape for block in blocks.values()])")
     assert out.startswith("[0.7] {'height': ")
@@ -57,6 +43,7 @@ def test_task(package):
     assert out.endswith(f"\n{2 + 4 + 3 + 4}\n")  # the quaternion, hips, velocities of the torso, hips
 
 
+@pytest.mark.slow
 def test_arena(package):
     out = package("-c", USING_AN_ARENA + "print(environment.progress if 0 else steeper.reset().observation.keys())")
     assert out.splitlines()[-1].startswith(
@@ -65,16 +52,12 @@ def test_arena(package):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("imported", "env_id", "kwargs"),
-    [
-        ("crouching", "arc_suite/leaper-crouch-v0", {}),
-        ("ramps", "arc_suite/tick-walk-v0", {"arena": "ramp"}),
-    ],
-)
-def test_rows_are_bit_equal_to_single_environments(package, imported, env_id, kwargs):
-    code = f"import arc_suite, {imported}\nENV_ID, KWARGS = {env_id!r}, {kwargs!r}\n{SAME_IN_ROWS}"
-    assert package("-c", code) == "same\n"
+def test_the_task_and_a_task_in_the_arena_conform(package):
+    done = package("-m", "arc_suite", "check", "--task", "crouching:crouch", "--robot", "tick")
+    assert done == "tick, crouch: a batch of environments equals each of them alone over 200 steps\n"
+    code = "from arc_suite.envs.setup import Setup\nfrom arc_suite.evaluation import conformance\n"
+    code += 'print(conformance.difference(Setup.of("tick", "walk", {"arena": "ramps:ramp"}), 20))'
+    assert package("-c", code) == "None\n"
 
 
 @pytest.mark.parametrize("command", tiers(COMMANDS, never, lambda command: "evaluate" in command))

@@ -12,8 +12,14 @@ jax.config.update("jax_enable_x64", True)
 
 BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": generator.random_body(3)}
 ROWS, STEPS = 3, 60
-MODIFIERS = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "limp": True, "observation_noise": 1.0, "delay": (0, 3)}
-MODIFIERS |= {"actions": "position", "without": "gait_clock"}
+MODIFIERS = {
+    "kicks": 1.0,
+    "motor_strength": (0.5, 1.0),
+    "actuator_failure": True,
+    "observation_noise": 1.0,
+    "delay": (0, 3),
+}
+MODIFIERS |= {"actions": "position", "exclude_blocks": "gait_clock"}
 
 
 def assert_close(ours, theirs):
@@ -62,7 +68,7 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
             ends[0],
             task.progress(memory),
             task.begin(memory, readings),
-            task.lift(memory, readings),
+            task.clear_spawn(memory, readings),
         )
 
     compiled = None

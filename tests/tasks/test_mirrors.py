@@ -24,14 +24,15 @@ def look_into_the_mirror(task):
     velocities = mirrors.joined([mirrors.POLAR, mirrors.AXIAL, action])
     start, clock = task.start, task.clock
 
-    def mirrored(random, carry):
-        begun = start(random, carry)
+    def mirrored(random, stream):
+        begun = start(random, stream)
         memory = begun.memory
-        if "schedule" in memory._fields:
-            memory = memory._replace(schedule=mirrors.PLANAR(memory.schedule))
+        if "schedule" in getattr(memory, "command", memory)._fields:
+            schedule = mirrors.PLANAR(memory.command.schedule)
+            memory = memory._replace(command=memory.command._replace(schedule=schedule))
         qpos = poses(begun.qpos)
-        if "lane" in memory._fields:
-            qpos[1] += 2.0 * memory.lane  # a lane is mirrored about its middle
+        if "lane" in getattr(memory, "ground", memory)._fields:
+            qpos[1] += 2.0 * memory.ground.lane  # a lane is mirrored about its middle
         return begun._replace(qpos=qpos, qvel=velocities(begun.qvel), memory=memory)
 
     vars(task)["start"] = mirrored
@@ -107,9 +108,13 @@ def test_a_gait_whose_sides_move_together_keeps_its_clock():
     [
         ("queen", {"phase_offsets": (0, 1, 2, 3, 4, 5)}, "phase_offsets: expected legs across from each other to move"),
         ("queen", {"default_angles": np.arange(18) / 9}, "default_angles: expected mirrored poses left and right"),
-        ("queen", {"limp": 1}, "limp: expected a leg that is drawn, or one on the midline, got 1"),
+        (
+            "queen",
+            {"actuator_failure": 1},
+            "actuator_failure: expected a leg that is drawn, or one on the midline",
+        ),
         (generator.random_body(0), {}, "phase_offsets: expected legs across from each other"),
-        (generator.random_body(10), {}, "random_10 is not its own mirror image: no leg is across from leg1"),
+        (generator.random_body(10), {}, "random_10 is not left-right symmetric: no leg is across from leg1"),
     ],
 )
 def test_what_has_no_mirror_image_is_refused_in_one_line(body, settings, message):
@@ -137,9 +142,9 @@ def test_every_task_has_a_mirror(robot, task):
 
 def test_modifiers_leave_a_task_its_mirror_image():
     plain = arc_suite.symmetry("tick", "steer")
-    modified = arc_suite.symmetry("tick", "steer", {"limp": True, "kicks": 1.0, "actions": "position"})
+    modified = arc_suite.symmetry("tick", "steer", {"actuator_failure": True, "kicks": 1.0, "actions": "position"})
     for mine, other in zip(modified, plain, strict=True):
         assert_array_equal(mine.sources, other.sources)
         assert_array_equal(mine.signs, other.signs)
-    blind = arc_suite.symmetry("tick", "steer", {"without": "contact_forces"})
+    blind = arc_suite.symmetry("tick", "steer", {"exclude_blocks": "contact_forces"})
     assert len(blind.observation.sources) == len(plain.observation.sources) - 150

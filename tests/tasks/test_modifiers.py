@@ -29,13 +29,13 @@ BODIES = {**ROBOTS, "spider": SPIDER}
 EACH = {
     "kicks": {"kicks": 1.5},
     "motor_strength": {"motor_strength": (0.5, 1.0)},
-    "limp": {"limp": True},
+    "actuator_failure": {"actuator_failure": True},
     "friction": {"friction": (0.2, 1.0)},
     "mass": {"mass": (0.7, 2.0)},
     "observation_noise": {"observation_noise": 1.0},
     "delay": {"delay": (0, 3)},
     "actions": {"actions": "position"},
-    "without": {"without": ("contact_forces",)},
+    "exclude_blocks": {"exclude_blocks": ("contact_forces",)},
 }
 ALL = {name: value for setting in EACH.values() for name, value in setting.items()}
 CASES = EACH | {"all": ALL}
@@ -77,7 +77,7 @@ def test_a_modified_task_conforms(case, task_name, body):
     blocks = {name: (size,) for name, size in one.task.definition.blocks.items()}
     assert {name: block.shape for name, block in timestep.observation.items()} == blocks
     assert set(plain.task.definition.blocks) - set(blocks) == (
-        {"contact_forces"} if case in ("without", "all") else set()
+        {"contact_forces"} if case in ("exclude_blocks", "all") else set()
     )
     assert one.action_spec() == plain.action_spec()
     assert_array_equal(flat(timestep), flat(two.reset()))
@@ -98,8 +98,8 @@ def test_a_modified_task_conforms(case, task_name, body):
 def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
     """And what they draw, they draw after all that the task draws."""
     neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0, "kicks": 0}
-    plain = load(body, task_name, **({"kicks": 0.0, "limp": False} if TASKS[task_name].modifiers else {}))
-    one = load(body, task_name, **neutral, limp=False, without=(), actions="torque")
+    plain = load(body, task_name, **({"kicks": 0.0, "actuator_failure": False} if TASKS[task_name].modifiers else {}))
+    one = load(body, task_name, **neutral, actuator_failure=False, exclude_blocks=(), actions="torque")
     assert_array_equal(flat(one.reset()), flat(plain.reset()))
     for action in actions(one, 10):
         once, other = one.step(action), plain.step(action)
@@ -183,21 +183,21 @@ def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_agai
     environment = load("tick", "walk", kicks=1.5, time_limit=math.inf)
     environment.reset()
     task, memory, seen = environment.task.definition, environment.task.memory, {}
-    for step in range(1, int(memory.kick_steps[-1]) + 200):
+    for step in range(1, int(memory.changes.kick_steps[-1]) + 200):
         memory, inputs = task.before(memory, np.zeros(18))
         assert inputs.kick.shape == (24,) and not inputs.kick[2:].any()
         if inputs.kick.any():
             seen[step] = inputs.kick[:2]
-    period = memory.kick_steps[-1]
-    due = [*memory.kick_steps, *(period + memory.kick_steps[: len(seen) - 25])]
+    period = memory.changes.kick_steps[-1]
+    due = [*memory.changes.kick_steps, *(period + memory.changes.kick_steps[: len(seen) - 25])]
     assert len(seen) > 25 and list(seen) == due
-    assert_array_equal(list(seen.values())[:25], memory.kicks)
-    assert_array_equal(list(seen.values())[25:], memory.kicks[: len(seen) - 25])
-    sizes = np.hypot(*memory.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
+    assert_array_equal(list(seen.values())[:25], memory.changes.kicks)
+    assert_array_equal(list(seen.values())[25:], memory.changes.kicks[: len(seen) - 25])
+    sizes = np.hypot(*memory.changes.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
     assert sizes.min() > 0.0 and sizes.max() < 1.5
     stronger = load("tick", "walk", kicks=3.0)
     stronger.reset()
-    assert_allclose(stronger.task.memory.kicks, 2.0 * memory.kicks, rtol=1e-15)
+    assert_allclose(stronger.task.memory.changes.kicks, 2.0 * memory.changes.kicks, rtol=1e-15)
 
 
 def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
@@ -211,25 +211,27 @@ def test_a_kick_is_on_the_torso_before_the_first_substep(monkeypatch):
         advance(nstep)
 
     monkeypatch.setattr(physics, "step", watched)
-    first = environment.task.memory.kick_steps[0]
+    first = environment.task.memory.changes.kick_steps[0]
     for _ in range(first):
         after = physics.velocity().copy()
         environment.step(np.zeros(18))
     assert not np.any(changes[:-1])
-    assert_allclose(changes[-1], [*environment.task.memory.kicks[0], *np.zeros(22)], atol=1e-15)
+    assert_allclose(changes[-1], [*environment.task.memory.changes.kicks[0], *np.zeros(22)], atol=1e-15)
 
 
 @pytest.mark.parametrize("leg", [True, 0, 4])
 def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
-    environment = load("queen", "walk", limp=leg)
+    environment = load("queen", "walk", actuator_failure=leg)
     environment.reset()
     names = ROBOTS["queen"].joint_names
     action = np.linspace(0.1, 0.2, 18)
     for step in range(60):
         environment.step(action)
         ctrl = environment.physics.data.ctrl
-        assert_array_equal(ctrl, action if step < 40 else np.where(environment.task.memory.limp, 0.0, action))
-    limp = np.flatnonzero(environment.task.memory.limp)
+        assert_array_equal(
+            ctrl, action if step < 40 else np.where(environment.task.memory.changes.failing, 0.0, action)
+        )
+    limp = np.flatnonzero(environment.task.memory.changes.failing)
     assert len({names[index].rpartition("_")[0] for index in limp}) == 1 and len(limp) == 3
     if leg is not True:
         assert_array_equal(limp, [3 * leg, 3 * leg + 1, 3 * leg + 2])
@@ -238,7 +240,13 @@ def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
 
 def test_each_episode_draws_a_leg_a_strength_a_friction_and_a_delay_of_its_own():
     environment = load(
-        "leaper", "walk", limp=True, motor_strength=(0.5, 1.0), friction=(0.2, 1.0), mass=(0.8, 2.0), delay=(1, 3)
+        "leaper",
+        "walk",
+        actuator_failure=True,
+        motor_strength=(0.5, 1.0),
+        friction=(0.2, 1.0),
+        mass=(0.8, 2.0),
+        delay=(1, 3),
     )
     compiled = environment.physics.model.ptr
     friction, mass = compiled.pair_friction.copy(), compiled.body_mass.copy()
@@ -246,10 +254,11 @@ def test_each_episode_draws_a_leg_a_strength_a_friction_and_a_delay_of_its_own()
     for _ in range(60):
         environment.reset()
         memory, model = environment.task.memory, environment.physics.model.ptr
+        own = memory.changes
         slide, weight = model.pair_friction / friction, (model.body_mass[1:] / mass[1:])
-        for values in (slide, weight, memory.strength):
+        for values in (slide, weight, memory.changes.strength):
             assert_allclose(values, values.flat[0], rtol=1e-12)
-        drawn.append((memory.limp.argmax(), memory.delay, memory.strength[0], slide[0, 0], weight[0]))
+        drawn.append((own.failing.argmax(), own.delay, own.strength[0], slide[0, 0], weight[0]))
     legs, delays, *ranges = zip(*drawn, strict=True)
     assert set(legs) == {0, 3, 6, 9} and set(delays) == {1, 2, 3}
     for values, (low, high) in zip(ranges, ((0.5, 1.0), (0.2, 1.0), (0.8, 2.0)), strict=True):
@@ -368,7 +377,7 @@ def test_noise_is_on_what_is_measured_and_on_nothing_else():
 
 
 def test_noise_of_one_block_is_the_same_whatever_else_is_observed():
-    alone = load("queen", "walk", observation_noise={"velocities": 2.0}, without="posture")
+    alone = load("queen", "walk", observation_noise={"velocities": 2.0}, exclude_blocks="posture")
     both = load("queen", "walk", observation_noise={"velocities": 2.0, "contact_forces": 1.0})
     plain = load("queen", "walk")
     once, other, clean = alone.reset().observation, both.reset().observation, plain.reset().observation
@@ -389,7 +398,7 @@ def test_a_fall_is_told():
 
 
 def test_a_task_that_prescribes_no_gait_takes_modifiers():
-    settings = ALL | {"without": "posture", "observation_noise": {"velocities": 1.0}, "time_limit": 2.0}
+    settings = ALL | {"exclude_blocks": "posture", "observation_noise": {"velocities": 1.0}, "time_limit": 2.0}
     with gaitless.registered():
         names = {"domain_name": "tick", "task_name": "stay", "task_kwargs": settings}
         rows, single = VectorEnv(num_envs=2, **names), gymnasium.make("arc_suite/queen-walk-v0", **names)
@@ -403,7 +412,7 @@ def test_a_task_that_prescribes_no_gait_takes_modifiers():
 
 
 def test_named_rows_are_steer_with_modifiers_that_callers_can_change():
-    for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"limp": True})):
+    for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"actuator_failure": True})):
         named, spelt = load("tick", name), load("tick", "steer", **settings)
         assert_array_equal(flat(named.reset()), flat(spelt.reset()))
         assert named.task.definition.changes == spelt.task.definition.changes
@@ -423,9 +432,9 @@ def test_live_commands_reach_the_task():
         ({"kick": 1.0}, "unknown setting of walk 'kick'; did you mean 'kicks'? (there are: "),
         ({"kicks": -1.0}, "kicks: expected a number from 0 to 100, got -1.0"),
         ({"kicks": True}, "kicks: expected a number from 0 to 100, got True"),
-        ({"limp": 6}, "limp: expected an integer from 0 to 5, got 6"),
-        ({"limp": -1}, "limp: expected an integer from 0 to 5, got -1"),
-        ({"limp": "left"}, "limp: expected an integer from 0 to 5, got 'left'"),
+        ({"actuator_failure": 6}, "actuator_failure: expected an integer from 0 to 5, got 6"),
+        ({"actuator_failure": -1}, "actuator_failure: expected an integer from 0 to 5, got -1"),
+        ({"actuator_failure": "left"}, "actuator_failure: expected an integer from 0 to 5, got 'left'"),
         (
             {"motor_strength": -0.1},
             "motor_strength: expected a number from 0 to 1, or two of them, the lower first, got",
@@ -445,11 +454,14 @@ def test_live_commands_reach_the_task():
         ({"delay": 1.5}, "delay: expected an integer from 0 to 100, got 1.5"),
         ({"delay": (3, 1)}, "delay: expected an integer from 3 to 100, got 1"),
         ({"actions": "velocity"}, "unknown actions 'velocity' (there are: torque, position)"),
-        ({"without": ("scan",)}, "unknown block 'scan' (there are: posture, velocities, contact_forces, gait_clock)"),
-        ({"without": 3}, "without: expected names of blocks, got 3"),
         (
-            {"without": ["posture", "velocities", "contact_forces", "gait_clock"]},
-            "without: expected to leave a block, got all of them: posture, velocities, contact_forces, gait_clock",
+            {"exclude_blocks": ("scan",)},
+            "unknown block 'scan' (there are: posture, velocities, contact_forces,",
+        ),
+        ({"exclude_blocks": 3}, "exclude_blocks: expected names of blocks, got 3"),
+        (
+            {"exclude_blocks": ["posture", "velocities", "contact_forces", "gait_clock"]},
+            "exclude_blocks: expected to leave a block, got all of them: posture, velocities, contact_forces,",
         ),
     ],
 )

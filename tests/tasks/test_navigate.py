@@ -16,7 +16,7 @@ from arc_suite.arenas.pillars import COUNT, PITCH, RADIUS, SHIFT
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks import navigate
+from arc_suite.tasks import command, sensors
 from arc_suite.tasks.fitting import reach
 
 
@@ -37,17 +37,17 @@ def test_pillars_leave_room_and_goals_are_apart(robot):
     unit = reach(ROBOTS[robot])
     assert task.scene.arena.unit == unit
     for start in starts:
-        pillars, goals = start.memory.pillars / unit, start.memory.goals / unit
-        assert_array_equal(start.mocap_pos[:, :2], start.memory.pillars)
+        pillars, goals = start.memory.ground.pillars / unit, start.memory.command.goals / unit
+        assert_array_equal(start.mocap_pos[:, :2], start.memory.ground.pillars)
         apart = np.hypot(*np.moveaxis(pillars[:, None] - pillars, -1, 0)) + 99.0 * np.eye(COUNT)
         assert apart.min() >= PITCH - 2.0 * SHIFT >= 2.3 + 2.0 * RADIUS
         places = np.concatenate([np.zeros((1, 2)), goals])
         legs = np.hypot(*np.diff(places, axis=0).T)
-        assert legs.min() > 3.5 and legs.max() < navigate.FAR
+        assert legs.min() > 3.5 and legs.max() < sensors.FAR
         assert np.hypot(*np.moveaxis(places[:, None] - pillars, -1, 0)).min() > 2.0
         assert not (places[2:] == places[:-2]).all(axis=-1).any(), "nobody is sent straight back"
-    assert len({start.memory.goals.tobytes() for start in starts}) == len(starts)
-    moves = np.concatenate([np.diff(start.memory.goals, axis=0) for start in starts])
+    assert len({start.memory.command.goals.tobytes() for start in starts}) == len(starts)
+    moves = np.concatenate([np.diff(start.memory.command.goals, axis=0) for start in starts])
     across = moves.all(axis=-1).mean()
     assert 0.3 < across < 0.6, "some ways lead between pillars, some straight at one"
 
@@ -57,10 +57,10 @@ def test_what_is_drawn_and_in_which_order():
     (start,) = drawn(seeds=[7])[1]
     random = np.random.RandomState(7)
     arc_suite.load("tick", "steer").task.definition.start(random, None)
-    shifts, numbers = random.uniform(-1.0, 1.0, (COUNT, 2)), random.uniform(size=navigate.GOALS)
+    shifts, numbers = random.uniform(-1.0, 1.0, (COUNT, 2)), random.uniform(size=command.GOALS)
     task = arc_suite.load("tick", "navigate").task.definition
-    assert_array_equal(start.memory.pillars, task.scene.arena.places(shifts)[:, :2])
-    assert_array_equal(start.memory.goals, task.scene.arena.unit * PITCH * navigate.chain(numbers))
+    assert_array_equal(start.memory.ground.pillars, task.scene.arena.places(shifts)[:, :2])
+    assert_array_equal(start.memory.command.goals, task.scene.arena.unit * PITCH * command.chain(numbers))
 
 
 @pytest.mark.parametrize("robot", ["queen", "tick"])
@@ -74,9 +74,9 @@ def test_ranges_are_those_of_mujocos_rays(robot):
             continue
         physics, memory = environment.physics, environment.task.memory
         unit = task.scene.arena.unit
-        for ray, share in zip(navigate.RAYS.T, timestep.observation["ranges"], strict=True):
-            start = np.array([*memory.place[:2], 0.5 * task.scene.arena.top])
-            direction = np.array([*rotations.headed(ray, -memory.place[2]), 0.0])
+        for ray, share in zip(sensors.RAYS.T, timestep.observation["ranges"], strict=True):
+            start = np.array([*memory.core.place[:2], 0.5 * task.scene.arena.top])
+            direction = np.array([*rotations.headed(ray, -memory.core.place[2]), 0.0])
             group = np.array([1, 0, 0, 0, 0, 0], np.uint8)
             # The body's own parts are in the way of rays from within it, so that rays go on behind them.
             far = 0.0
@@ -87,8 +87,8 @@ def test_ranges_are_those_of_mujocos_rays(robot):
                 if length < 0.0 or physics.model.geom(int(hit[0])).name.startswith("floor_pillar"):
                     break
                 far += length + 1e-6
-            far = navigate.SIGHT * unit if length < 0.0 else far + length
-            assert min(far / (navigate.SIGHT * unit), 1.0) == pytest.approx(share, abs=1e-4)
+            far = sensors.SIGHT * unit if length < 0.0 else far + length
+            assert min(far / (sensors.SIGHT * unit), 1.0) == pytest.approx(share, abs=1e-4)
             seen += share < 1.0
     assert seen > 10
 
@@ -97,15 +97,17 @@ def test_bearing_and_distance_of_the_goal():
     environment = arc_suite.load("tick", "navigate", {"random": 0})
     environment.reset()
     task, memory = environment.task.definition, environment.task.memory
-    unit, readings = task.scene.arena.unit, task.read(environment.physics.data.ptr)
+    unit = task.scene.arena.unit
+
+    def observed(goal, place):
+        own = memory.command._replace(goals=np.tile(goal, (command.GOALS, 1)))
+        return task.command.observe(task.context, task.command.begin(task.context, own, place))["goal"]
+
     for bearing, distance in ((0.3, 2.0), (-2.0, 5.0), (3.0, 7.5)):
         place = np.array([1.0, -2.0, 0.7])
         goal = place[:2] + distance * unit * np.array([math.cos(0.7 + bearing), math.sin(0.7 + bearing)])
-        told = memory._replace(place=place, goals=np.tile(goal, (navigate.GOALS, 1)))
-        expected = math.cos(bearing), math.sin(bearing), min(distance / 7.0, 1.0)
-        assert_allclose(task.observe(told, readings)["goal"], expected, atol=1e-12)
-    arrived = task.observe(memory._replace(place=np.array([*goal, 0.0]), goals=told.goals), readings)["goal"]
-    assert_allclose(arrived, np.zeros(3), atol=1e-9)
+        assert_allclose(observed(goal, place), (math.cos(bearing), math.sin(bearing), min(distance / 7.0, 1.0)))
+    assert_allclose(observed(goal, np.array([*goal, 0.0])), np.zeros(3), atol=1e-9)
 
 
 def moved(environment, place):
@@ -120,17 +122,17 @@ def test_a_goal_that_is_reached_counts_and_gives_way_to_the_next():
     environment.reset()
     task, memory = environment.task.definition, environment.task.memory
     readings, unit = task.read(environment.physics.data.ptr), task.scene.arena.unit
-    near = moved(environment, memory.goals[0] + (0.0, 0.71 * unit))
-    assert (near.reached, task.terms(near, readings)["goal"]) == (0, 0.0)
-    there = moved(environment, memory.goals[0] + (0.0, 0.69 * unit))
-    assert (there.reached, task.terms(there, readings)["goal"]) == (1, 1.0)
-    assert there.gained == 1.0, "no step counts for more than one at the target velocity"
-    assert_allclose(task.distance(there), np.hypot(*(memory.goals[1] - there.place[:2])))
-    back = moved(environment, memory.place[:2] - (memory.goals[0] - memory.place[:2]))
-    assert back.gained == -1.0
-    step = task.units[0] * task.scene.control_timestep
-    way = (memory.goals[0] - memory.place[:2]) / task.distance(memory)
-    assert moved(environment, memory.place[:2] + 0.4 * step * way).gained == pytest.approx(0.4)
+    goals, start = memory.command.goals, memory.core.place[:2]
+    near = moved(environment, goals[0] + (0.0, 0.71 * unit))
+    assert (near.command.reached, task.terms(near, readings)["goal"]) == (0, 0.0)
+    there = moved(environment, goals[0] + (0.0, 0.69 * unit))
+    assert (there.command.reached, task.terms(there, readings)["goal"]) == (1, 1.0)
+    assert there.command.gained == 1.0, "no step counts for more than one at the target velocity"
+    assert_allclose(np.hypot(*there.command.to_goal), np.hypot(*(goals[1] - there.core.place[:2])))
+    assert moved(environment, start - (goals[0] - start)).command.gained == -1.0
+    step = task.context.units[0] * task.scene.control_timestep
+    direction = (goals[0] - start) / np.hypot(*memory.command.to_goal)
+    assert moved(environment, start + 0.4 * step * direction).command.gained == pytest.approx(0.4)
 
 
 def test_at_the_end_of_the_chain_it_goes_back():
@@ -138,10 +140,11 @@ def test_at_the_end_of_the_chain_it_goes_back():
     environment.reset()
     task, memory = environment.task.definition, environment.task.memory
     order = []
+    place = memory.core.place
     for reached in range(35):
-        distance = task.distance(memory._replace(reached=reached))
-        far = np.hypot(*(memory.goals - memory.place[:2]).T)
-        order.append(set(np.flatnonzero(np.isclose(far, distance))))
+        seen = task.command.begin(task.context, memory.command._replace(reached=reached), place)
+        far = np.hypot(*(memory.command.goals - place[:2]).T)
+        order.append(set(np.flatnonzero(np.isclose(far, np.hypot(*seen.to_goal)))))
     expected = [*range(16), *range(14, -1, -1), *range(1, 5)]
     assert all(number in numbers for number, numbers in zip(expected, order, strict=True))
 
@@ -158,10 +161,10 @@ def test_a_collision_is_counted_once_on_every_way():
     assert touching.touches
     counts = []
     for touch, arrives in ((1, 0), (0, 0), (1, 0), (1, 1), (0, 0), (1, 0), (0, 1), (0, 1)):
-        place = memory.goals[memory.reached] if arrives else np.zeros(2)
+        place = memory.command.goals[memory.command.reached] if arrives else np.zeros(2)
         felt = (touching if touch else readings)._replace(frame_position=np.array([*place, 0.2]))
         memory = task.after(memory, felt)
-        counts.append((int(memory.reached), int(memory.collisions)))
+        counts.append((int(memory.command.reached), int(memory.ground.collisions)))
     assert counts == [(0, 1), (0, 1), (0, 1), (1, 1), (1, 1), (1, 2), (2, 2), (3, 2)]
 
 
@@ -169,10 +172,11 @@ def test_a_pillar_in_the_way_is_touched_and_stops_a_body():
     environment = arc_suite.load("tick", "navigate", {"random": 0})
     timestep, demonstrator = environment.reset(), Demonstrator("tick", "steered")
     memory, task = environment.task.memory, environment.task.definition
-    unit, heading = task.scene.arena.unit, memory.place[2]
+    unit, heading = task.scene.arena.unit, memory.core.place[2]
     ahead = np.array([math.cos(heading), math.sin(heading)])
     environment.physics.data.mocap_pos[0, :2] = 2.0 * unit * ahead
-    environment.task.memory = memory._replace(goals=np.tile(9.0 * unit * ahead, (navigate.GOALS, 1)))
+    chain = memory.command._replace(goals=np.tile(9.0 * unit * ahead, (command.GOALS, 1)))
+    environment.task.memory = memory._replace(command=task.command.begin(task.context, chain, memory.core.place))
     for _ in range(100):
         timestep = environment.step(demonstrator(timestep))
         assert environment.physics.data.qpos[:2] @ ahead < 2.0 * unit
@@ -197,6 +201,7 @@ def test_rows_are_single_environments_and_carry_on_after_a_copy():
     rows.close()
 
 
+@pytest.mark.slow
 def test_pictures_show_the_goal_and_pillars():
     rows = VectorEnv("tick", "navigate", 2, 1, render_mode="rgb_array", height=60, width=80)
     single = arc_suite.load("tick", "navigate")
@@ -206,9 +211,9 @@ def test_pictures_show_the_goal_and_pillars():
     shown = single.physics.render(60, 80)
     assert_array_equal(rows.render()[1], shown)
     task, memory = single.task.definition, single.task.memory
-    disc = task.marks(memory, task.read(single.physics.data.ptr))[-1]
-    assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.reach)
-    assert_array_equal(disc.start[:2], memory.goals[0])
+    disc = task.markers(memory, task.read(single.physics.data.ptr))[-1]
+    assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.context.reach)
+    assert_array_equal(disc.start[:2], memory.command.goals[0])
     single.physics.data.mocap_pos[:, :2] += 100.0
     assert not np.array_equal(single.physics.render(60, 80), shown)
     rows.close()
@@ -231,7 +236,7 @@ def test_the_same_shape_finds_its_way_at_any_size():
 
 def test_the_ring_in_a_mirror():
     mirror = arc_suite.load("queen", "navigate").task.definition.mirrors["ranges"]
-    assert_allclose(mirror(navigate.RAYS), navigate.RAYS * [[1.0], [-1.0]], atol=1e-15)
+    assert_allclose(mirror(sensors.RAYS), sensors.RAYS * [[1.0], [-1.0]], atol=1e-15)
 
 
 def test_it_has_a_ground_of_its_own_and_no_stick():

@@ -12,16 +12,17 @@ from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks import steer
+from arc_suite.tasks import command
+from arc_suite.tasks.health import Upright
 
 
 def commands(environment):
-    return environment.task.definition.wanted(environment.task.memory)
+    return environment.task.memory.core.desired
 
 
 def test_commands_are_within_their_ranges_and_one_in_ten_stops():
     random = np.random.RandomState(0)
-    drawn = np.array([steer.draw_command(random) for _ in range(4000)])
+    drawn = np.array([command.draw_command(random) for _ in range(4000)])
     stops = ~drawn.any(axis=-1)
     assert 0.07 < stops.mean() < 0.13
     sizes = np.hypot(drawn[:, 0], drawn[:, 1]) + abs(drawn[:, 2])
@@ -34,13 +35,17 @@ def test_commands_are_within_their_ranges_and_one_in_ten_stops():
 def test_the_schedule_holds_each_command_and_begins_again():
     environment = arc_suite.load("tick", "steer", {"random": 0})
     environment.reset()
-    memory, task = environment.task.memory, environment.task.definition
+    memory, task = environment.task.memory.command, environment.task.definition
     held = np.diff(memory.ends, prepend=0)
     assert held.min() >= 60 and held.max() <= 160
-    for command, end, length in zip(memory.schedule, memory.ends, held, strict=True):
+
+    def desired(steps):
+        return task.command.desired(task.context, memory, np.int64(steps), np.zeros(3))
+
+    for expected, end, length in zip(memory.schedule, memory.ends, held, strict=True):
         for tick in (end - length, end - 1):
-            assert_array_equal(task.wanted(memory._replace(steps=int(tick))), command)
-    assert_array_equal(task.wanted(memory._replace(steps=int(memory.ends[-1]))), memory.schedule[0])
+            assert_array_equal(desired(tick), expected)
+    assert_array_equal(desired(memory.ends[-1]), memory.schedule[0])
 
 
 def test_the_command_is_observed_and_changes_on_schedule():
@@ -59,18 +64,18 @@ def test_motion_is_measured_in_the_frame_of_the_heading():
     task, memory = environment.task.definition, environment.task.memory
     heading = 2.0
     place = np.array([5.0, -3.0, heading])
-    memory = memory._replace(place=place, motion=np.zeros(3))
+    memory = memory._replace(core=memory.core._replace(place=place, motion=np.zeros(3)))
     readings = task.read(environment.physics.data.ptr)
     forward, left, turn = 0.4, -0.1, 0.2  # units a step
-    step = task.scene.control_timestep * task.units
+    step = task.scene.control_timestep * task.context.units
     moved = place[:2] + forward * step[0] * np.array([np.cos(heading), np.sin(heading)])
     moved += left * step[1] * np.array([-np.sin(heading), np.cos(heading)])
     readings = readings._replace(
         frame_position=np.array([*moved, 0.2]),
-        torso_quaternion=rotations.turned(np.array([1.0, 0.0, 0.0, 0.0]), heading + turn * step[2]),
+        heading=np.float64(heading + turn * step[2]),
     )
     leak = task.parameters.gait_frequency * task.scene.control_timestep
-    assert_allclose(task.after(memory, readings).motion, leak * np.array([forward, left, turn]), atol=1e-12)
+    assert_allclose(task.after(memory, readings).core.motion, leak * np.array([forward, left, turn]), atol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -85,10 +90,7 @@ def test_motion_is_measured_in_the_frame_of_the_heading():
     ],
 )
 def test_tracking_is_the_product_of_course_and_turning(wanted, motion, tracking):
-    environment = arc_suite.load("queen", "steer", {"random": 0})
-    environment.reset()
-    memory = environment.task.memory._replace(command=np.array(wanted), motion=np.array(motion))
-    assert_allclose(environment.task.definition.tracked(memory), tracking, atol=1e-12)
+    assert_allclose(command.tracking(np.array(wanted), np.array(motion)), tracking, atol=1e-12)
 
 
 def test_a_live_command_takes_the_place_of_the_schedule_until_the_next_episode():
@@ -102,23 +104,23 @@ def test_a_live_command_takes_the_place_of_the_schedule_until_the_next_episode()
     assert_array_equal(commands(environment), scheduled)
     environment.command("command", (1.0, 0.0, 0.0))
     environment.reset()
-    assert np.isnan(environment.task.memory.command).all()
+    assert np.isnan(environment.task.memory.command.live).all()
 
 
 def test_live_commands_of_rows_are_those_of_single_environments():
     envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
     env = gymnasium.make("arc_suite/tick-steer-v0")
     envs.reset(seed=5), env.reset(seed=6)
-    command = np.array([0.3, 0.1, -0.2])
-    envs.command("command", command, rows=np.array([False, True, False]))
-    env.unwrapped.command("command", command)
+    desired = np.array([0.3, 0.1, -0.2])
+    envs.command("command", desired, mask=np.array([False, True, False]))
+    env.unwrapped.command("command", desired)
     for _ in range(5):
         observations, rewards, *_ = envs.step(np.zeros(envs.action_space.shape))
         observation, reward, *_ = env.step(np.zeros(18, np.float32))
         assert_array_equal(observations[1], observation)
         assert rewards[1] == reward
     blocks = envs.task.split(observations)
-    assert_array_equal(blocks["command"][1, :3], command.astype(np.float32))
+    assert_array_equal(blocks["command"][1, :3], desired.astype(np.float32))
     assert not np.array_equal(blocks["command"][0, :3], blocks["command"][1, :3])
     envs.close()
 
@@ -167,12 +169,12 @@ def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
 def test_at_a_stop_all_feet_are_to_stand_and_the_clock_rests():
     environment, policy = arc_suite.load("queen", "steer", {"random": 0}), Demonstrator("queen", "steered")
     timestep = environment.reset()
-    for steps, command in ((40, (1.0, 0.0, 0.0)), (80, (0.0, 0.0, 0.0))):
-        environment.command("command", command)
+    for steps, desired in ((40, (1.0, 0.0, 0.0)), (80, (0.0, 0.0, 0.0))):
+        environment.command("command", desired)
         for _ in range(steps):
             timestep = environment.step(policy(timestep))
     memory = environment.task.memory
-    assert (memory.tick, memory.steps) == (40, 120)
+    assert (memory.core.tick, memory.core.steps) == (40, 120)
     assert_array_equal(timestep.observation["gait_clock"], [0.0, 0.0])
     assert environment.task.terms["gait_cost"] == 0.0, "it stands, as it is to"
     assert environment.task.terms["tracking"] > 0.95
@@ -229,7 +231,7 @@ def test_who_is_carried_by_the_torso_has_fallen():
     for share, healthy in ((0.4, True), (0.6, False)):
         forces = np.zeros_like(readings.contact_forces)
         forces[5] = share  # upwards, on the first part, in the body's weight
-        assert task.healthy(readings._replace(contact_forces=forces)) == healthy
+        assert task.health.after(task.context, readings._replace(contact_forces=forces)).fell != healthy
 
 
 def test_a_body_that_lies_on_its_torso_is_not_healthy():
@@ -240,7 +242,7 @@ def test_a_body_that_lies_on_its_torso_is_not_healthy():
         error = joints[:, 1] - data.qpos[7:]
         timestep = environment.step((3.0 * error - 0.2 * data.qvel[6:]).clip(-1.0, 1.0))
     assert timestep.discount == 0.0
-    assert timestep.observation["posture"][0] > steer.LOWEST * ROBOTS["tick"].torso.standing_height
+    assert timestep.observation["posture"][0] > Upright().lowest * ROBOTS["tick"].torso.standing_height
     assert environment.task.progress["fell"] == 1.0
 
 
@@ -249,16 +251,16 @@ def test_pictures_show_the_command_as_arrows():
     environment.reset()
     environment.command("command", (0.5, -0.25, 0.5))
     task, memory = environment.task.definition, environment.task.memory
-    readings, heading = task.read(environment.physics.data.ptr), memory.place[2]
-    hub, going, turning = task.marks(memory, readings)
+    readings, heading, reach = task.read(environment.physics.data.ptr), memory.core.place[2], task.context.reach
+    hub, going, turning = task.markers(memory, readings)
     assert (hub.shape, going.shape, turning.shape) == ("cylinder", "arrow", "arrow")
     assert_array_equal(hub.start, going.start)
-    assert_allclose(rotations.headed((going.end - going.start)[:2], heading), (0.5 * task.reach, -0.25 * task.reach))
-    assert_allclose(rotations.headed((turning.start - hub.start)[:2], heading), (task.reach, 0.0), atol=1e-12)
-    assert_allclose(rotations.headed((turning.end - turning.start)[:2], heading), (0.0, 0.5 * task.reach), atol=1e-12)
+    assert_allclose(rotations.headed((going.end - going.start)[:2], heading), (0.5 * reach, -0.25 * reach))
+    assert_allclose(rotations.headed((turning.start - hub.start)[:2], heading), (reach, 0.0), atol=1e-12)
+    assert_allclose(rotations.headed((turning.end - turning.start)[:2], heading), (0.0, 0.5 * reach), atol=1e-12)
     shown = environment.physics.render(60, 80)
     environment.command("command", (0.0, 0.0, 0.0))
-    assert [mark.shape for mark in task.marks(environment.task.memory, readings)] == ["cylinder"]
+    assert [mark.shape for mark in task.markers(environment.task.memory, readings)] == ["cylinder"]
     stopped = environment.physics.render(60, 80)
     assert not np.array_equal(shown, stopped)
     rows = VectorEnv("queen", "steer", 2, render_mode="rgb_array", height=60, width=80)

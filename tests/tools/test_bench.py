@@ -11,8 +11,10 @@ import pytest
 from benchmark import growth, ordinary, report, tasks
 from numpy.testing import assert_allclose
 from PIL import Image
+from tiers import tiers
 
 import arc_suite
+from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "bench.py"
@@ -28,7 +30,7 @@ def small_run(tmp_path_factory):
     """What a small run printed, and the folder to which it wrote."""
     folder = tmp_path_factory.mktemp("bench")
     (folder / "performance.md").write_text("Before.\n<!-- benchmark -->\nold\n<!-- end of benchmark -->\nAfter.\n")
-    small = ("--robots=queen,leaper", "--rows=1,4", "--workers=1,2", "--rounds=2", "--steps=2")
+    small = ("--robots=queen,leaper", "--num_envs=1,4", "--workers=1,2", "--rounds=2", "--steps=2")
     result = bench(*small, "--document=performance.md", folder=folder)
     assert (result.returncode, result.stderr) == (0, "")
     return result, folder
@@ -56,7 +58,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run)
     results = json.loads((folder / "results.json").read_text())
     assert list(results["robots"]) == ["queen", "leaper"]
     for robot in results["robots"].values():
-        assert robot["size"]["rows"] == 4
+        assert robot["size"]["num_envs"] == 4
         for contestant in robot["contestants"]:
             assert len(contestant["microseconds"]) == 2 and min(contestant["microseconds"]) > 0
         assert report.ratios(robot["contestants"]).keys() == report.TARGETS.keys()
@@ -87,8 +89,8 @@ def is_a_plot(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--robots=quen"], "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)"),
-        (["--rows=1,many"], "--rows: expected positive integers with commas between, got '1,many'"),
+        (["--robots=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})"),
+        (["--num_envs=1,many"], "--num_envs: expected positive integers with commas between, got '1,many'"),
         (["--workers=0"], "--workers: expected positive integers with commas between, got '0'"),
         (["--document=missing.md"], "--document: no file missing.md"),
         (["--document=results.md"], "results.md has no <!-- benchmark --> and <!-- end of benchmark -->"),
@@ -102,7 +104,7 @@ def test_bad_flags_are_one_line_errors(arguments, message, tmp_path):
     assert not (tmp_path / "results.json").exists()
 
 
-@pytest.mark.parametrize("robot", ["queen", "bastion", "tick", "leaper"])
+@pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "leaper"))
 def test_ordinary_environment_has_the_same_observation_and_reward(robot, tmp_path):
     path = tmp_path / "model.xml"
     path.write_text(ordinary.full_model(robot).to_xml_string())
@@ -128,8 +130,9 @@ def test_grown_bodies_have_their_legs_and_links(legs, links):
     assert len(body.part_names) == 1 + legs * (links + 1)
 
 
+@pytest.mark.slow
 def test_what_every_task_costs(monkeypatch):
-    for name, value in {"ROWS": 2, "_ONSET": 1, "_STEPS": 1}.items():
+    for name, value in {"NUM_ENVS": 2, "_ONSET": 1, "_STEPS": 1}.items():
         monkeypatch.setattr(tasks, name, value)
     table = [line.strip("|").split("|") for line in tasks.measure("tick", 1, 1).splitlines()[2:]]
     assert [cells[0].strip() for cells in table] == [*TASKS, "the scan of rough"]

@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.tuning import Evaluator
 
 
 def test_evaluator_plays_the_episodes_of_ordinary_environments():
-    presets = [TUNINGS["leaper"][name] for name in ("slow", "fast")]
+    presets = [PRESETS["leaper"][name] for name in ("slow", "fast")]
     score = Evaluator(Setup.of("leaper"), presets=2, episodes=2, steps=30)(presets, range(5, 7))
     environment = gymnasium.make("arc_suite/leaper-walk-v0")
     for row, preset in enumerate(presets):
@@ -36,7 +36,7 @@ def test_evaluator_plays_the_episodes_of_ordinary_environments():
 
 
 def test_evaluator_counts_falls_and_pays_nothing_after_them():
-    medium = TUNINGS["leaper"]["medium"]
+    medium = PRESETS["leaper"]["medium"]
     folding = medium._replace(stiffness=3.0, centre={"knee": -120.0, "ankle": -120.0}, sweep=0.0)
     score = Evaluator(Setup.of("leaper"), presets=2, episodes=1, steps=60)([folding, medium], [0])
     assert_array_equal(score.falls, [[True], [False]])
@@ -58,7 +58,7 @@ def test_evaluator_counts_falls_and_pays_nothing_after_them():
 
 
 def test_first_steps_may_count_for_nothing():
-    presets = [TUNINGS["leaper"]["medium"]]
+    presets = [PRESETS["leaper"]["medium"]]
     whole, first, last = (
         Evaluator(Setup.of("leaper"), 1, 2, steps, skipped=skipped)(presets, range(2))
         for steps, skipped in ((30, 0), (12, 0), (30, 12))

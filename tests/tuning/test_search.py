@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from arc_suite.cpg.presets import TUNINGS
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.tuning import Evaluator, Search
 
@@ -32,7 +32,7 @@ def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_
     assert resumed.step() == generations[2]
     assert resumed.result() == straight.result()
     assert [generation.tipping for generation in generations] == [0.0] * 3
-    tuned = TUNINGS["leaper"]["tuned"]
+    tuned = PRESETS["leaper"]["tuned"]
     assert straight.result()._replace(torques=None, steering=0.0) == tuned
     assert straight.candidates == 48
 
@@ -44,6 +44,6 @@ def test_a_search_learns():
     for _ in range(14):
         last = search.step()
     assert np.median(last.fitness) > np.median(first.fitness)
-    score = Evaluator(Setup.of("bastion"), 2, 2, 80)([search.result(), TUNINGS["bastion"]["medium"]], [0, 1])
+    score = Evaluator(Setup.of("bastion"), 2, 2, 80)([search.result(), PRESETS["bastion"]["medium"]], [0, 1])
     tuned, medium = score.rewards.mean(axis=-1)
     assert tuned > medium

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from arc_suite import data
 from arc_suite.envs.setup import Setup
 
-ROWS = 64
+NUM_ENVS = 64
 POLICIES = ("cpg", "random")  # long episodes and short ones
 _ID = "arc_suite/benchmark-v0"
 
@@ -48,22 +48,22 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
 
 def _collecting(settings: data.Settings, episodes: int) -> float:
     started = time.perf_counter()
-    data.collect(_ID, settings, episodes, ROWS, progress=functools.partial(tqdm, disable=True))
+    data.collect(_ID, settings, episodes, NUM_ENVS, progress=functools.partial(tqdm, disable=True))
     seconds = time.perf_counter() - started
     return data.open(_ID).metadata["total_steps"] / seconds
 
 
 def _bare(settings: data.Settings) -> float:
     """Steps the actions of the dataset's first episodes, row by row, again and again where they are over."""
-    environment = settings.environment(ROWS)
+    environment = settings.environment(NUM_ENVS)
     dataset = data.open(_ID)
-    recorded = [dataset[row % len(dataset)].actions for row in range(ROWS)]
+    recorded = [dataset[row % len(dataset)].actions for row in range(NUM_ENVS)]
     actions = np.stack([np.resize(episode, (settings.steps, episode.shape[1])) for episode in recorded], axis=1)
     environment.reset(seed=settings.seed)
-    steps, ended = 0, np.zeros(ROWS, bool)
+    steps, ended = 0, np.zeros(NUM_ENVS, bool)
     started = time.perf_counter()
     for row in actions:
-        steps += ROWS - ended.sum()  # a row whose episode has ended starts the next one instead
+        steps += NUM_ENVS - ended.sum()  # a row whose episode has ended starts the next one instead
         *_, terminated, truncated, _ = environment.step(row)
         ended = terminated | truncated
     seconds = time.perf_counter() - started

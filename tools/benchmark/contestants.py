@@ -36,15 +36,15 @@ class Contestant(NamedTuple):
 
     Attributes:
         name: what runs.
-        rows: environments that a step advances.
+        num_envs: environments that a step advances.
         workers: threads or processes that do so.
         reset: starts; returns an observation.
-        step: maps an action (rows, motors), or (motors,) where there is one row, to an observation.
+        step: maps an action (num_envs, motors), or (motors,) where there is one environment, to an observation.
         close: frees everything.
     """
 
     name: str
-    rows: int
+    num_envs: int
     workers: int
     reset: Callable[[], Any]
     step: Callable[[Any], Any]
@@ -65,7 +65,7 @@ def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
 
 
 def ordinary_vectors(ordinary_id: str, workers: Sequence[int]) -> Iterator[Contestant]:
-    """Gymnasium's own vector environments of ordinary ones: as many processes as rows, or none at all."""
+    """Gymnasium's own vector environments of ordinary ones: as many processes as environments, or none at all."""
     forever = {"terminate_when_unhealthy": False, **_FOREVER}
     for rows in workers:
         envs = gymnasium.make_vec(ordinary_id, rows, vectorization_mode="async", **forever)

@@ -53,17 +53,17 @@ def product_rate() -> float:
 
 
 def rate(name: str, updates: int, with_policy: bool, looked_up: bool = False) -> float:
-    """Return updates a second of a row, noise and masks included; in phases with the policy's answers looked up."""
-    random, row = np.random.default_rng(0), ALGORITHMS[name].row
+    """Return updates a second of an algorithm, with noise and masks; in phases next actions are looked up."""
+    random, hp = np.random.default_rng(0), ALGORITHMS[name].hyperparameters
     shapes = ((BATCH, SIZE), (BATCH, JOINTS), (BATCH,), (BATCH,), (BATCH, SIZE))
     batch = Transitions(*(random.normal(size=shape).astype(np.float32) for shape in shapes))
-    figures = off_policy._FIGURES if with_policy else off_policy._OF_CRITICS
-    present = [sac.begin(row, random, SIZE, JOINTS), off_policy._zeros(figures)]
-    following = [np.zeros((BATCH, JOINTS), np.float32)] * 2 if looked_up else None
+    metrics = off_policy.METRICS if with_policy else off_policy.METRICS_OF_CRITICS
+    present = [sac.begin(hp, random, SIZE, JOINTS), off_policy.zeros(metrics)]
+    next_actions = [np.zeros((BATCH, JOINTS), np.float32)] * 2 if looked_up else None
 
     def update(index):
-        noise = sac.noise(row, generator(0, "update", index), BATCH, JOINTS, with_policy)
-        present[:] = off_policy._update(row, *present, batch, noise, following)
+        noise = sac.noise(hp, generator(0, "update", index), BATCH, JOINTS, with_policy)
+        present[:] = off_policy.update(hp, *present, batch, noise, next_actions)
         return present[1]
 
     return 1.0 / seconds(update, updates)

@@ -102,14 +102,14 @@ class _Field:
         """One turn for each contestant, in alternating order."""
         order = range(len(self._contestants))
         for index in order if len(self._times[0]) % 2 == 0 else reversed(order):
-            rows = self._contestants[index].rows
+            rows = self._contestants[index].num_envs
             few = max(1, steps // 3, min(steps, ROW_STEPS // rows))
             self._times[index].append(1e6 * self._run(index, few) / (few * rows))
 
     def results(self) -> list[dict]:
         """The times of all turns."""
         return [
-            {"name": c.name, "rows": c.rows, "workers": c.workers, "microseconds": times}
+            {"name": c.name, "num_envs": c.num_envs, "workers": c.workers, "microseconds": times}
             for c, times in zip(self._contestants, self._times, strict=True)
         ]
 
@@ -147,7 +147,7 @@ def _size(robot: str, rows: int, threads: int) -> dict:
         resets.append(time.perf_counter() - started)
     envs.close()
     return {
-        "rows": rows,
+        "num_envs": rows,
         "build_seconds": built,
         "kilobytes_per_row": memory / rows / 1e3,
         "masked_reset_microseconds": 1e6 * float(np.median(resets)),

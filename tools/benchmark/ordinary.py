@@ -7,7 +7,7 @@ from gymnasium.envs.mujoco import MujocoEnv
 
 from arc_suite import models
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import walk
+from arc_suite.tasks.walk import Walk
 
 
 def full_model(robot: str):
@@ -52,8 +52,8 @@ class OrdinaryEnv(MujocoEnv):
             **kwargs: of `MujocoEnv`.
         """
         super().__init__(xml_file, frame_skip=25, observation_space=None, **kwargs)
-        settings = walk.settings(ROBOTS[robot], {})
-        self._weights, self._numbers = settings.weights, settings.parameters
+        settings = Walk.settings_for(ROBOTS[robot], {})
+        self._settings, self._weights, self._numbers = settings, settings.weights, settings.parameters
         self._base_noise, self._joint_noise = settings.noise.position_noise, settings.noise.joint_angle_noise
         self._torso = self.model.body("torso").id
         self._feet = [self.model.body(name).id for name in ROBOTS[robot].foot_names]
@@ -72,7 +72,7 @@ class OrdinaryEnv(MujocoEnv):
 
     @property
     def is_healthy(self):
-        low, high = self._numbers.healthy_range
+        low, high = self._settings.healthy_range
         return low <= self.data.qpos[2] <= high
 
     def step(self, action):
@@ -97,7 +97,7 @@ class OrdinaryEnv(MujocoEnv):
         wrong_feet = np.sum(stance != wanted)
         angles = self.data.qpos[7:]
         terms = {
-            "forward": max(0.0, 1.0 - abs(x_velocity - numbers.target_velocity) / numbers.velocity_band),
+            "forward": max(0.0, 1.0 - abs(x_velocity - numbers.target_velocity) / self._settings.velocity_band),
             "healthy": float(self.is_healthy),
             "gait_bonus": 1.0 - wrong_feet / len(self._feet),
             "gait_cost": float(wrong_feet),

@@ -43,7 +43,7 @@ def tables(results: dict) -> str:
 
 def ratios(contestants: list[dict]) -> dict[str, float]:
     """The ratios of one robot that its contestants allow, by the names of `TARGETS`."""
-    times = {(c["name"], c["rows"], c["workers"]): np.array(c["microseconds"]) for c in contestants}
+    times = {(c["name"], c["num_envs"], c["workers"]): np.array(c["microseconds"]) for c in contestants}
     single = {name: array for (name, rows, workers), array in times.items() if rows == workers == 1}
     most = max(workers for name, _, workers in times if name == names.VECTOR)
     rows = sorted(rows for name, rows, workers in times if name == names.VECTOR and workers == most)
@@ -105,9 +105,9 @@ def _about(machine: dict) -> str:
 
 
 def _label(contestant: dict) -> str:
-    name, rows, workers = contestant["name"], contestant["rows"], contestant["workers"]
+    name, rows, workers = contestant["name"], contestant["num_envs"], contestant["workers"]
     if name == names.VECTOR:
-        return f"{name}, {_count(rows, 'row')}, {_count(workers, 'thread')}"
+        return f"{name}, {_count(rows, 'environment')}, {_count(workers, 'thread')}"
     if name == names.ASYNC:
         return f"{name}, {workers} processes"
     return name
@@ -135,10 +135,13 @@ def _ratio_rows(results: dict) -> Iterator[list[str]]:
 
 def _size_rows(results: dict) -> Iterator[list[str]]:
     sizes = [robot["size"] for robot in results["robots"].values()]
-    rows = sizes[0]["rows"]
-    yield [f"building {rows} rows, s", *(f"{size['build_seconds']:.2f}" for size in sizes)]
+    rows = sizes[0]["num_envs"]
+    yield [f"building {rows} environments, s", *(f"{size['build_seconds']:.2f}" for size in sizes)]
     yield ["memory of a row, kB", *(f"{size['kilobytes_per_row']:.0f}" for size in sizes)]
-    yield [f"restarting one of {rows} rows, us", *(f"{size['masked_reset_microseconds']:.0f}" for size in sizes)]
+    yield [
+        f"restarting one of {rows} environments, us",
+        *(f"{size['masked_reset_microseconds']:.0f}" for size in sizes),
+    ]
 
 
 def _growth_table(growth: list[dict]) -> str:
@@ -163,7 +166,9 @@ def _speed(contestant: dict) -> float:
 def _plot_singles(panel, results: dict) -> None:
     robots = list(results["robots"])
     first = results["robots"][robots[0]]["contestants"]
-    singles = [index for index, c in enumerate(first) if c["rows"] == c["workers"] == 1 and c["name"] != names.VECTOR]
+    singles = [
+        index for index, c in enumerate(first) if c["num_envs"] == c["workers"] == 1 and c["name"] != names.VECTOR
+    ]
     width = 0.85 / len(robots)
     for column, (robot, color, contestants) in enumerate(_colored(results)):
         speeds = [_speed(contestants[index]) for index in singles]
@@ -182,7 +187,7 @@ def _plot_rows(panel, results: dict) -> None:
     for robot, color, contestants in _colored(results):
         most = max(c["workers"] for c in contestants if c["name"] == names.VECTOR)
         points = sorted(
-            (c["rows"], _speed(c)) for c in contestants if c["name"] == names.VECTOR and c["workers"] == most
+            (c["num_envs"], _speed(c)) for c in contestants if c["name"] == names.VECTOR and c["workers"] == most
         )
         panel.plot(*zip(*points, strict=True), "o-", color=color, label=robot)
         best = max(_speed(c) for c in contestants if c["name"] == names.ASYNC)
@@ -190,21 +195,21 @@ def _plot_rows(panel, results: dict) -> None:
     panel.set_xscale("log", base=2)
     panel.set_xticks([rows for rows, _ in points], [str(rows) for rows, _ in points])
     panel.set_title("Vector env over rows\n(dotted: best AsyncVectorEnv of ordinary ones)")
-    panel.set_xlabel("rows")
+    panel.set_xlabel("environments")
     panel.set_ylabel("control steps / s")
 
 
 def _plot_threads(panel, results: dict) -> None:
     for robot, color, contestants in _colored(results):
         vectors = [c for c in contestants if c["name"] == names.VECTOR]
-        rows = names.reference([c["rows"] for c in vectors])
-        points = sorted((c["workers"], _speed(c)) for c in vectors if c["rows"] == rows)
+        rows = names.reference([c["num_envs"] for c in vectors])
+        points = sorted((c["workers"], _speed(c)) for c in vectors if c["num_envs"] == rows)
         panel.plot(*zip(*points, strict=True), "o-", color=color, label=robot)
         lean = next(_speed(c) for c in contestants if c["name"] == names.LEAN)
         panel.plot([0, points[-1][0]], [0, lean * points[-1][0]], color=color, linestyle=":", linewidth=1)
     panel.set_xticks(sorted({point[0] for point in points}))
     panel.set_xlim(left=0)
-    panel.set_title(f"Vector env of {rows} rows over threads\n(dotted: threads x lean mj_step)")
+    panel.set_title(f"Vector env of {rows} environments over threads\n(dotted: threads x lean mj_step)")
     panel.set_xlabel("threads")
     panel.set_ylabel("control steps / s")
 

@@ -9,17 +9,17 @@ from arc_suite import policies
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import TASKS
 
-ROWS = 64
+NUM_ENVS = 64
 _ONSET, _STEPS = 40, 20  # control steps before those that are timed, and of one turn
 
 
 def _walking(task: str, robot: str, threads: int):
     """Rows that are under way, and the actions of their next steps, which every turn repeats."""
-    rows = VectorEnv(robot, task, ROWS, threads)
+    rows = VectorEnv(robot, task, NUM_ENVS, threads)
     has_command = "command" in rows.task.blocks
-    policy = policies.policy("cpg", robot, "surefooted" if has_command else "tuned", ROWS, task=rows.task)
-    observations, rewards, actions = rows.reset(seed=0)[0], np.zeros(ROWS), []
-    policy.begin(range(ROWS), range(ROWS))
+    policy = policies.policy("cpg", robot, "surefooted" if has_command else "tuned", NUM_ENVS, task=rows.task)
+    observations, rewards, actions = rows.reset(seed=0)[0], np.zeros(NUM_ENVS), []
+    policy.reset(range(NUM_ENVS), range(NUM_ENVS))
     for _ in range(_ONSET + _STEPS):
         actions.append(policy.act(rows.task.split(observations), rewards))
         observations, rewards, *_ = rows.step(actions[-1])
@@ -38,9 +38,12 @@ def measure(robot: str, threads: int, rounds: int) -> str:
                 begin = time.perf_counter()
                 for action in actions:
                     rows.step(action)
-                seconds[task].append((time.perf_counter() - begin) / len(actions) / ROWS)
+                seconds[task].append((time.perf_counter() - begin) / len(actions) / NUM_ENVS)
         scan = _scan(contestants["rough"][0], rounds)
-    lines = [f"| {robot}, {ROWS} rows, {threads} threads | us a row | of walk's |", "|---|---|---|"]
+    lines = [
+        f"| {robot}, {NUM_ENVS} environments, {threads} threads | us an environment | of walk's |",
+        "|---|---|---|",
+    ]
     for task, times in seconds.items():
         ratio = np.median(np.divide(times, seconds["walk"]))
         lines.append(f"| {task} | {1e6 * np.median(times):.0f} | {ratio:.2f} |")
@@ -55,4 +58,4 @@ def _scan(rows: VectorEnv, rounds: int) -> float:
         begin = time.perf_counter()
         rows.task.scan(rows._memory, readings)
         times.append(time.perf_counter() - begin)
-    return float(np.median(times)) / ROWS
+    return float(np.median(times)) / NUM_ENVS

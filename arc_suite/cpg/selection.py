@@ -1,0 +1,79 @@
+"""Presets of a body, the law of each, and the preset that suits a task."""
+
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any
+
+from arc_suite import robots
+from arc_suite.cpg.balancing import Balanced, BalancingParameters
+from arc_suite.cpg.planner import Planned, PlanningParameters
+from arc_suite.cpg.prescribed import PrescribedLaw, Preset
+from arc_suite.cpg.presets import DEFAULTS, PRESETS
+from arc_suite.cpg.sighted import Sighted, SightedParameters
+from arc_suite.cpg.steering import Steered, SteeringParameters
+from arc_suite.cpg.stride import StrideLaw
+from arc_suite.robots.spec import Body
+from arc_suite.tasks.contract import Task
+
+# By kind of preset.
+LAWS = {
+    Preset: PrescribedLaw,
+    float: StrideLaw,
+    SteeringParameters: Steered,
+    SightedParameters: Sighted,
+    BalancingParameters: Balanced,
+    PlanningParameters: Planned,
+}
+
+_AHEAD = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
+
+
+def law(task: Task, preset: Any):
+    """Return the law of a preset, fitted to a task; see `cpg.law`.
+
+    Raises:
+        ValueError: the preset is of no kind of `LAWS`, or does not fit; one line.
+    """
+    return _kind(preset)(task, preset)
+
+
+def _kind(preset: Any):
+    kind = float if isinstance(preset, Real) else type(preset)
+    if kind not in LAWS:
+        kinds = ", ".join(each.__name__ for each in LAWS)
+        raise ValueError(f"preset: expected one of {kinds}, got {kind.__name__}")
+    return LAWS[kind]
+
+
+def presets_of(body: Body) -> Mapping[str, Any]:
+    """Return a body's presets by name: its own, and the defaults of others.
+
+    Raises:
+        ValueError: a body of a robot's name that has other joints; one line.
+    """
+    own = robots.parameters(PRESETS, body, "presets") or {}
+    return own | {name: preset for name, preset in DEFAULTS.items() if name not in own}
+
+
+def preset_names() -> tuple[str, ...]:
+    """Return the names of the presets of all robots, those of other packages included."""
+    return tuple(dict.fromkeys(name for presets in (*PRESETS.values(), DEFAULTS) for name in presets))
+
+
+def suited_preset(task: Task) -> str:
+    """Return the preset that suits a task and its body best.
+
+    It is the first of the task's `demonstrators` that the body has and whose blocks the task observes; then
+    `steered`; then, where the task prescribes a walk, one that walks straight ahead.
+
+    Raises:
+        ValueError: no preset suits the task, or as `presets_of`; one line.
+    """
+    presets = presets_of(task.scene.body)
+    for name in (*task.demonstrators, "steered", *(() if task.parameters is None else _AHEAD)):
+        if name in presets and set(_kind(presets[name]).reads) <= task.blocks.keys():
+            return name
+    raise ValueError(
+        f"task {task.name}: nothing suits a task that observes no command and prescribes no gait; "
+        f"choose one of {', '.join(presets)}"
+    )

@@ -1,0 +1,93 @@
+"""Checks of calls of an environment: one thread at a time, actions and live commands that fit."""
+
+import functools
+import threading
+
+import numpy as np
+
+from arc_suite import checks
+from arc_suite.tasks import Task
+
+_NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
+
+
+class Lock(type(threading.RLock())):
+    """The lock of one environment, as MuJoCo crashes where two threads step one simulation.
+
+    Its pickles and copies are new locks, which nobody holds.
+    """
+
+    def __reduce__(self):
+        return Lock, ()
+
+
+def one_thread_at_a_time(method):
+    """Make a method of an environment, whose `_lock` is a `Lock`, refuse calls while another thread is in one.
+
+    Raises:
+        RuntimeError: another thread's call is at work; one line, and nothing has changed.
+    """
+
+    @functools.wraps(method)
+    def alone(self, *args, **kwargs):
+        lock = self._lock
+        if not lock.acquire(False):
+            raise RuntimeError(
+                f"cannot {method.__name__}: another thread is using this environment; make one for each thread"
+            )
+        try:
+            return method(self, *args, **kwargs)
+        finally:
+            lock.release()
+
+    return alone
+
+
+def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
+    """Return the action as float64, clipped to [-1, 1].
+
+    Args:
+        action: of the shape.
+        shape: (..., motors)
+
+    Raises:
+        ValueError: another shape, not numbers, or NaN; one line that names the index.
+    """
+    array = _real(action)
+    if array is None:
+        numbers, kind = " x ".join(map(str, shape)), type(action).__name__
+        kind += f" of {action.dtype}" if isinstance(action, np.ndarray) else ""
+        raise ValueError(f"action: expected {numbers} numbers, got {kind}")
+    if array.shape != shape:
+        raise ValueError(f"action: expected shape {shape}, got {array.shape}")
+    invalid = np.isnan(array)
+    if np.count_nonzero(invalid):
+        index = np.argwhere(invalid)[0]
+        raise ValueError(f"action[{', '.join(map(str, index))}]: expected a number from -1 to 1, got nan")
+    return array.clip(-1.0, 1.0)
+
+
+def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ()) -> np.ndarray:
+    """Return the value of a live command as floats, (*leading, size); None stands for what the task itself would do.
+
+    Raises:
+        ValueError: the task has no such command, or the value has another size; one line.
+    """
+    if not task.commands:
+        raise ValueError(f"command {name!r}: task {task.name} has no commands")
+    size = task.commands[checks.name(name, task.commands, "command")]
+    numbers = np.full(size, np.nan) if value is None else _real(value)
+    if numbers is None or numbers.shape not in ((size,), (*leading, size)) or np.isinf(numbers).any():
+        raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
+    return np.broadcast_to(numbers, (*leading, size)).copy()
+
+
+def _real(value) -> np.ndarray | None:
+    """The value as floats; None where it holds anything but real numbers, or hides some of them."""
+    try:
+        array = np.asarray(value)
+        if array.dtype.kind in _NOT_REAL or (array is not value and isinstance(value, np.ma.MaskedArray)):
+            return None
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        return None

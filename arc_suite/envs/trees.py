@@ -1,0 +1,30 @@
+"""Memories of tasks as trees: numbers and arrays in NamedTuples and tuples, or None."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+
+def mapped(function: Callable, tree, *others) -> Any:
+    """Return a tree whose leaves a function makes from the leaves of trees of the same structure."""
+    if isinstance(tree, tuple):
+        return rebuilt(tree, [mapped(function, *items) for items in zip(tree, *others, strict=True)])
+    return None if tree is None else function(tree, *others)
+
+
+def at(tree, index: int) -> Any:
+    """Return the tree of the entries that leaves have at an index of their first axis."""
+    return mapped(lambda leaf: leaf[index], tree)
+
+
+def leaves(tree) -> Iterator:
+    """Yield the numbers and arrays of a tree, depth first."""
+    if isinstance(tree, tuple):
+        for item in tree:
+            yield from leaves(item)
+    elif tree is not None:
+        yield tree
+
+
+def rebuilt(like: tuple, items: list) -> tuple:
+    """Return a tuple of the type of another one, with other items."""
+    return type(like)(*items) if hasattr(like, "_fields") else tuple(items)

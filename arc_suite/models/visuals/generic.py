@@ -1,0 +1,28 @@
+"""Visuals for any body, scaled to its torso."""
+
+import numpy as np
+
+from arc_suite.models.outline import solid_corners
+from arc_suite.models.visuals.spec import Ornament, Visuals
+from arc_suite.robots.spec import Body
+
+
+def generic(body: Body) -> Visuals:
+    """Return visuals for a body: slate armour, violet joints, and an eye on a snout in front of the torso."""
+    corners = solid_corners(body.torso.solids[0])
+    centre, half = corners.mean(axis=0), np.ptp(corners, axis=0) / 2.0
+    r = 0.4 * min(half)
+    x, y, z = centre + half * (1.0, 0.0, 0.5)  # above the mount of a leg that points forward
+    return Visuals(
+        colours={
+            "shell": (0.62, 0.66, 0.72),
+            "trim": (0.35, 0.38, 0.45),
+            "frame": (0.13, 0.14, 0.17),
+            "limb": (0.28, 0.30, 0.35),
+            "glow": (0.36, 0.18, 0.85),
+        },
+        ornaments=(
+            Ornament("snout", "frame", "cylinder", (r, half[0] / 2.0), (x - half[0] / 2.0, y, z), (0, 90, 0)),
+            Ornament("eye", "glow", "ellipsoid", (0.4 * r, 0.7 * r, 0.7 * r), (x, y, z)),
+        ),
+    )

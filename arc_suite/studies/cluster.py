@@ -1,0 +1,51 @@
+"""Submits studies to a SLURM cluster with submitit, one job for each share of the runs."""
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import submitit
+
+
+class Share(NamedTuple):
+    """A job: makes a share of a study; after a timeout or preemption it is queued again and resumes.
+
+    Attributes:
+        arguments: of `arc-suite`.
+    """
+
+    arguments: tuple[str, ...]
+
+    def __call__(self) -> None:
+        """Make the runs.
+
+        Raises:
+            subprocess.CalledProcessError: a run has failed.
+        """
+        subprocess.run([sys.executable, "-m", "arc_suite", *self.arguments], check=True)
+
+    def checkpoint(self) -> submitit.helpers.DelayedSubmission:
+        """Return the job that is queued in place of an interrupted one: the same, as it resumes from its folders."""
+        return submitit.helpers.DelayedSubmission(self)
+
+
+def submit(
+    arguments: Sequence[str], shares: int, hours: float, logs: Path, cluster: str | None = None, **parameters
+) -> list[submitit.Job]:
+    """Submit an array of jobs.
+
+    Args:
+        arguments: of `arc-suite` that make the study; each job adds its share.
+        shares: number of jobs, of one core each.
+        hours: time limit of a job, which is queued again.
+        logs: folder of the jobs' output.
+        cluster: submitit's name of a cluster; None for the cluster of this machine.
+        **parameters: others of submitit, such as `slurm_partition`.
+    """
+    executor = submitit.AutoExecutor(logs, cluster=cluster)
+    executor.update_parameters(timeout_min=round(60 * hours), cpus_per_task=1, name="arc-suite", **parameters)
+    with executor.batch():
+        jobs = [executor.submit(Share((*arguments, f"--shard={i}/{shares}", "--jobs=1"))) for i in range(shares)]
+    return jobs

@@ -1,0 +1,137 @@
+"""Publication: copies the results of runs that are committed, with the style of their latest policies."""
+
+import contextlib
+import csv
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from arc_suite import evaluation, files, policies, style
+from arc_suite.agents import run_folder
+from arc_suite.cpg import suited_preset
+from arc_suite.cpg.selection import presets_of
+from arc_suite.envs.dm import Environment
+from arc_suite.envs.setup import Setup
+from arc_suite.policies import Policy, checkpoints, network
+from arc_suite.simulation.opengl import RenderingUnavailable
+from arc_suite.studies import results
+from arc_suite.studies.results import table
+from arc_suite.studies.tables import Run
+from arc_suite.style import strips
+
+PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
+
+# Metrics of `arc_suite.style` by which the final policies are compared.
+METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
+
+# Presets of demonstrators whose returns are published, in `walk`, and in tasks with a command; and the suited one.
+PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
+
+
+def publish(run: Run, folder: Path, published: Path) -> None:
+    """Copy the tables of a run that has been evaluated, and measure and draw the style of its latest policy.
+
+    Existing style and strip of the same policy stay. Without OpenGL no strip is drawn.
+
+    Args:
+        run: of the study.
+        folder: of the study, with a folder for each run.
+        published: folder of the copies, with a folder for each run.
+
+    Raises:
+        OSError: a file cannot be written; one line.
+    """
+    source, target = folder / run.name, published / run.name
+    steps = results.evaluated(table(source, "evaluations"))
+    if not len(steps):
+        return
+    files.folder(target)
+    config = target / run_folder.CONFIG
+    if config.exists() and config.read_text() != (source / run_folder.CONFIG).read_text():
+        (target / "style.csv").unlink(missing_ok=True)  # of another run
+    for name in PUBLISHED:
+        with files.writing(target / name) as temporary:
+            temporary.write_text((source / name).read_text())
+    training = table(source, "training")
+    if np.any(training.get("phase_updates", 0)):
+        with files.writing(target / "phases.csv") as temporary:
+            temporary.write_text(_phases(training))
+    step = int(steps[-1])
+    measured, drawn = table(target, "style"), target / results.STRIP
+    up_to_date = bool(measured) and measured["step"][-1] == step
+    if not up_to_date:
+        drawn.unlink(missing_ok=True)  # before the style is written: then both are of the same policy
+    if not drawn.exists():
+        with contextlib.suppress(RenderingUnavailable), _played(run, source, step) as (environment, policy):
+            if (picture := strips.strip(environment, policy)) is not None:
+                with files.writing(drawn) as temporary:
+                    strips.write(temporary, picture)
+    if not up_to_date:
+        text = _style(run, source, step)  # slow; a kill meanwhile leaves no temporary file
+        with files.writing(target / "style.csv") as temporary:
+            temporary.write_text(text)
+
+
+def _phases(training: Mapping[str, np.ndarray]) -> str:
+    """Return a table of the updates of stabilisation phases by environment step."""
+    pairs = zip(training["step"].astype(int), training["phase_updates"].astype(int), strict=True)
+    return "\n".join(["step,updates", *(f"{step},{updates}" for step, updates in pairs if updates)]) + "\n"
+
+
+def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
+    """Publish all evaluated runs of a study, and the returns of demonstrators in the same tasks.
+
+    Raises:
+        OSError: a file cannot be written; one line.
+    """
+    for run in runs:
+        publish(run, folder, published)
+    known = results.demonstrators(published)
+    places = {run.place: run for run in runs}
+    if places.keys() <= known.keys() or not published.exists():
+        return
+    with files.writing(published / results.DEMONSTRATORS) as temporary, temporary.open("w", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(("place", "preset", "seed", "return"))
+        for place, presets in known.items():
+            for preset, totals in presets.items():
+                lines.writerows((place, preset, seed, repr(float(total))) for seed, total in enumerate(totals))
+        for place, run in places.items():
+            if place not in known:
+                for preset, episodes in _demonstrated(run.configuration.setup).items():
+                    lines.writerows((place, preset, seed, repr(each.total)) for seed, each in enumerate(episodes))
+
+
+def _demonstrated(setup: Setup) -> dict[str, list[evaluation.Episode]]:
+    """Return the episodes of the evaluation protocol by the demonstrators of a body, by preset."""
+    found = {}
+    environment = setup.make_vec(evaluation.EPISODES, num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
+    with contextlib.closing(environment):
+        task = environment.task
+        usual = COMMANDED if "command" in task.blocks else PRESETS
+        for preset in dict.fromkeys((*usual, suited_preset(task))):
+            if preset in presets_of(setup.body):
+                policy = policies.policy("cpg", setup.body, preset, evaluation.EPISODES, task=task)
+                found[preset] = evaluation.episodes_in_batch(environment, policy)
+    return found
+
+
+@contextlib.contextmanager
+def _played(run: Run, folder: Path, step: int) -> Iterator[tuple[Environment, Policy]]:
+    """Open the environment of a run, and its policy at a step, as a later one may exist already."""
+    path, setup = folder / checkpoints.FOLDER / str(step) / network.FILE, run.configuration.setup
+    with contextlib.closing(setup.load()) as environment:
+        yield environment, policies.policy(path, setup.body, task=environment.task.definition)
+
+
+def _style(run: Run, folder: Path, step: int) -> str:
+    """Return a table of the metrics of the episodes of the evaluation protocol."""
+    lines = []
+    with _played(run, folder, step) as (environment, policy):
+        for seed in range(evaluation.EPISODES):
+            measured = style.measure(style.record(environment, policy, seed))
+            metrics = {name: measured[name].value for name in METRICS if name in measured}
+            lines.append(",".join(map(repr, (step, seed, *metrics.values()))))
+    return "\n".join([",".join(("step", "seed", *metrics)), *lines]) + "\n"

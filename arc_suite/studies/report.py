@@ -1,0 +1,401 @@
+"""Reports of studies: Markdown and curves, of published tables alone."""
+
+import itertools
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import checks, evaluation, files
+from arc_suite.agents import run_folder
+from arc_suite.envs.setup import Setup
+from arc_suite.studies import results, tables
+from arc_suite.studies.results import STRIP, Result
+from arc_suite.studies.tables import Run, Study
+
+REPORT, CURVES = "README.md", "curves.png"
+
+# Final returns after 1,000,000 steps, mean of five seeds, read off the paper's curves, within about 30.
+PAPER = {
+    "leaper": {"sac": 2860, "speq": 3120, "sope_eo": 3310, "sacfd": 3520, "speq_o2o": 3550, "sope": 3760},
+    "bastion": {"sac": 3080, "speq": 3350, "sope_eo": 3530, "sacfd": 3530, "speq_o2o": 3680, "sope": 3690},
+    "queen": {"sac": 3520, "speq": 3330, "sope_eo": 3580, "sacfd": 3220, "speq_o2o": 3620, "sope": 3730},
+    "tick": {"sac": 2590, "speq": 3590, "sope_eo": 3490, "sacfd": 3160, "speq_o2o": 3720, "sope": 3610},
+}
+ONLINE = ("sac", "speq", "sope_eo")
+WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
+COMPETITIVE = 100.0  # of return: within it of the best online algorithm the paper calls SAC competitive
+
+Groups = Mapping[str, Mapping[str, Sequence[Result]]]
+_Of = Callable[[str, str], float | None]  # robot and algorithm -> a figure; None where there is none
+
+
+class Claim(NamedTuple):
+    """A sentence of the paper, and what it says of each robot.
+
+    Attributes:
+        text: in short.
+        compared: of a robot and the figures of algorithms, what must be above zero for the sentence to hold; None
+            where a figure is missing.
+        figure: of a result; what is compared.
+        in_paper: whether the paper's table of final returns can be asked too.
+    """
+
+    text: str
+    compared: Callable[[str, _Of], float | None]
+    figure: Callable[[Result], float]
+    in_paper: bool = False
+
+
+def _difference(first: float | None, second: float | None) -> float | None:
+    return None if first is None or second is None else first - second
+
+
+def _least(values: Sequence[float | None]) -> float | None:
+    return None if None in values else min(values)
+
+
+def _metric(name: str) -> Callable[[Result], float]:
+    """The mean size of a metric of style over the episodes in which it is finite; NaN where there is none."""
+
+    def figure(result):
+        sizes = np.abs(result.style.get(name, np.empty(0)))
+        return float(sizes[np.isfinite(sizes)].mean()) if np.isfinite(sizes).any() else np.nan
+
+    return figure
+
+
+def _final(result: Result) -> float:
+    return result.final
+
+
+def _of_all(names: Sequence[str]) -> Callable[[str, _Of], float | None]:
+    """The least lead of some algorithms over the paper's demonstrator."""
+    return lambda robot, of: _least(
+        [_difference(of(robot, n), evaluation.expert_return(Setup.of(robot))) for n in names]
+    )
+
+
+def _pairs(robot: str, of: _Of) -> float | None:
+    pairs = zip(WITH_PRIOR, ONLINE, strict=True)
+    return _least([_difference(of(robot, with_prior), of(robot, online)) for with_prior, online in pairs])
+
+
+def _most(name: str) -> Callable[[str, _Of], float | None]:
+    """The least lead of an algorithm over the other five."""
+    others = [other for other in (*ONLINE, *WITH_PRIOR) if other != name]
+    return lambda robot, of: _least([_difference(of(robot, name), of(robot, other)) for other in others])
+
+
+def _best_online(robot: str, of: _Of) -> float | None:
+    """The lead of SOPE-EO over the other two, on Tick of SPEQ."""
+    best = "speq" if robot == "tick" else "sope_eo"
+    return _least([_difference(of(robot, best), of(robot, other)) for other in ONLINE if other != best])
+
+
+def _sac_lags(robot: str, of: _Of) -> float | None:
+    """By how much more than `COMPETITIVE` SAC stays below the best online algorithm; on Queen, by how much less."""
+    figures = [of(robot, name) for name in ONLINE]
+    if None in figures:
+        return None
+    lag = max(figures) - figures[0] - COMPETITIVE
+    return -lag if robot == "queen" else lag
+
+
+CLAIMS = (
+    Claim("all online algorithms surpass the demonstrator", _of_all(ONLINE), _final, True),
+    Claim("SOPE-EO is the best online algorithm, on Tick SPEQ", _best_online, _final, True),
+    Claim("SAC is competitive on Queen alone", _sac_lags, _final, True),
+    Claim("with prior data all start higher", _pairs, lambda result: float(result.returns[0].mean())),
+    Claim("with prior data all end higher than without", _pairs, _final, True),
+    Claim("SAC walks sideways: the largest heading error, rad", _most("sac"), _metric("heading_error")),
+    Claim("SPEQ pitches forwards: the largest pitch, rad", _most("speq"), _metric("torso_pitch")),
+    Claim("SOPE looks best: the most gait compliance", _most("sope"), _metric("gait_compliance")),
+)
+
+
+def write(name: str, study: Study, published: Path) -> Path:
+    """Write the report of a study beside its tables, and the leaderboard of all studies one folder above.
+
+    Args:
+        name: of the study.
+        study: its rows.
+        published: folder of its tables.
+
+    Returns:
+        The file of the report.
+
+    Raises:
+        ValueError: nothing is published, or a table is damaged; one line.
+        OSError: something cannot be written; one line.
+    """
+    found = results.results(study.runs, published)
+    if not found:
+        raise ValueError(f"{published}: holds no results of the study {name}")
+    groups, demonstrators = results.grouped(found), results.demonstrators(published)
+    sections = {
+        f"Study {name}": [_title(study, found), _reached(found)],
+        "Curves": [f"![Returns over environment steps]({CURVES})"],
+        "Final returns": [_FINALS, _finals(groups, demonstrators)],
+        "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
+        "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
+        **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
+        "Style": [_STYLE, _style(groups), *_strips(name, groups, published)],
+        "What the paper says": [_CLAIMS, _claims(found)],
+    }
+    with files.writing(published / CURVES) as temporary:
+        _curves(groups, demonstrators).savefig(temporary)
+    with files.writing(published / REPORT) as temporary:
+        temporary.write_text(_page(sections))
+    if tables.STUDIES.get(name) == study:
+        with files.writing(published.parent / REPORT) as temporary:
+            temporary.write_text(_page({"Leaderboard": [_LEADERBOARD, _leaderboard(published.parent)]}))
+    return published / REPORT
+
+
+_FINALS = (
+    "Mean of the latest evaluation, ten seeded episodes, and standard deviation over seeds, or of a single seed over "
+    "its episodes; interquartile mean with 95 % bootstrap interval over the same. Beside it the paper's, after "
+    "1,000,000 steps, read off its curves within about 30, and its demonstrator; then our demonstrators."
+)
+_EFFICIENCY = (
+    "Environment steps and minutes of one core until an evaluation earns what the paper's demonstrator "
+    "earns, and 3,500; a dash where it has not. Area is the mean return over all evaluations so far."
+)
+_IMPROVEMENT = (
+    "That a run of the row earns more than one of the column, with 95 % bootstrap interval, over all robots and tasks, "
+    "at the latest step that both have reached. With one seed, episodes stand for runs: the interval then tells "
+    "nothing of other seeds."
+)
+_PHASES = (
+    "Updates of critics alone in a stabilisation phase, of runs whose phases have been published: those of `speq` and "
+    "`speq_o2o` are as long as they may be, the others stop early."
+)
+_STYLE = (
+    "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each. "
+    "Heading and drift are told from the x axis, which is not the way where a command turns."
+)
+_STRIPS = (
+    "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle, to the nearest control "
+    "step: the fifth cycle, or the latest whole one before a fall. The camera moves along and keeps its direction; in "
+    "tasks with a command it looks straight ahead. The command line makes a page that plays the policy."
+)
+_CLAIMS = (
+    "How far each sentence is from being false, in its own unit: above zero it holds. The paper's figure is from its "
+    "final returns after 1,000,000 steps, where those tell. Ours are of finished runs alone, at the steps they have."
+)
+_LEADERBOARD = (
+    "Of all studies whose tables lie here, written by `arc-suite study NAME --report`. Return: mean of the latest "
+    "evaluation, and interquartile mean with 95 % bootstrap interval over seeds, or of a single seed over episodes. "
+    "Then the task's own figure, speed in m/s; headings are told from the x axis, which is not the way of a command."
+)
+
+
+def _page(sections: Mapping[str, Sequence[str]]) -> str:
+    texts = [("#" if not place else "##") + f" {title}" for place, title in enumerate(sections)]
+    parts = itertools.chain.from_iterable(zip(texts, ("\n\n".join(body) for body in sections.values()), strict=True))
+    return "\n\n".join(parts) + "\n"
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [columns, ["---"] * len(columns), *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _title(study: Study, found: Sequence[Result]) -> str:
+    title = study.title[0].upper() + study.title[1:] + "."
+    return title if len(found) == len(study.runs) else f"{title} Begun: {len(found)} of {len(study.runs)} runs."
+
+
+def _reached(found: Sequence[Result]) -> str:
+    lines = []
+    for each in found:
+        run, configuration = each.run, each.run.configuration
+        reached = f"{each.steps[-1]:,} of {configuration.steps:,}"
+        lines.append((run.place, run.kind, str(configuration.seed), reached, f"{each.cpu[-1] / 60.0:.1f}"))
+    return _table(("robot, task", "algorithm", "seed", "steps", "CPU min"), lines)
+
+
+def _curves(groups: Groups, demonstrators):
+    from arc_suite.agents import plots  # needs matplotlib
+
+    drawn = {}
+    for place, kinds in groups.items():
+        drawn[place] = {}
+        for kind, seeds in kinds.items():
+            count = min(len(each.steps) for each in seeds)
+            several = np.array([each.returns.mean(axis=1)[:count] for each in seeds])
+            drawn[place][kind] = seeds[0].steps[:count], several if len(seeds) > 1 else seeds[0].returns.T
+    lines = {p: {f"demonstrator {n}": v.mean() for n, v in d.items()} for p, d in demonstrators.items()}
+    return plots.study(drawn, lines)
+
+
+def _mean(values: np.ndarray) -> str:
+    return f"{values.mean():.1f} +- {values.std():.1f}"
+
+
+def _iqm(values: np.ndarray) -> str:
+    middle, (low, high) = evaluation.iqm_and_interval([values])
+    return f"{middle:.1f} [{low:.1f}, {high:.1f}]"
+
+
+def _is_papers(result: Result) -> bool:
+    """Return whether the paper's table of final returns has a run."""
+    setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
+    plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
+    return plain and algorithm in PAPER.get(setup.body.name, {})
+
+
+def _expert(run: Run) -> float | None:
+    """Return the return of the paper's demonstrator in a run's place; None if the paper has none."""
+    return evaluation.expert_return(run.configuration.setup)
+
+
+def _finals(groups: Groups, demonstrators) -> str:
+    lines = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            run, values = seeds[0].run, results.scores(seeds)
+            paper = (
+                str(PAPER[run.configuration.setup.body.name][run.configuration.algorithm])
+                if _is_papers(seeds[0])
+                else "-"
+            )
+            reached = f"{min(each.steps[-1] for each in seeds):,}"
+            lines.append((place, kind, reached, str(len(seeds)), _mean(values), _iqm(values), paper))
+        expert = _expert(run)
+        for preset, totals in demonstrators.get(place, {}).items():
+            paper = f"{expert:.0f}" if preset == "medium" and expert else "-"
+            lines.append((place, f"demonstrator {preset}", "-", "-", _mean(totals), _iqm(totals), paper))
+    return _table(("robot, task", "algorithm", "steps", "seeds", "return", "IQM [95 %]", "paper, 1M steps"), lines)
+
+
+def _efficiency(groups: Groups) -> str:
+    lines = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            expert = _expert(seeds[0].run)
+            cells = []
+            for threshold in (expert, 3500.0):
+                steps, seconds = (np.inf, np.inf) if threshold is None else results.until(seeds, threshold)
+                cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
+            area = np.mean([each.returns.mean() for each in seeds])
+            lines.append((place, kind, *cells, f"{area:.1f}"))
+    heads = ("robot, task", "algorithm", "steps to demonstrator", "CPU min", "steps to 3,500", "CPU min", "area")
+    return _table(heads, lines)
+
+
+def _improvements(groups: Groups) -> str:
+    names = list(dict.fromkeys(kind for kinds in groups.values() for kind in kinds))
+    lines = []
+    for x in names:
+        cells = []
+        for y in names:
+            found = None if x == y else results.improvement(groups, x, y)
+            cells.append("-" if found is None else "{:.2f} [{:.2f}, {:.2f}]".format(found[0], *found[1]))
+        lines.append((x, *cells))
+    return _table(("more than", *names), lines)
+
+
+def _phases(groups: Groups) -> str:
+    lines = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            updates = np.concatenate([each.phases for each in seeds])
+            if len(updates):
+                figures = (updates.mean(), updates.min(), updates.max())
+                lines.append((place, kind, str(len(updates)), *(f"{figure:,.0f}" for figure in figures)))
+    return _table(("robot, task", "algorithm", "phases", "mean", "least", "most"), lines)
+
+
+def _style(groups: Groups) -> str:
+    names = list(dict.fromkeys(name for kinds in groups.values() for s in kinds.values() for name in s[0].style))
+    lines = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            cells = [_size(name, seeds) for name in names]
+            lines.append((place, kind, *cells))
+    return _table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
+
+
+def _size(name: str, seeds: Sequence[Result]) -> str:
+    size = np.mean([_metric(name)(each) for each in seeds])
+    return "-" if np.isnan(size) else f"{size:.3f}"
+
+
+def _claims(found: Sequence[Result]) -> str:
+    own = [each for each in found if _is_papers(each) and each.steps[-1] >= each.run.configuration.steps]
+    lines = []
+    for claim in CLAIMS:
+
+        def measured(robot, name, claim=claim):
+            figures = [claim.figure(each) for each in own if _robot_and_algorithm(each) == (robot, name)]
+            return float(np.mean(figures)) if figures else None
+
+        paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
+        ours = {robot: claim.compared(robot, measured) for robot in PAPER}
+        lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
+    return _table(("sentence", "paper's figure", "holds there", "ours", "holds here"), lines)
+
+
+def _robot_and_algorithm(result: Result) -> tuple[str, str]:
+    return result.run.configuration.setup.body.name, result.run.configuration.algorithm
+
+
+def _strips(name: str, groups: Groups, published: Path) -> list[str]:
+    """Return the strips of a study as Markdown paragraphs: for each kind that of the first seed which has one."""
+    found = []
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            for run in [each.run for each in seeds if (published / each.run.name / STRIP).exists()][:1]:
+                setup, folder = run.configuration.setup, Path("runs", tables.folder_name(name), run.name)
+                command = ["arc-suite", "render", f"--robot={setup.body.name}", f"--task={setup.task}"]
+                command += [
+                    f"--policy={folder}",
+                    *map(_setting, setup.task_kwargs.items()),
+                    f"--output={run.name}.html",
+                ]
+                found.append(f"**{place}: {kind}**, seed {run.configuration.seed}: `{shlex.join(command)}`")
+                found.append(f"![{place}: {kind}]({run.name}/{STRIP})")
+    return [_STRIPS, *found] if found else []
+
+
+def _setting(item: tuple[str, object]) -> str:
+    name, value = item
+    return f"--set={name}={value if isinstance(value, str) else checks.json_text(name, value)}"
+
+
+def _leads(figures: Mapping[str, float | None]) -> str:
+    known = {robot: figure for robot, figure in figures.items() if figure is not None}
+    return ", ".join(f"{robot} {figure:+.4g}" for robot, figure in known.items()) or "-"
+
+
+def _verdict(figures: Mapping[str, float | None]) -> str:
+    known = [figure > 0.0 for figure in figures.values() if figure is not None]
+    return f"{sum(known)} of {len(known)} robots" if known else "not measured"
+
+
+def _leaderboard(folder: Path) -> str:
+    lines = []
+    for name, study in tables.STUDIES.items():
+        for kinds in results.grouped(results.results(study.runs, folder / name)).values():
+            for seeds in kinds.values():
+                lines.append((name, seeds))
+    lines.sort(key=lambda line: (line[1][0].run.place, -np.mean([each.final for each in line[1]])))
+    cells = []
+    for name, seeds in lines:
+        run, values = seeds[0].run, results.scores(seeds)
+        figure = next(iter(seeds[0].progress))
+        own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
+        style = [_size(name, seeds) for name in ("gait_compliance", "heading_error", "torso_pitch")]
+        command = f"arc-suite train --config studies/{name}/{run.name}/{run_folder.CONFIG}"
+        steps = f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}"
+        cpu = f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}"
+        result = f"{np.mean([each.final for each in seeds]):.1f}"
+        link = f"[{name}]({name}/{REPORT})"
+        cells.append((run.place, run.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
+    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "figure", "gait compliance")
+    heads += ("heading error, rad", "torso pitch, rad")
+    return _table((*heads, "steps", "CPU min", "study", "command of seed 0"), cells)

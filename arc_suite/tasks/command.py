@@ -1,0 +1,342 @@
+"""Commands: the velocity that a body is to follow, and how well it does.
+
+A command is a frozen value with pure functions of its own memory. Velocities are (forward, left,
+turning) as the torso heads, in the units of `Context.units`. `place` is (..., 3): x and y of the
+torso's frame, m, and its yaw, rad.
+"""
+
+import dataclasses
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.arenas.pillars import CELLS, PITCH
+from arc_suite.markers import Marker
+from arc_suite.tasks import terms
+from arc_suite.tasks.context import Context
+from arc_suite.tasks.mirrors import Mirror
+from arc_suite.tasks.readings import component
+from arc_suite.tasks.sensors import FAR
+
+BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
+COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
+
+GOALS = 16  # of a chain; after the last one the way leads back
+NEAR = 0.7  # distance of the torso at which a goal is reached, R
+_DISC, _GOAL = 0.02, (0.2, 0.9, 0.4, 1.0)  # thickness, R, and colour of the disc that shows a goal
+
+_MOVES = [(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]
+
+
+class Followed(NamedTuple):
+    """A command after a control step.
+
+    Attributes:
+        memory: of the command.
+        desired: (..., 3) the velocity that holds from now on.
+        tracking: (...) how well the step followed it, 0 to 1.
+        arrived: (...) whether the step reached a goal; False where there are none.
+    """
+
+    memory: Any
+    desired: np.ndarray
+    tracking: np.ndarray
+    arrived: np.ndarray | bool = False
+
+
+@dataclasses.dataclass(frozen=True)
+class Command(ABC):
+    """What a body is to follow.
+
+    Attributes:
+        live: sizes of what may be set from outside while an episode runs, by name.
+        blocks: sizes of the blocks that it adds to the observation, by name.
+    """
+
+    live: ClassVar[Mapping[str, int]] = {"command": 3}
+    blocks: ClassVar[Mapping[str, int]] = {}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """The left-right maps of these blocks."""
+        return {}
+
+    @abstractmethod
+    def start(self, context: Context, random: np.random.RandomState, schedule: "Scheduled") -> Any:
+        """Return the memory at the start; see `CommandTask.start` for the order of draws."""
+
+    def begin(self, context: Context, memory, place) -> Any:
+        """Return the memory from which the first step starts."""
+        return memory
+
+    @abstractmethod
+    def desired(self, context: Context, memory, steps, place):
+        """Return the velocity (..., 3) that holds at a place after control steps (...)."""
+
+    @abstractmethod
+    def follow(self, context: Context, memory, steps, before, place, motion) -> Followed:
+        """Return the command after a control step.
+
+        Args:
+            context: of the task.
+            memory: of the command, before the step.
+            steps: (...) control steps since the start.
+            before: (..., 3) the place before the step.
+            place: (..., 3) the place after it.
+            motion: (..., 3) mean velocity of the torso.
+        """
+
+    def commanded(self, memory, name: str, value):
+        """Return the memory with a live command (..., 3) in place of the task's own where it is not NaN."""
+        return memory._replace(live=value)
+
+    def terms(self, memory, upright) -> dict:
+        """Return the terms that it adds to the reward, given the cosine (...) of the torso's tilt."""
+        return {}
+
+    def observe(self, context: Context, memory) -> dict:
+        """Return the blocks that it adds to the observation."""
+        return {}
+
+    def progress(self, context: Context, memory, judged) -> dict:
+        """Return the metrics that it adds to progress, given the steps (...) over which the episode is judged."""
+        return {}
+
+    def outcome(self, context: Context, memory, tracking, judged):
+        """Return the outcome (...) by which a curriculum judges an episode: its mean tracking."""
+        return tracking / judged
+
+    def markers(self, context: Context, memory) -> list[Marker]:
+        """Return what pictures show of it, in addition to the command's arrows."""
+        return []
+
+
+class Live(NamedTuple):
+    """Memory of a command that can be set live.
+
+    Attributes:
+        live: (..., 3) set from outside; NaN for what the task itself would do.
+        distance: (...) along world x since the start, m.
+    """
+
+    live: np.ndarray
+    distance: np.ndarray
+
+
+class Scheduled(NamedTuple):
+    """Memory of a schedule.
+
+    Attributes:
+        ends: (..., COMMANDS) steps at which the commands of the schedule end.
+        schedule: (..., COMMANDS, 3) commands.
+        live: (..., 3) set from outside, in place of the schedule where it is not NaN.
+    """
+
+    ends: np.ndarray
+    schedule: np.ndarray
+    live: np.ndarray
+
+
+def draw_schedule(random: np.random.RandomState) -> Scheduled:
+    """Draw how long each command is held, then the commands."""
+    ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
+    return Scheduled(ends, np.array([draw_command(random) for _ in range(COMMANDS)]), np.full(3, np.nan))
+
+
+def draw_command(random: np.random.RandomState) -> np.ndarray:
+    """Draw a command (3,): mostly forward, some turning or sideways, one in ten a stop; always six draws."""
+    command = random.uniform((-0.5, -0.5, -1.0), (1.0, 0.5, 1.0))
+    sideways, turns, goes = random.uniform(size=3) < (0.5, 0.7, 0.95)
+    command = command * (1.0, sideways, turns)
+    size = np.hypot(command[0], command[1]) + abs(command[2])
+    return command / max(size, 1.0) * (goes and size >= 0.2)
+
+
+def tracking(desired, motion):
+    """Return how well a motion (..., 3) follows a velocity (..., 3): the product of course and turning, 0 to 1."""
+    numpy, error = motion.__array_namespace__(), desired - motion
+    speed, miss = (numpy.hypot(vector[..., 0], vector[..., 1]) for vector in (desired, error))
+    course = terms.triangle(miss, BAND * numpy.maximum(speed, 0.5))
+    return course * terms.triangle(error[..., 2], BAND * numpy.maximum(abs(desired[..., 2]), 0.5))
+
+
+@dataclasses.dataclass(frozen=True)
+class Schedule(Command):
+    """Commands that are drawn for the episode, each held for some seconds; stops are among them."""
+
+    def start(self, context: Context, random, schedule: Scheduled) -> Scheduled:
+        """Return the drawn schedule."""
+        return schedule
+
+    def desired(self, context: Context, memory: Scheduled, steps, place):
+        """Return the command that holds; a schedule that has run out begins again."""
+        step, numpy = steps % memory.ends[..., -1], memory.ends.__array_namespace__()
+        current = (step[..., None] >= memory.ends).sum(axis=-1)[..., None, None]
+        scheduled = numpy.take_along_axis(memory.schedule, current, axis=-2)[..., 0, :]
+        return numpy.where(numpy.isnan(memory.live), scheduled, memory.live)
+
+    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion) -> Followed:
+        """Return the command after a control step."""
+        desired = self.desired(context, memory, steps, place)
+        return Followed(memory, desired, tracking(desired, motion))
+
+
+@dataclasses.dataclass(frozen=True)
+class AlongLane(Command):
+    """Along world x at the target velocity, and a turn back into that direction."""
+
+    def start(self, context: Context, random, schedule: Scheduled) -> Live:
+        """Return a memory without displacement; the drawn schedule is not used."""
+        return Live(schedule.live, np.float64(0.0))
+
+    def desired(self, context: Context, memory: Live, steps, place):
+        """Return the command as the torso heads."""
+        heading, numpy = place[..., 2], place.__array_namespace__()
+        turn = (-heading * context.reach / context.height).clip(-1.0, 1.0)
+        along = numpy.stack([numpy.cos(heading), -numpy.sin(heading), turn], axis=-1)
+        return numpy.where(numpy.isnan(memory.live), along, memory.live)
+
+    def follow(self, context: Context, memory: Live, steps, before, place, motion) -> Followed:
+        """Return the command after a control step, and the distance."""
+        desired = self.desired(context, memory, steps, place)
+        displacement = component(place, 0) - component(before, 0)
+        memory = Live(memory.live, memory.distance + displacement)
+        return Followed(memory, desired, tracking(desired, motion))
+
+    def progress(self, context: Context, memory: Live, judged) -> dict:
+        """Return the distance along the lane as a share of that at the target velocity."""
+        return {"distance": self.outcome(context, memory, None, judged)}
+
+    def outcome(self, context: Context, memory: Live, tracking, judged):
+        """Return the same share."""
+        return memory.distance / (context.units[0] * context.control_timestep * judged)
+
+
+class Chain(NamedTuple):
+    """Memory of a chain of goals.
+
+    Attributes:
+        goals: (..., GOALS, 2) where they are, m.
+        reached: (...) how many goals were.
+        arrived: (...) whether one was in the latest step.
+        gained: (...) progress to the goal in the latest step, a share of that at the target velocity, from -1 to 1.
+        to_goal: (..., 2) from the torso to the present goal, forward and left, m.
+    """
+
+    goals: np.ndarray
+    reached: np.ndarray
+    arrived: np.ndarray
+    gained: np.ndarray
+    to_goal: np.ndarray
+
+
+def draw_chain(random: np.random.RandomState) -> np.ndarray:
+    """Draw a chain of goals (GOALS, 2): corners of the grid of pillars, in widths of a cell."""
+    return chain(random.uniform(size=GOALS))
+
+
+def chain(numbers) -> np.ndarray:
+    """Return corners (n, 2) of the grid's cells, each next to the one before, the first next to the start.
+
+    Args:
+        numbers: (n,) from 0 to 1; each chooses among the corners next to the one before, straight
+            or across a cell, except the one before that.
+    """
+    corners, farthest = [(0, 0), (0, 0)], CELLS // 2
+    for number in numbers:
+        near = [(corners[-1][0] + i, corners[-1][1] + j) for i, j in _MOVES]
+        near = [corner for corner in near if max(map(abs, corner)) <= farthest and corner != corners[-2]]
+        corners.append(near[int(number * len(near))])
+    return np.array(corners[2:], float)
+
+
+def at_goal(bearing):
+    """Return the command (..., 3) that turns to a bearing (...), rad, and walks there as far as it is faced."""
+    numpy = bearing.__array_namespace__()
+    forward = numpy.cos(bearing).clip(0.0)
+    return numpy.stack([forward, 0.0 * forward, bearing.clip(-1.0, 1.0)], axis=-1)
+
+
+@dataclasses.dataclass(frozen=True)
+class ToGoal(Command):
+    """Straight to a goal, pillars or not, and when it is reached to the next one of a chain.
+
+    Lengths are multiples of the arena's unit R.
+    """
+
+    live: ClassVar[Mapping[str, int]] = {}
+    blocks: ClassVar[Mapping[str, int]] = {"goal": 3}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """The left-right map of the goal."""
+        return {"goal": Mirror.signed(1, -1, 1)}
+
+    def start(self, context: Context, random, schedule: Scheduled) -> Chain:
+        """Draw the chain of goals."""
+        goals = context.arena.unit * PITCH * draw_chain(random)
+        return Chain(goals, 0, np.False_, np.float64(0.0), np.zeros(2))
+
+    def begin(self, context: Context, memory: Chain, place) -> Chain:
+        """Return the memory with the first goal as seen from the place."""
+        return memory._replace(to_goal=_to_goal(memory.goals, memory.reached, place))
+
+    def desired(self, context: Context, memory: Chain, steps, place):
+        """Return the command: straight at the goal as far as the body faces it, and a turn to face it."""
+        goal, numpy = memory.to_goal, memory.goals.__array_namespace__()
+        return at_goal(numpy.arctan2(goal[..., 1], goal[..., 0]))
+
+    def follow(self, context: Context, memory: Chain, steps, before, place, motion) -> Followed:
+        """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
+        numpy, unit = place.__array_namespace__(), context.arena.unit
+        far = numpy.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])
+        goal = _to_goal(memory.goals, memory.reached, place)
+        near = numpy.hypot(goal[..., 0], goal[..., 1])
+        arrived = near <= NEAR * unit
+        toward = goal[..., 0] * motion[..., 0] + goal[..., 1] * motion[..., 1]
+        reached = memory.reached + arrived
+        memory = Chain(
+            goals=memory.goals,
+            reached=reached,
+            arrived=arrived,
+            gained=((far - near) / (context.units[0] * context.control_timestep)).clip(-1.0, 1.0),
+            to_goal=_to_goal(memory.goals, reached, place),
+        )
+        tracking = (toward / numpy.maximum(near, 1e-9 * unit)).clip(0.0, 1.0)
+        return Followed(memory, self.desired(context, memory, steps, place), tracking, arrived)
+
+    def terms(self, memory: Chain, upright) -> dict:
+        """Return the bonuses for progress to the goal and for reaching it."""
+        return {"progress": memory.gained * upright, "goal": memory.arrived * 1.0}
+
+    def observe(self, context: Context, memory: Chain) -> dict:
+        """Return cosine and sine of the goal's bearing, and its distance."""
+        goal, unit = memory.to_goal, context.arena.unit
+        numpy = goal.__array_namespace__()
+        apart = numpy.maximum(numpy.hypot(goal[..., 0], goal[..., 1]), 1e-9 * unit)[..., None]
+        return {"goal": numpy.concatenate([goal / apart, (apart / (FAR * unit)).clip(0.0, 1.0)], axis=-1)}
+
+    def progress(self, context: Context, memory: Chain, judged) -> dict:
+        """Return how many goals were reached."""
+        return {"goals": memory.reached * 1.0}
+
+    def markers(self, context: Context, memory: Chain) -> list[Marker]:
+        """Return the goal as the disc within which it is reached."""
+        unit = context.arena.unit
+        middle = np.array((*_goal(memory.goals, memory.reached), 0.0))
+        return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISC * unit), NEAR * unit, _GOAL)]
+
+
+def _goal(goals, reached):
+    """Where the present goal is (..., 2), m, after a number (...) of reached ones."""
+    numpy, end = goals.__array_namespace__(), GOALS - 1
+    number = end - abs(end - reached % (2 * end))
+    return numpy.take_along_axis(goals, numpy.asarray(number)[..., None, None], axis=-2)[..., 0, :]
+
+
+def _to_goal(goals, reached, place):
+    """Where the present goal is from the torso (..., 2), forward and left, m."""
+    return rotations.headed(_goal(goals, reached) - place[..., :2], place[..., 2])

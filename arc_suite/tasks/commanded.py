@@ -1,0 +1,348 @@
+"""Tasks in which a body follows a command of velocities, on some ground, in the prescribed gait.
+
+A task is put together of three frozen values: a command, a ground and a health. This module writes down
+once in which order they draw, remember, observe and earn. Nothing in it has a scale: lengths are told in
+standing heights h, speeds in the body's own target velocity or sqrt(g h), rates in sqrt(g / h), contact
+forces in the body's weight. Directions are the body's own, as the torso heads, so that an episode may
+start in any. What standing still would earn is gated by how well the command is followed.
+"""
+
+import functools
+import math
+from collections.abc import Mapping
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.arenas import Arena
+from arc_suite.markers import Marker
+from arc_suite.models.sizing import GRAVITY
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import clock, mirrors, paper, parameters, terms
+from arc_suite.tasks import readings as reading
+from arc_suite.tasks.clock import Clock
+from arc_suite.tasks.command import Command, draw_schedule
+from arc_suite.tasks.context import Context
+from arc_suite.tasks.contract import Inputs, Start, Task
+from arc_suite.tasks.ground import Ground, Level
+from arc_suite.tasks.health import Condition, Upright
+from arc_suite.tasks.mirrors import PLANAR, Mirror
+from arc_suite.tasks.parameters import Noise, Parameters
+from arc_suite.tasks.readings import Readings, component
+
+# Walk's weights of rates in SI units, as Queen has them in units of her own.
+RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
+
+_OVER = 0.5  # height of the command's arrows over the torso, h
+_GOING, _TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colours
+
+
+class Settings(NamedTuple):
+    """Settings of a task with a command.
+
+    Attributes:
+        parameters: of the gait, and the target velocity.
+        weights: signed weight of every term.
+        noise: of the start.
+        ground: the ground with its own settings.
+    """
+
+    parameters: Parameters
+    weights: dict[str, float]
+    noise: Noise
+    ground: Ground
+
+
+class Sensed(NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._fields, "heading", "touches")])):
+    """Readings with contact forces in the body's weight and as the torso heads.
+
+    Attributes:
+        heading: (...) yaw of the torso, rad.
+        touches: (...) whether the body touches an obstacle; None where there are none.
+    """
+
+    torso_height = Readings.torso_height
+
+
+class Core(NamedTuple):
+    """Memory that every task with a command has; velocities are (forward, left, turning) in `Context.units`.
+
+    Attributes:
+        steps: (...) control steps since the start.
+        tick: (...) of the gait's clock, which rests while the command says stop.
+        action: (..., joints) of the latest step, clipped to [-1, 1].
+        previous_action: (..., joints) of the step before; 0 before the first.
+        wrong_feet: (...) number of contact schedule errors in the latest step.
+        wrong_in_all: (...) sum of `wrong_feet` over the steps.
+        place: (..., 3) of the torso's frame at the latest reading: x and y, m, and yaw, rad.
+        motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
+        desired: (..., 3) velocity that the command asks for.
+        followed: (...) tracking of the latest step.
+        tracking: (...) sum of `followed` over the steps.
+    """
+
+    steps: int | np.ndarray
+    tick: int | np.ndarray
+    action: np.ndarray
+    previous_action: np.ndarray
+    wrong_feet: np.ndarray
+    wrong_in_all: np.ndarray
+    place: np.ndarray
+    motion: np.ndarray
+    desired: np.ndarray
+    followed: np.ndarray
+    tracking: np.ndarray
+
+
+class Memory(NamedTuple):
+    """Memory of an episode: what all tasks with a command have, and that of each of the three values."""
+
+    core: Core
+    command: Any
+    ground: Any
+    health: Condition
+
+
+class CommandTask(Task):
+    """Following a command.
+
+    Attributes:
+        command: what to follow.
+        ground: where, with the settings that a caller does not give.
+        health: when a body has fallen.
+        bonuses: positive weights.
+        yaw: half-width of the heading at the start, rad.
+    """
+
+    command: ClassVar[Command]
+    ground: ClassVar[Ground] = Level()
+    health: ClassVar[Upright] = Upright()
+    bonuses: ClassVar[Mapping[str, float]] = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
+    yaw: ClassVar[float] = math.pi
+
+    def __init_subclass__(cls, **kwargs):
+        super().__init_subclass__(**kwargs)
+        cls.own_arena, cls.commands = cls.ground.own_arena, cls.command.live
+
+    @classmethod
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
+        """Return the settings for a body, some of them overridden; see `parameters.values`."""
+        names, elsewhere = (*cls.ground.settings, *parameters.NAMES), () if cls.own_arena else ("arena",)
+        given = parameters.values(body, overrides, cls.name, names, elsewhere)
+        weights = {**cls.bonuses, **paper.COSTS, **given["weights"], **RATES}
+        return Settings(
+            parameters.parameters(body, given),
+            parameters.weights(weights, overrides.get("weights")),
+            parameters.noise(given),
+            cls.ground.with_settings(overrides),
+        )
+
+    @classmethod
+    def arena(cls, body: Body, settings: Settings) -> Arena:
+        """Return the arena of the ground."""
+        return settings.ground.arena(body, settings.parameters)
+
+    @functools.cached_property
+    def blocks(self) -> Mapping[str, int]:
+        """The paper's observation, the command with the motion that is to follow it, what command and ground add."""
+        return {**paper.blocks(self.scene.body), "command": 6, **self.command.blocks, **self.settings.ground.blocks}
+
+    @property
+    def mirrors(self) -> Mapping[str, Mirror]:
+        """The left-right maps of the blocks."""
+        command = {"command": mirrors.joined([PLANAR, PLANAR]), **self.command.mirrors}
+        return {**paper.symmetry(self.scene.body, self.parameters), **command, **self.settings.ground.mirrors}
+
+    @functools.cached_property
+    def parameters(self) -> Parameters:
+        """The prescribed gait."""
+        return self.settings.parameters
+
+    @functools.cached_property
+    def context(self) -> Context:
+        """Lengths and speeds of the body."""
+        return Context.of(self.scene, self.parameters.target_velocity, self.step_limit)
+
+    @functools.cached_property
+    def clock(self) -> Clock:
+        """The clock of the prescribed gait."""
+        p = self.parameters
+        return Clock.made(
+            p.gait_frequency, p.duty_factor, p.phase_offsets, self.scene.control_timestep, self.step_limit
+        )
+
+    def phase(self, memory: Memory):
+        """Return the phase (...) of the gait, rad."""
+        return self.clock.at(self.clock.phases, memory.core.tick)
+
+    def first(self) -> Any:
+        """Return the ground's stream state."""
+        return self.settings.ground.first()
+
+    def start(self, random: np.random.RandomState, stream: Any) -> Start:
+        """Draw the start, in this order: ground, state, yaw, schedule, obstacles, and what the command draws.
+
+        The schedule is drawn for every command, and used by `command.Schedule` alone.
+        """
+        context, ground = self.context, self.settings.ground
+        ground_memory, displacement = ground.place(context, random, stream)
+        qpos, qvel = paper.drawn_state(self.scene.standing, self.settings.noise, random)
+        qpos[:2] += displacement
+        qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
+        schedule = draw_schedule(random)
+        ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
+        command_memory = self.command.start(context, random, schedule)
+        still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
+        core = Core(0, 0, still, still, zero, zero, np.zeros(3), np.zeros(3), np.zeros(3), zero, zero)
+        return Start(qpos, qvel, Memory(core, command_memory, ground_memory, self.health.start()), obstacles)
+
+    def read(self, data) -> Sensed:
+        """Take the readings."""
+        layout, heading = self.scene.layout, rotations.yaw(data.qpos[..., 3:7])
+        forces = data.cfrc_ext[..., layout.parts, :] / self.context.force_unit
+        numpy, across = forces.__array_namespace__(), heading[..., None]
+        torque, force = (rotations.headed(forces[..., i : i + 2], across) for i in (0, 3))
+        forces = numpy.concatenate([torque, forces[..., 2:3], force, forces[..., 5:6]], axis=-1)
+        readings = reading.read(data, layout, self.scene.arena, forces)
+        return Sensed(*readings, heading, self.settings.ground.touches(data))
+
+    def clear_spawn(self, memory: Memory, readings: Sensed) -> np.ndarray:
+        """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
+        return self.cleared(readings)
+
+    def begin(self, memory: Memory, readings: Sensed) -> Memory:
+        """Remember where the torso is, and what the command asks for there."""
+        place = _place(readings)
+        command = self.command.begin(self.context, memory.command, place)
+        desired = self.command.desired(self.context, command, memory.core.steps, place)
+        return memory._replace(core=memory.core._replace(place=place, desired=desired), command=command)
+
+    def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
+        """Remember the action, which is applied as it is."""
+        core = memory.core._replace(action=action, previous_action=memory.core.action)
+        return memory._replace(core=core), Inputs(action)
+
+    def after(self, memory: Memory, readings: Sensed) -> Memory:
+        """Return the memory after a control step, in this order: gait, health, motion, command, ground."""
+        core, context, place = memory.core, self.context, _place(readings)
+        steps = core.steps + 1
+        going = core.desired.any(axis=-1)
+        tick = core.tick + going
+        stance = self.clock.at(self.clock.stance, tick) | ~going[..., None]  # all feet, while the command says stop
+        wrong_feet = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
+        health = self.health.after(context, readings)
+        motion = self._motion(core, place)
+        followed = self.command.follow(context, memory.command, steps, core.place, place, motion)
+        ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
+        core = Core(
+            steps=steps,
+            tick=tick,
+            action=core.action,
+            previous_action=core.previous_action,
+            wrong_feet=wrong_feet,
+            wrong_in_all=core.wrong_in_all + wrong_feet,
+            place=place,
+            motion=motion,
+            desired=followed.desired,
+            followed=followed.tracking,
+            tracking=core.tracking + followed.tracking,
+        )
+        return Memory(core, followed.memory, ground, health)
+
+    def _motion(self, core: Core, place):
+        """The mean velocity (..., 3), of steps in the frame of the heading at their start."""
+        context, numpy = self.context, place.__array_namespace__()
+        step, moved = context.control_timestep, place - core.place
+        turn = rotations.wrapped(moved[..., 2])
+        moved = numpy.concatenate([rotations.headed(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1)
+        leak = min(self.parameters.gait_frequency * step, 1.0)
+        return (1.0 - leak) * core.motion + leak * moved / (step * context.units)
+
+    def commanded(self, memory: Memory, name: str, value) -> Memory:
+        """Return the memory with a live command."""
+        command = self.command.commanded(memory.command, name, value)
+        desired = self.command.desired(self.context, command, memory.core.steps, memory.core.place)
+        return memory._replace(core=memory.core._replace(desired=desired), command=command)
+
+    def terms(self, memory: Memory, readings: Sensed) -> dict:
+        """Return the paper's costs without scale, and bonuses for following the command in the prescribed gait."""
+        core, height, feet = memory.core, self.context.height, len(self.parameters.phase_offsets)
+        costs = terms.costs(
+            readings, core.action, core.previous_action, core.wrong_feet, self.parameters.default_angles
+        )
+        found = {
+            **costs,
+            "angular_velocity": costs["angular_velocity"] * (height / GRAVITY),
+            "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
+            "tracking": core.followed,
+            "obedient_gait": core.followed * (1.0 - core.wrong_feet / feet),
+            **self.health.terms(memory.health),
+            **self.command.terms(memory.command, memory.health.upright),
+        }
+        return {name: found[name] for name in self.settings.weights}
+
+    def observe(self, memory: Memory, readings: Sensed) -> dict:
+        """Return the blocks as the torso heads, without a clock at a stop and without negative zeros."""
+        core, context, heading = memory.core, self.context, readings.heading
+        numpy, posture, velocities = core.motion.__array_namespace__(), readings.posture, readings.velocities
+        quaternion = rotations.turned(readings.torso_quaternion, -heading)
+        velocity = rotations.headed(velocities[..., :2], heading)
+        circle = self.clock.at(self.clock.circle, core.tick)
+        observed = {
+            "posture": numpy.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
+            "velocities": numpy.concatenate([velocity, velocities[..., 2:]], axis=-1),
+            "contact_forces": readings.contact_forces,
+            "gait_clock": circle * core.desired.any(axis=-1)[..., None],
+            "command": numpy.concatenate([core.desired, core.motion], axis=-1),
+            **self.command.observe(context, memory.command),
+            **self.settings.ground.observe(context, memory.ground, core.place, readings),
+        }
+        return {name: block + 0.0 for name, block in observed.items()}
+
+    def ended(self, memory: Memory, readings: Sensed) -> tuple:
+        """Terminate where the body fell; the ground may end the episode, too."""
+        return self.settings.ground.ended(memory.ground, memory.health.fell)
+
+    def progress(self, memory: Memory) -> dict:
+        """Return the mean `tracking`, whether the body `fell`, `gait_compliance`, and what command and ground add."""
+        core = memory.core
+        steps = core.steps + (core.steps == 0)
+        return {
+            **self.command.progress(self.context, memory.command, self.judged(memory)),
+            "tracking": core.tracking / steps,
+            **self.health.progress(memory.health),
+            "gait_compliance": clock.compliance(core.wrong_in_all, steps, len(self.parameters.phase_offsets)),
+            **self.settings.ground.progress(memory.ground),
+        }
+
+    def judged(self, memory: Memory):
+        """Return the steps (...) over which an episode is judged: a full episode once it is over, else those so far."""
+        steps, (terminated, truncated) = memory.core.steps, self.ended(memory, None)
+        numpy = memory.core.place.__array_namespace__()
+        return numpy.where(terminated | truncated, self.context.steps, steps + (steps == 0))
+
+    def stream_state(self, memory: Memory) -> Any:
+        """Return the stream state of the ground, by the outcome of the episode."""
+        outcome = self.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
+        return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
+
+    def markers(self, memory: Memory, readings: Sensed) -> list[Marker]:
+        """Return arrows over the torso: the desired velocity, and the sideways velocity of a point R ahead.
+
+        The latter shows turning. At the target velocity an arrow is R long.
+        """
+        unit, (x, y, heading) = self.context.reach, memory.core.place
+        forward, left, turn = (unit * share for share in memory.core.desired)
+        middle = np.array((x, y, readings.torso_position[2] + _OVER * self.context.height))
+        ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
+        aside = np.array((-ahead[1], ahead[0], 0.0))
+        arrows = (middle, forward * ahead + left * aside, _GOING), (middle + unit * ahead, turn * aside, _TURNING)
+        arrows = [Marker("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
+        base = Marker("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, _GOING)
+        return [base, *arrows, *self.command.markers(self.context, memory.command)]
+
+
+def _place(readings: Sensed):
+    numpy, frame = readings.posture.__array_namespace__(), readings.frame_position
+    return numpy.stack([component(frame, 0), component(frame, 1), readings.heading], axis=-1)

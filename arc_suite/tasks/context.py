@@ -1,0 +1,48 @@
+"""Lengths and speeds of a body, in whose multiples tasks with a command are defined."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.arenas import Arena
+from arc_suite.models.sizing import GRAVITY
+from arc_suite.models.standing import standing
+from arc_suite.tasks.contract import STEPS
+from arc_suite.tasks.fitting import velocity_units
+
+
+class Context(NamedTuple):
+    """What the command, the ground and the health of a task are fitted to.
+
+    Attributes:
+        arena: where the task takes place.
+        height: h, the standing height, m.
+        reach: R, the mean distance of the feet from their centre, m.
+        units: (3,) of commands: the target velocity, twice, m/s, and rad/s at which feet move as fast when turning.
+        force_unit: (6,) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
+        control_timestep: s.
+        steps: control steps over which an episode is judged.
+    """
+
+    arena: Arena
+    height: float
+    reach: float
+    units: np.ndarray
+    force_unit: np.ndarray
+    control_timestep: float
+    steps: int
+
+    @classmethod
+    def of(cls, scene, target_velocity: float, step_limit: float) -> "Context":
+        """Return the context of a task in a `contract.Scene`."""
+        body, pose = scene.body, standing(scene.body)
+        units = velocity_units(body, target_velocity)
+        return cls(
+            arena=scene.arena,
+            height=body.torso.standing_height,
+            reach=units[0] / units[2],
+            units=units,
+            force_unit=pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3),
+            control_timestep=scene.control_timestep,
+            steps=int(min(step_limit, STEPS)),
+        )

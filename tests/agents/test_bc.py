@@ -1,0 +1,57 @@
+"""Behaviour cloning: it acts as its dataset does, goes on to the same bits, and refuses what does not fit."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+
+from conftest import SHORT, learning
+
+from arc_suite import data
+from arc_suite.envs.setup import Setup
+from arc_suite.policies.network import forward
+
+
+@pytest.fixture
+def begun(tmp_path):
+    """A function that begins to learn from a dataset, or none."""
+
+    def begin(prior, **context):
+        setup = Setup.of("tick", "walk", SHORT)
+        return learning("bc", {"hidden": 32, "batch": 64}, tmp_path / "run", setup, 1000, 1000, prior=prior, **context)
+
+    return begin
+
+
+def test_it_learns_the_actions_of_its_dataset(begun, prior):
+    agent = begun(prior)
+    errors = [agent.advance().metrics["error"] for _ in range(2)]
+    assert agent.latest.step == 1000
+    assert errors[1] < 0.5 * errors[0]
+    episodes = list(data.open(prior))
+    observations = np.concatenate([episode.observations[:-1] for episode in episodes])
+    actions = np.concatenate([episode.actions for episode in episodes])
+    learned = forward(agent.latest.policy, observations)
+    # Most of it; the demonstrator starts by a clock that the network does not see.
+    assert ((learned - actions) ** 2).mean() < 0.3 * actions.var()
+    # The normaliser has the moments of the whole dataset.
+    mean, factor, _ = agent.latest.policy[0].arrays
+    np.testing.assert_allclose(mean, observations.mean(axis=0), atol=1e-5)
+    moving = observations.std(axis=0) > 1e-3
+    np.testing.assert_allclose(1.0 / factor[moving], observations.std(axis=0)[moving], rtol=1e-3)
+
+
+def test_it_resumes_bit_exactly(begun, prior):
+    whole = begun(prior)
+    half = whole.advance()
+    resumed = begun(prior, checkpoint=half.checkpoint).advance()
+    last = whole.advance()
+    assert (half.step, last.step, resumed.step) == (500, 1000, 1000)
+    assert last.metrics == resumed.metrics
+    for name, array in last.checkpoint.items():
+        assert array.tobytes() == resumed.checkpoint[name].tobytes(), name
+
+
+def test_without_a_dataset_it_says_what_it_takes(begun):
+    with pytest.raises(ValueError, match=r"^prior: the algorithm takes prior data, the id of a dataset, got None$"):
+        begun(None).advance()

@@ -1,0 +1,191 @@
+"""Looks: they show, and they change nothing."""
+
+import mujoco
+import numpy as np
+import pytest
+from tiers import tiers
+
+import arc_suite
+from arc_suite import models
+from arc_suite.models import visuals
+from arc_suite.policies import policy
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import Solid
+
+# A body that has no visuals of its own: Tick's legs, four of them askew, under a lying capsule.
+_TICK = ROBOTS["tick"]
+STRANGER = _TICK.replace(
+    name="stranger",
+    torso=_TICK.torso.replace(
+        solids=(Solid(name="tube", shape="capsule", size=(0.06, 0.1), euler_deg=(0.0, 90.0, 20.0)),)
+    ),
+    legs=tuple(leg for leg in _TICK.legs if leg.name != "r2"),
+)
+BODIES = [*ROBOTS.values(), STRANGER]
+# What may differ on bodies and joints: where their geoms are listed, and a length scale that only sleeping reads.
+LAYOUT = {"body_geomnum", "body_geomadr", "body_bvhadr", "body_bvhnum", "dof_length"}
+FEW = ("bastion", "stranger")  # in `make check`
+every_body = pytest.mark.parametrize("body", tiers(BODIES, lambda body: body.name in FEW), ids=lambda body: body.name)
+every_robot = pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot in FEW))
+
+
+def compiled(body, decorated):
+    return mujoco.MjModel.from_xml_string(models.assemble(body, decorated=decorated).to_xml_string())
+
+
+@every_body
+def test_visuals_keep_every_array_of_the_dynamics(body):
+    plain, shown = compiled(body, False), compiled(body, True)
+    names = [name for name in dir(plain) if name.startswith(("body_", "jnt_", "dof_", "actuator_", "sensor_", "qpos"))]
+    for name in set(names) - LAYOUT:
+        if isinstance(getattr(plain, name), np.ndarray):
+            np.testing.assert_array_equal(getattr(shown, name), getattr(plain, name), err_msg=name)
+    same = [shown.geom(plain.geom(i).name).id for i in range(plain.ngeom)]
+    for name in ("type", "contype", "conaffinity", "condim", "friction", "margin", "size", "pos", "quat", "bodyid"):
+        np.testing.assert_array_equal(getattr(shown, f"geom_{name}")[same], getattr(plain, f"geom_{name}"), name)
+    added = sorted(set(range(shown.ngeom)) - set(same))
+    assert added
+    assert not shown.geom_contype[added].any()
+    assert not shown.geom_conaffinity[added].any()
+    assert set(shown.geom_group[added]) == {visuals.GROUP}
+    assert visuals.GROUP not in shown.geom_group[same]
+
+
+@every_body
+def test_visuals_keep_a_rollout_bit_for_bit(body):
+    states = []
+    for decorated in (False, True):
+        model = compiled(body, decorated)
+        data = mujoco.MjData(model)
+        random = np.random.default_rng(0)
+        states.append([])
+        for _ in range(50):
+            data.ctrl = random.uniform(-1.0, 1.0, model.nu)
+            mujoco.mj_step(model, data, 25)
+            states[-1].append(np.concatenate([data.qpos, data.qvel, data.cfrc_ext.ravel(), data.sensordata]))
+    assert len(np.unique(states[0], axis=0)) == 50
+    np.testing.assert_array_equal(*states)
+
+
+@every_body
+def test_everything_that_visuals_add_is_named(body):
+    model = compiled(body, True)
+    for kind, count in (("geom", "ngeom"), ("light", "nlight"), ("camera", "ncam"), ("mat", "nmat"), ("tex", "ntex")):
+        assert all(getattr(model, kind)(i).name for i in range(getattr(model, count))), kind
+    assert (model.geom_matid >= 0).all()
+    assert (model.geom_matid == model.mat("glow").id).any()
+
+
+def test_ornaments_of_a_pair_mirror_each_other():
+    model = compiled(ROBOTS["queen"], True)
+    left, right = model.geom("visual-vent"), model.geom("visual-vent_right")
+    np.testing.assert_allclose(right.pos, left.pos * (1, -1, 1), rtol=1e-12)
+    turn = [np.empty(9), np.empty(9)]
+    for geom, matrix in zip((left, right), turn, strict=True):
+        mujoco.mju_quat2Mat(matrix, geom.quat)
+    reflection = np.diag((1.0, -1.0, 1.0))
+    np.testing.assert_allclose(turn[1].reshape(3, 3), reflection @ turn[0].reshape(3, 3) @ reflection, atol=1e-12)
+
+
+@every_body
+@pytest.mark.parametrize("camera", ["portrait", pytest.param("profile", marks=pytest.mark.slow)])
+def test_near_cameras_frame_the_standing_body(body, camera):
+    """Seen by segmentation, the body touches no edge of a 4:3 picture, yet fills most of its width or height."""
+    environment = arc_suite.simulation.physics.Physics.from_body(body)
+    environment.forward()
+    kinds = environment.render(120, 160, camera, segmentation=True)
+    model = environment.decorated().model
+    geoms = [model.geom(i).name for i in range(model.ngeom)]
+    seen = (kinds[..., 1] == mujoco.mjtObj.mjOBJ_GEOM) & (kinds[..., 0] != geoms.index("floor"))
+    rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
+    assert min(rows[0], columns[0], 119 - rows[-1], 159 - columns[-1]) > 0
+    assert max(np.ptp(rows) / 120, np.ptp(columns) / 160) > 0.65
+    environment.free()
+
+
+@every_robot
+def test_pictures_show_something_and_differ_by_camera(robot):
+    environment = arc_suite.load(robot, "walk", {"random": 0})
+    environment.reset()
+    pictures = [environment.physics.render(90, 120, camera) for camera in ("tracking", "portrait", "profile")]
+    for i, picture in enumerate(pictures):
+        assert picture.shape == (90, 120, 3)
+        assert picture.dtype == np.uint8
+        assert picture.std() > 10.0
+        assert (picture == 255).mean() < 0.02  # hardly anything is over-exposed
+        assert not any(np.array_equal(picture, other) for other in pictures[:i])
+    environment.close()
+
+
+@pytest.mark.slow
+def test_pictures_follow_the_simulation_and_leave_it_alone():
+    environment, other = (arc_suite.load("queen", "walk", {"random": 0}) for _ in range(2))
+    act = policy("cpg", "queen")
+    step = environment.reset(), other.reset()
+    pictures = []
+    for _ in range(5):
+        action = act(step[0])
+        step = environment.step(action), other.step(action)
+        pictures.append(environment.physics.render(60, 80, "profile"))
+    assert all((a != b).any() for a, b in zip(pictures, pictures[1:], strict=False))
+    np.testing.assert_array_equal(environment.physics.data.qpos, other.physics.data.qpos)
+    np.testing.assert_array_equal(environment.physics.data.cfrc_ext, other.physics.data.cfrc_ext)
+    environment.close()
+
+
+@pytest.mark.slow
+def test_the_largest_picture_is_at_least_1280_by_960():
+    environment = arc_suite.load("leaper", "walk")
+    environment.reset()
+    assert environment.physics.render(960, 1280, "portrait").shape == (960, 1280, 3)
+    environment.close()
+
+
+@pytest.mark.parametrize(
+    ("camera", "message"),
+    [
+        ("portait", "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)"),
+        (3, "no camera 3: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
+    ],
+)
+def test_unknown_cameras_are_named(camera, message):
+    environment = arc_suite.load("tick", "walk")
+    with pytest.raises(ValueError) as error:
+        environment.physics.render(60, 80, camera)
+    assert str(error.value) == message
+
+
+def glow_in(physics) -> np.ndarray:
+    return physics.decorated().model.mat("glow").rgba.copy()
+
+
+@pytest.mark.slow
+@every_robot
+def test_visualize_reward_colours_the_glow(robot):
+    plain = arc_suite.load(robot, "walk", {"random": 0})
+    shown = arc_suite.load(robot, "walk", {"random": 0}, visualize_reward=True)
+    for environment in (plain, shown):
+        environment.reset()
+    own = compiled(ROBOTS[robot], True).mat("glow").rgba
+    np.testing.assert_array_equal(glow_in(plain.physics), own)
+    np.testing.assert_array_equal(glow_in(shown.physics), own)
+    action = np.zeros(plain.action_spec().shape)
+    reward = plain.step(action).reward
+    assert shown.step(action).reward == reward
+    np.testing.assert_array_equal(glow_in(plain.physics), own)
+    np.testing.assert_allclose(glow_in(shown.physics), visuals.reward_colour(reward / 4.0), rtol=1e-6)
+    before, after = (environment.physics.render(90, 120, "profile") for environment in (plain, shown))
+    assert (before != after).any()
+    shown.reset()
+    np.testing.assert_array_equal(glow_in(shown.physics), own)
+    for environment in (plain, shown):
+        environment.close()
+
+
+def test_reward_colours_go_from_red_to_green():
+    red, middle, green = (visuals.reward_colour(share) for share in (0.0, 0.5, 1.0))
+    assert red[0] > 5 * red[1]
+    assert green[1] > 5 * green[0]
+    np.testing.assert_allclose(middle, (red + green) / 2.0)
+    np.testing.assert_array_equal(visuals.reward_colour(-3.0), red)
+    np.testing.assert_array_equal(visuals.reward_colour(7.0), green)

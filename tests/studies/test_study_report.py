@@ -1,0 +1,203 @@
+"""Reports of studies: every number comes from published tables, and says what it should."""
+
+import pathlib
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from arc_suite import evaluation
+from arc_suite.agents import configuration
+from arc_suite.evaluation.protocol import EXPERT_RETURNS
+from arc_suite.studies import report, results, tables
+from arc_suite.studies.report import PAPER
+from arc_suite.studies.tables import Study, run
+
+METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
+STEPS = (1000, 2000)
+
+
+def publish(folder, each, returns, style=0.1):
+    """Tables of a run: returns are (evaluations, episodes)."""
+    path = folder / each.name
+    path.mkdir(parents=True)
+    lines = ["step,seed,return,length,speed,gait_compliance"]
+    for step, episodes in zip(STEPS, returns, strict=True):
+        lines += [f"{step},{seed},{total!r},1000,0.3,0.9" for seed, total in enumerate(np.asarray(episodes).tolist())]
+    (path / "evaluations.csv").write_text("\n".join(lines) + "\n")
+    (path / "times.csv").write_text("step,wall_seconds,cpu_seconds\n1000,90.0,60.0\n2000,200.0,180.0\n")
+    lines = [f"step,seed,{','.join(METRICS)}", *(f"2000,{seed}" + f",{style}" * 6 for seed in range(10))]
+    (path / "style.csv").write_text("\n".join(lines) + "\n")
+
+
+def constant(*levels):
+    return [np.full(10, level) + np.arange(10) for level in levels]
+
+
+@pytest.fixture
+def made(tmp_path):
+    """A study as the paper's table of finals would have it, two seeds of everything, and its folder."""
+    keys = [(robot, name, seed) for robot in PAPER for name in PAPER[robot] for seed in (0, 1)]
+    runs = tuple(run(robot, name, 2000, seed) for robot, name, seed in keys)
+    for each, (robot, name, seed) in zip(runs, keys, strict=True):
+        start, style = 100.0 if name in report.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
+        publish(tmp_path / "mine", each, constant(start, float(PAPER[robot][name]) + seed), style)
+    text = "place,preset,seed,return\n" + "".join(f"queen, walk,medium,{s},2048.0\n" for s in range(10))
+    (tmp_path / "mine" / "demonstrators.csv").write_text(text.replace("queen, walk", '"queen, walk"'))
+    return Study("as in the paper", runs), tmp_path / "mine"
+
+
+def cells(page, *starts):
+    """Of the first line of a table that begins so."""
+    for line in page.splitlines():
+        found = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("|") and found[: len(starts)] == list(starts):
+            return found
+    raise AssertionError(starts)
+
+
+@pytest.mark.slow
+def test_report(made):
+    study, folder = made
+    page = report.write("mine", study, folder).read_text()
+    assert (folder / "curves.png").stat().st_size > 10_000
+    assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0"]
+    # 3610 and 3611, each with 0 to 9 on top
+    assert cells(page, "tick, walk", "sope", "2,000")[3:] == ["2", "3615.0 +- 0.5", "3615.0 [3614.5, 3615.5]", "3610"]
+    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "2048.0 [2048.0, 2048.0]", "2048"]
+    assert cells(page, "tick, walk", "sac", "2,000", "3.0") == [
+        *("tick, walk", "sac", "2,000", "3.0", "-", "-"),
+        f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}",
+    ]
+    assert cells(page, "bastion, walk", "sac", "0.500")[2:] == ["0.500"] * 6
+    assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
+    assert "As in the paper.\n" in page
+    more = study._replace(runs=(*study.runs, run("tick", "sac", 2000, seed=2)))
+    assert "As in the paper. Begun: 48 of 49 runs.\n" in report.write("more", more, folder).read_text()
+
+
+@pytest.mark.slow
+def test_claims(made):
+    """On the paper's own finals each sentence comes out as in its table; one does not hold there."""
+    study, folder = made
+    page = report.write("mine", study, folder).read_text()
+    held = {claim.text: cells(page, claim.text)[1:] for claim in report.CLAIMS}
+    for claim in report.CLAIMS:
+        paper, there, ours, here = held[claim.text]
+        if claim.in_paper:
+            assert there == here
+            assert re.findall(r"\w+ [+-]", paper) == re.findall(r"\w+ [+-]", ours)
+        else:
+            assert (paper, there) == ("-", "not measured")
+    assert [held[claim.text][3] for claim in report.CLAIMS] == [
+        *("4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "3 of 4 robots"),
+        *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
+    ]
+    assert "queen -300" in held["with prior data all end higher than without"][0]
+    least = min(PAPER["queen"][name] for name in report.ONLINE) - EXPERT_RETURNS["queen"]
+    assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
+
+
+@pytest.mark.slow
+def test_commands_name_the_folder_of_the_runs(made):
+    """In which no colon stands."""
+    study, folder = made
+    (folder / study.runs[0].name / "strip.png").write_bytes(b"")
+    page = report.write("my_studies:MINE", study, folder).read_text()
+    assert f"--policy=runs/my_studies.MINE/{study.runs[0].name} " in page
+
+
+@pytest.mark.slow
+def test_phases_are_told_where_they_are_published(made):
+    study, folder = made
+    assert "## Phases" not in report.write("mine", study, folder).read_text()
+    for each, lengths in zip(study.runs, ((300, 700), (1100,)), strict=False):
+        lines = ["step,updates", *(f"{10_000 * place},{updates}" for place, updates in enumerate(lengths, 1))]
+        (folder / each.name / "phases.csv").write_text("\n".join(lines) + "\n")
+    page = report.write("mine", study, folder).read_text()
+    first = study.runs[0]
+    assert cells(page, first.place, first.kind, "3") == [first.place, first.kind, "3", "700", "300", "1,100"]
+
+
+@pytest.mark.slow
+def test_claims_need_what_they_compare(made):
+    """Short phases are told by the study's title; other tasks and missing algorithms are not compared."""
+    study, folder = made
+    few = study._replace(runs=tuple(each for each in study.runs if each.kind == "sac"))
+    page = report.write("few", few, folder).read_text()
+    assert cells(page, report.CLAIMS[0].text)[3:] == ["-", "not measured"]
+    found = results.results(few.runs, folder)
+    assert report._is_papers(found[0])
+    usual = {"robot": "tick", "algorithm": "sac", "steps": 2000}
+    for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
+        assert not report._is_papers(found[0]._replace(run=run(**usual | other)))
+
+
+def test_unfinished_evaluations_do_not_count(tmp_path):
+    each = run("tick", "sac", 5000)
+    publish(tmp_path, each, constant(100.0, 200.0))
+    with (tmp_path / each.name / "evaluations.csv").open("a") as file:
+        file.write("3000,0,900.0,1000,0.3,0.9\n")
+    (result,) = results.results([each], tmp_path)
+    assert result.steps.tolist() == [1000, 2000]
+    assert result.final == 204.5
+    assert result.progress["speed"].shape == (10,)
+
+
+def test_runs_are_compared_where_both_have_been(tmp_path):
+    """At the latest step that all have reached."""
+    long, short = run("tick", "sac", 2000), run("tick", "speq", 2000)
+    publish(tmp_path, long, constant(100.0, 900.0))
+    publish(tmp_path, short, constant(500.0, 600.0))
+    path = tmp_path / short.name / "evaluations.csv"
+    path.write_text("\n".join(path.read_text().splitlines()[:11]) + "\n")
+    groups = results.grouped(results.results([long, short], tmp_path))
+    probability, interval = results.improvement(groups, "speq", "sac")
+    assert probability == 1.0 and interval == (1.0, 1.0)
+    assert results.improvement(groups, "speq", "sope") is None
+
+
+def test_until(tmp_path):
+    runs = run("tick", "sac", 2000), run("tick", "sac", 2000, 1)
+    publish(tmp_path, runs[0], constant(100.0, 900.0))
+    publish(tmp_path, runs[1], constant(500.0, 600.0))
+    found = results.results(runs, tmp_path)
+    assert results.until(found, 500.0) == (1500.0, 120.0)
+    assert results.until(found, 700.0) == (np.inf, np.inf)
+
+
+def test_nothing_published_is_one_line(tmp_path):
+    with pytest.raises(ValueError, match=r"none: holds no results of the study mine$"):
+        report.write("mine", Study("none", (run("tick", "sac", 10),)), tmp_path / "none")
+
+
+COMMITTED = pathlib.Path(__file__).parents[2] / "studies"
+
+
+@pytest.mark.parametrize("path", sorted(COMMITTED.glob("*/*/config.json")), ids=lambda path: path.parent.name)
+def test_committed_configurations_are_those_of_the_studies(path):
+    """Today's code reads each, and trains the same run."""
+    study = tables.study(path.parts[-3])
+    (each,) = (each for each in study.runs if each.name == path.parts[-2])
+    assert configuration.read(path) == each.configuration
+
+
+@pytest.mark.slow
+def test_committed_reports_are_made_of_committed_tables(tmp_path):
+    """By the one command, and nobody has changed a number."""
+    committed = COMMITTED
+    shutil.copytree(committed, tmp_path / "studies")
+    names = [name for name in tables.STUDIES if (committed / name).exists()]
+    assert len(names) == 6 and len(list(committed.glob("*/*/config.json"))) == 61
+    for name in names:
+        report.write(name, tables.study(name), tmp_path / "studies" / name)
+    for path in (*(f"{name}/README.md" for name in names), "README.md"):
+        assert (tmp_path / "studies" / path).read_text() == (committed / path).read_text(), path
+
+
+def test_the_papers_table_has_every_robot_and_algorithm():
+    assert PAPER.keys() == EXPERT_RETURNS.keys()
+    for finals in PAPER.values():
+        assert set(finals) == {*report.ONLINE, *report.WITH_PRIOR}
+    assert evaluation.EPISODES == 10

@@ -1,0 +1,86 @@
+"""Every setting of every task changes something, and a task refuses those of others under its own name."""
+
+import numpy as np
+import pytest
+from tiers import tiers
+
+import arc_suite
+from arc_suite.tasks import TASKS, parameters, walk
+from arc_suite.tasks.commanded import CommandTask
+from arc_suite.tasks.contract import Task
+from arc_suite.tasks.modified import Modified
+
+# Another value of every setting.
+OTHER = {
+    "target_velocity": 0.2,
+    "velocity_band": 2.0,
+    "gait_frequency": 1.1,
+    "duty_factor": 0.8,
+    "phase_offsets": 1.0,
+    "stance_threshold": 0.02,
+    "default_angles": 0.3,
+    "healthy_range": (0.175, 0.5),
+    "weights": {"control": -0.5},
+    "gait": "wave",
+    "difficulty": 0.1,
+    "curriculum": True,
+    "level": 5,
+    "terrain_seed": 3,
+    **dict.fromkeys((*parameters.SHARED_NOISE, *parameters.Noise._fields), 0.05),
+}
+WITH = {"level": {"curriculum": True}}
+
+
+def names(task):
+    """The settings that a task has, without those of every task."""
+    own = TASKS[task]
+    return (*own.ground.settings, *parameters.NAMES) if issubclass(own, CommandTask) else walk.NAMES
+
+
+PAIRS = [(task, name) for task in ("walk", "steer", "rough", "navigate") for name in names(task)]
+
+
+def told(task, settings):
+    """Everything that a task tells of 40 steps of random actions."""
+    environment = arc_suite.load("tick", task, {"random": 5, **settings})
+    random, timestep = np.random.RandomState(2), environment.reset()
+    found = [np.concatenate(list(timestep.observation.values()))]
+    for _ in range(40):
+        if timestep.last():
+            break
+        timestep = environment.step(random.uniform(-1.0, 1.0, 18))
+        found += [np.concatenate(list(timestep.observation.values())), np.array([timestep.reward, timestep.discount])]
+    return np.concatenate(found)
+
+
+@pytest.mark.parametrize(("task", "name"), tiers(PAIRS, lambda task, name: task == "rough"))
+def test_every_setting_changes_something(task, name):
+    given = WITH.get(name, {})
+    plain, changed = told(task, given), told(task, given | {name: OTHER[name]})
+    assert plain.shape != changed.shape or not np.array_equal(plain, changed)
+
+
+def test_tasks_that_differ_in_data_alone_have_the_same_settings():
+    assert {task: names(task) for task in TASKS if task in ("shoved", "limp")} == dict.fromkeys(
+        ("shoved", "limp"), names("steer")
+    )
+    assert {names(task) for task in ("slopes", "stairs", "gaps", "course", "roam")} == {names("rough")}
+
+
+@pytest.mark.parametrize("task", [name for name in TASKS if name != "walk"])
+def test_settings_of_walk_alone_are_refused_elsewhere(task):
+    for name in ("velocity_band", "healthy_range"):
+        with pytest.raises(ValueError, match=f"^unknown setting of {task} '{name}'") as error:
+            arc_suite.load("tick", task, {name: OTHER[name]})
+        assert "\n" not in str(error.value)
+
+
+# Members of the contract that follow from others, or that only the task itself is asked for before it is wrapped.
+DERIVED = {"symmetry", "size", "vector", "named", "split", "lifted", "arena", "own_arena", "modifiers", "step_limit"}
+FIELDS = {"scene", "settings"}
+
+
+def test_a_modified_task_has_every_member_of_the_contract():
+    members = {name for name in (*vars(Task), *Task.__annotations__) if not name.startswith("_")}
+    forgotten = members - DERIVED - FIELDS - vars(Modified).keys()
+    assert forgotten == set()
