@@ -15,6 +15,10 @@ from arc_suite.tasks import TASKS, Task
 MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
 
+class NotImported(ValueError):
+    """A file names a module that has not been imported; one line."""
+
+
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
     """Return the names of the tasks by name of the robot, as they are now."""
     return {domain: tuple(TASKS) for domain in ROBOTS}
@@ -78,11 +82,11 @@ def imported(kind: str, name: str) -> str:
     Files are data: their names are looked up among the registered ones, and only callers choose what to import.
 
     Raises:
-        ValueError: the name's module has not been imported yet; one line that names it.
+        NotImported: the name's module has not been imported yet; one line that names it.
     """
     module, colon, _ = name.rpartition(":")
     if colon and module not in sys.modules:
-        raise ValueError(f"{kind} {name[:80]!r}: files import nothing; import {module[:80]!r} first")
+        raise NotImported(f"{kind} {name[:80]!r}: files import nothing; import {module[:80]!r} first")
     return name
 
 

@@ -63,7 +63,7 @@ def main() -> None:
             reports[robot] = report(episodes, experts[robot])
             print(row(robot.ljust(width), reports[robot]), flush=True)
         file.update(
-            task=setup.kind.name,
+            task=setup.task,
             task_kwargs=setup.task_kwargs,
             policy=FLAGS.policy,
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,

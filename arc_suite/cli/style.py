@@ -201,7 +201,7 @@ def main() -> None:
             played.update(firsts)
         setup = next(iter(chosen_for.values()))
         file.update(
-            task=setup.kind.name,
+            task=setup.task,
             task_kwargs=setup.task_kwargs,
             episodes=FLAGS.episodes,
             seed=FLAGS.seed,

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, files
+from arc_suite import checks, files, registry
 from arc_suite.envs.setup import Setup
 
 EXTENSION = ".npz"
@@ -173,6 +173,8 @@ def load(path: str | os.PathLike) -> Network:
         return network
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
+    except registry.NotImported as error:
+        raise ValueError(f"policy {path}: {error}") from None
     except _DAMAGES as error:
         raise ValueError(f"{path}: no policy, or a damaged one: {checks.quoted(error)}") from None
 

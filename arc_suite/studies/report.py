@@ -10,6 +10,7 @@ import numpy as np
 
 from arc_suite import checks, evaluation, files
 from arc_suite.agents import run_folder
+from arc_suite.envs.setup import Setup
 from arc_suite.studies import results, tables
 from arc_suite.studies.results import STRIP, Result
 from arc_suite.studies.tables import Run, Study

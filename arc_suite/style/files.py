@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, versions
+from arc_suite import checks, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
@@ -92,6 +92,8 @@ def load(path: str | os.PathLike) -> list[Track]:
                 if any(_names(track) != _names(tracks[0]) for track in tracks):
                     raise ValueError("expected the same progress and gait in all tracks")
                 return tracks
+        except registry.NotImported as error:
+            raise ValueError(f"{path}: {error}") from None
         except Exception as error:  # a damaged archive may raise anything
             raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")

@@ -140,7 +140,10 @@ def test_damaged_files(saved, kept):
         ({"blocks": {"posture": 3}}, "broadcast"),
         ({"blocks": 3}, "blocks: expected a mapping"),
         ({"robot": None}, "expected robot to be a str"),
-        ({"task": "strolling:stroll"}, "import 'strolling' first$"),
+        (
+            {"task": "strolling:stroll"},
+            r"npz: task 'strolling:stroll': files import nothing; import 'strolling' first$",
+        ),
     ],
 )
 def test_files_made_in_bad_faith(saved, change, line):
