@@ -16,12 +16,13 @@ with versions.explained():
     from arc_suite import registration, registry
     from arc_suite.envs.dm import load
     from arc_suite.envs.prepare import symmetry
+    from arc_suite.envs.setup import Setup
     from arc_suite.registration import register
 
     registration.register_ids()
 
 __version__ = "0.1.0"
-__all__ = ["ALL_TASKS", "TASKS_BY_DOMAIN", "load", "register", "symmetry"]
+__all__ = ["ALL_TASKS", "Setup", "TASKS_BY_DOMAIN", "load", "register", "symmetry"]
 
 
 def __getattr__(name):

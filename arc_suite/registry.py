@@ -1,4 +1,4 @@
-"""Names of what there is: robots, tasks and arenas, those of other packages among them."""
+"""Tables of names: robots, tasks and arenas, including those of other packages."""
 
 import importlib
 import os
@@ -26,7 +26,7 @@ def all_tasks() -> tuple[tuple[str, str], ...]:
 
 
 def body_of(domain) -> Body:
-    """Return the body that a domain stands for.
+    """Return the body of a domain.
 
     Args:
         domain: name of a robot, path of a file that holds a body (a `Path`, or a string that ends
@@ -75,8 +75,7 @@ def arena_maker(name: str) -> Callable[[Body], Arena]:
 def imported(kind: str, name: str) -> str:
     """Return a name that a file gives, `name` or `module:name`, if looking it up imports nothing new.
 
-    Files are data: what they name is looked up among what is registered, and only callers choose what
-    to import.
+    Files are data: their names are looked up among the registered ones, and only callers choose what to import.
 
     Raises:
         ValueError: the name's module has not been imported yet; one line that names it.

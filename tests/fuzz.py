@@ -25,12 +25,12 @@ from tqdm import tqdm
 
 import arc_suite
 from arc_suite import data, policies, style
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec_files import load_body
 
 LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
 ID = "arc_suite/test/fuzz-v0"
-SETTINGS = data.Settings(ROBOTS["tick"], "random", (), steps=5)
+SETTINGS = data.Settings(Setup.of("tick"), "random", (), steps=5)
 QUIET = functools.partial(tqdm, disable=True)
 SPEC = pathlib.Path(__file__).parents[1] / "examples" / "spider.json"
 

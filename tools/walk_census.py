@@ -1,6 +1,6 @@
-"""Run arc_suite/cli/census.py."""
+"""Run arc_suite/cli/survey.py."""
 
-from arc_suite.cli import census, program
+from arc_suite.cli import program, survey
 
 if __name__ == "__main__":
-    program.run(census.main)
+    program.run(survey.main)

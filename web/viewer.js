@@ -1,9 +1,9 @@
-// Plays recorded walks, side by side: bodies from their parts, a timeline, footfalls and rewards with a cursor.
+// Plays recorded walks, side by side: bodies from their parts, a timeline, foot contacts and rewards with a cursor.
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
-const WINDOW = 4; // s of footfalls
+const WINDOW = 4; // s of foot contacts
 const VIEW = (35 / 180) * Math.PI; // angle of the camera
 const INK = "#d7dde5", FAINT = "#8791a0", PALE = "#39424f", BLUE = "#3b9be0", VERMILION = "#f0713a";
 

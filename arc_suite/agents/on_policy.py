@@ -182,7 +182,7 @@ def _read(hp: ProximalPolicy, context: RunContext, task) -> tuple[Layer, tuple]:
     for name in {**found.blocks, **task.blocks}:
         there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.blocks))
         if there != here:
-            other = f"a policy of {found.task} for other observations than those of {task.name}"
+            other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
     linear = [layer.arrays for layer in found.layers if layer.kind == "linear"]
     if linear[0][0].shape[1] != hp.hidden or linear[1][0].shape[1] != hp.hidden:

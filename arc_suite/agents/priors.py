@@ -11,7 +11,6 @@ from pathlib import Path
 from arc_suite import files
 from arc_suite.agents.learner import RunContext
 from arc_suite.agents.replay import Replay
-from arc_suite.envs.setup import Setup
 from arc_suite.tasks import Task
 
 _COUNT = "count.json"  # written last: without it the files are incomplete
@@ -34,8 +33,7 @@ def mapped(context: RunContext, task: Task) -> Replay:
         OSError: the disk is full, or the like; one line.
     """
     dataset = _opened(context.prior)
-    settings, setup = dataset.settings, context.setup
-    found = Setup.of(settings.body, settings.task, settings.task_kwargs)
+    found, setup = dataset.settings.setup, context.setup
     if found.body != setup.body:
         raise ValueError(f"prior {context.prior!r}: of {found.body.name}, and not of {setup.body.name}")
     if found != setup:

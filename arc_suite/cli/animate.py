@@ -1,4 +1,4 @@
-"""Make animation clips of a robot for game engines: glTF (.glb), figures beside it.
+"""Make animation clips of a robot for game engines: glTF (.glb), and their metrics (.json).
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
@@ -16,7 +16,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, export, files, policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_setup
 from arc_suite.cli.program import VERSION, progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
@@ -42,27 +42,24 @@ def main() -> None:
     """Record, write both files and print a row for each clip."""
     checks.name(FLAGS.rig, export.RIGS, "rig")
     checks.name(FLAGS.root_motion, export.ROOT_MOTIONS, "root_motion")
-    body = only_body(_ROBOT)
-    task_name, task_kwargs = task()
+    setup = only_setup(_ROBOT)
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
     checks.extension(FLAGS.output, [".glb"])
     beside = Path(FLAGS.output).with_suffix(".json")
     if FLAGS.spec is not None and beside.resolve() == Path(FLAGS.spec).resolve():
         raise ValueError(f"--output={FLAGS.output}: {beside}, which is written too, is the spec; take another name")
-    with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as figures:
+    with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as metrics:
         clips = export.clips(
-            body,
+            setup,
             FLAGS.clips,
             FLAGS.policy,
             FLAGS.preset,
-            task_name,
-            task_kwargs,
             FLAGS.fps,
             lambda names: progress(names, "recording", unit="clip", leave=False),
         )
-        temporary.write_bytes(export.glb(body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
-        figures |= export.sidecar(body, clips, FLAGS.root_motion)
+        temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
+        metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)
     print(f"wrote {FLAGS.output} and {beside}")
 
@@ -73,6 +70,6 @@ def print_table(clips: list[export.Clip]) -> None:
     print(line.format(*_COLUMNS))
     for clip in clips:
         forward, left, turning = clip.motion.twist + 0.0
-        figures = [f"{forward:.3f}", f"{left:.3f}", f"{math.degrees(turning):.1f}"]
+        cells = [f"{forward:.3f}", f"{left:.3f}", f"{math.degrees(turning):.1f}"]
         seam = f"{math.degrees(clip.motion.seam):.3f}" if clip.loops else "-"
-        print(line.format(clip.name, f"{clip.motion.seconds:.3f}", len(clip.times), clip.cycles, *figures, seam))
+        print(line.format(clip.name, f"{clip.motion.seconds:.3f}", len(clip.times), clip.cycles, *cells, seam))

@@ -19,7 +19,7 @@ from arc_suite import checks, files, models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
@@ -33,7 +33,7 @@ flags.DEFINE_enum(
     "layout",
     None,
     list(generator.LAYOUTS),
-    "Mirrored pairs, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
+    "Pairs, left and right, or legs all around; with --legs or --seed. [default: pairs for an even number, or random]",
 )
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE)
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
@@ -49,7 +49,7 @@ flags.DEFINE_string("render", None, "File to write a picture of the standing bod
 
 
 def main() -> None:
-    """Build the body and write what is asked for."""
+    """Build the body and write it."""
     if FLAGS.render is not None:
         checks.extension(FLAGS.render, [".png"])
     body = _body()
@@ -86,11 +86,10 @@ def _body() -> Body:
 
 
 def _arena(body: Body) -> Arena:
-    """Return where the task takes place that the flags ask for; a floor if they ask for none."""
+    """Return the arena of the task that flags name; the floor if they name none."""
     if not (FLAGS["task"].present or FLAGS["set"].present):
         return FLAT
-    task_name, task_kwargs = task()
-    return prepared(body, task_name, task_kwargs)[0].scene.arena
+    return Setup.of(body, *task()).definition.scene.arena
 
 
 def _text(body: Body, arena: Arena) -> str:

@@ -1,4 +1,4 @@
-"""Collect a dataset in Minari's format, or replay one and compare it to the bit.
+"""Collect a dataset in Minari's format, or replay one and check that it is bit-equal.
 
 Both use all cores. Killed or interrupted, the same command continues. Minari keeps datasets in
 ~/.minari/datasets, or where MINARI_DATASETS_PATH points; `minari list local` shows them.
@@ -7,7 +7,7 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1
   arc-suite collect --spec examples/spider.json --policy my_package.policies:make
   arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --checkpoint 200000
-  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --grade medium
+  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --quality medium
   arc-suite collect --verify arc_suite/queen/walk/cpg-medium-v0
 
 --verify imports no module that the dataset names: --task and --set name those that it needs, as in collecting.
@@ -19,7 +19,7 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, setups
 from arc_suite.cli.program import progress
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
@@ -31,11 +31,11 @@ _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all in turn.")
 flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_integer("checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", 0)
 flags.DEFINE_enum(
-    "grade",
+    "quality",
     None,
-    checkpoints.GRADES,
-    "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of what "
-    "the best one does; expert, the latest; replay, all checkpoints in turn.",
+    checkpoints.QUALITIES,
+    "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of the "
+    "best one's return; expert, the latest; replay, all checkpoints in turn.",
 )
 flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
@@ -59,21 +59,21 @@ def main() -> None:
         from arc_suite import data
     except ImportError as error:
         raise ValueError(str(error)) from None
-    walkers = bodies(_ROBOT)
-    asked, task_kwargs = task()
+    asked = setups(_ROBOT)
     if FLAGS.verify is not None:
-        body = next(iter(walkers.values())) if _ROBOT.present or made_body() else None
-        name = asked if FLAGS["task"].present else None
-        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress, name)
-        print(f"{FLAGS.verify}: {count} episodes replayed, equal to the bit")
+        setup = next(iter(asked.values()))
+        body = setup.body if _ROBOT.present or made_body() else None
+        task = setup.task if FLAGS["task"].present else None
+        count = data.verify(FLAGS.verify, body, FLAGS.rows, FLAGS.threads, progress, task)
+        print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")
         return
-    if FLAGS.id is not None and len(walkers) > 1:
-        raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(walkers)}")
+    if FLAGS.id is not None and len(asked) > 1:
+        raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(asked)}")
     presets = tuple(checks.name(preset, policies.preset_names(), "preset") for preset in FLAGS.preset)
     presets = presets if FLAGS.policy == "cpg" else ()
     policy, label = chosen()
-    for body in walkers.values():
-        settings = data.Settings(body, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps, asked, task_kwargs)
+    for setup in asked.values():
+        settings = data.Settings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = FLAGS.id or settings.dataset_id(label)
         missing = data.collect(
             dataset_id,
@@ -100,19 +100,19 @@ def main() -> None:
 
 
 def chosen() -> tuple[str, str]:
-    """Return the policy, and what the dataset's id calls it: "" for the policy's name.
+    """Return the policy and its label in the dataset's id, "" for the policy's name.
 
     Raises:
-        ValueError: --checkpoint and --grade together, or a run without the checkpoints asked for; one line.
+        ValueError: --checkpoint and --quality together, or a run without such a checkpoint; one line.
     """
-    if FLAGS.checkpoint is None and FLAGS.grade is None:
+    if FLAGS.checkpoint is None and FLAGS.quality is None:
         return FLAGS.policy, ""
-    if FLAGS.checkpoint is not None and FLAGS.grade is not None:
-        raise ValueError("expected one of --checkpoint and --grade, got both")
+    if FLAGS.checkpoint is not None and FLAGS.quality is not None:
+        raise ValueError("expected one of --checkpoint and --quality, got both")
     run = pathlib.Path(FLAGS.policy)
     if FLAGS.checkpoint is not None:
-        policy, grade = str(checkpoints.at(run, FLAGS.checkpoint)), str(FLAGS.checkpoint)
+        policy, label = str(checkpoints.at(run, FLAGS.checkpoint)), str(FLAGS.checkpoint)
     else:
-        policy, grade = checkpoints.graded(run, FLAGS.grade), FLAGS.grade
+        policy, label = checkpoints.of_quality(run, FLAGS.quality), FLAGS.quality
     agent = checkpoints.agents(run / checkpoints.FOLDER)[-1]
-    return policy, f"{agent.algorithm}-{agent.seed}-{grade}"
+    return policy, f"{agent.algorithm}-{agent.seed}-{label}"

@@ -1,7 +1,7 @@
-"""Judge a policy: the task's own figures, then return and length of its episodes.
+"""Evaluate a policy: the task's own metrics, then return and length of its episodes.
 
-Walk's figures are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
-return stands beside that of the paper's demonstrator, where the task is the paper's. IQM is the
+Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
+return is compared with that of the paper's demonstrator, where the task is the paper's. IQM is the
 interquartile mean of the return, with a stratified bootstrap interval.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
@@ -13,9 +13,8 @@ from collections.abc import Mapping
 
 from absl import flags
 
-import arc_suite
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, setups
 from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
@@ -26,34 +25,32 @@ flags.DEFINE_string("policy", "cpg", policies.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
-flags.DEFINE_string("json", None, "File to write the figures to, as JSON, with every episode.")
+flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 
 _WIDTHS = (18, 26, 9, 12)  # of the columns that every task has
 
 
-def line(first: str, figures: Mapping[str, str], *cells: str) -> str:
+def line(first: str, metrics: Mapping[str, str], *cells: str) -> str:
     """Return a line of the table.
 
     Args:
-        first: what is in its first column, as wide as that is.
-        figures: the task's own by name, which matter first.
+        first: cell of the first column, as wide as the column.
+        metrics: the task's own by name.
         *cells: of the columns that every task has.
     """
-    own = [f"{cell:>{max(len(name), 6)}}" for name, cell in figures.items()]
+    own = [f"{cell:>{max(len(name), 6)}}" for name, cell in metrics.items()]
     return " ".join([first, *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))])
 
 
 def main() -> None:
     """Print the table and write the JSON."""
-    walkers = bodies(_ROBOT)
-    task_name, task_kwargs = task()
+    asked = setups(_ROBOT)
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     players = {}
-    for name, body in walkers.items():
-        environment = arc_suite.load(body, task_name, task_kwargs)
+    for name, setup in asked.items():
+        environment, body = setup.load(), setup.body
         players[name] = environment, policies.policy(FLAGS.policy, body, FLAGS.preset, task=environment.task.definition)
-    # The paper's demonstrators walked by the published numbers; with others there is nothing to compare with.
-    experts = {name: None if task_kwargs else evaluation.expert_return(task_name, name) for name in walkers}
+    experts = {name: evaluation.expert_return(setup) for name, setup in asked.items()}
     with files.writing_json(FLAGS.json) as file:
         reports = {}
         width = max(12, *map(len, players))
@@ -66,8 +63,8 @@ def main() -> None:
             reports[robot] = report(episodes, experts[robot])
             print(row(robot.ljust(width), reports[robot]), flush=True)
         file.update(
-            task=task_name,
-            task_kwargs=task_kwargs,
+            task=setup.kind.name,
+            task_kwargs=setup.task_kwargs,
             policy=FLAGS.policy,
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,
@@ -91,32 +88,32 @@ def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
 
 
 def report(episodes: list[evaluation.Episode], expert: float | None) -> dict:
-    """Return the figures of one robot, as they go into the JSON.
+    """Return the metrics of one robot, as in the JSON.
 
     Args:
         episodes: of the robot.
         expert: return of the paper's demonstrator, if it has one.
     """
-    figures = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
+    progress = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
     return {
         "expert_return": expert,
         "return": evaluation.summary([episode.total for episode in episodes]),
         "length": evaluation.summary([episode.length for episode in episodes]),
-        **{name: evaluation.summary(values) for name, values in figures.items()},
+        **{name: evaluation.summary(values) for name, values in progress.items()},
         "episodes": episodes,
     }
 
 
-def row(robot: str, figures: dict) -> str:
+def row(robot: str, metrics: dict) -> str:
     """Return one line of the table."""
-    total, progress = figures["return"], figures["episodes"][0].progress
+    total, progress = metrics["return"], metrics["episodes"][0].progress
     return line(
         robot,
-        {name: f"{figures[name].mean:.3f}" for name in progress},
+        {name: f"{metrics[name].mean:.3f}" for name in progress},
         f"{total.mean:.1f} +- {total.deviation:.1f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
-        f"{figures['length'].mean:.1f}",
-        "-" if figures["expert_return"] is None else f"{figures['expert_return']:.0f}",
+        f"{metrics['length'].mean:.1f}",
+        "-" if metrics["expert_return"] is None else f"{metrics['expert_return']:.0f}",
     )
 
 

@@ -1,4 +1,4 @@
-"""Flags that several programs have: of which body, and in which task."""
+"""Flags that several programs have: body, task and its settings."""
 
 import json
 from collections.abc import Iterable
@@ -7,6 +7,7 @@ from typing import Any
 from absl import flags
 
 from arc_suite import checks, registry
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
@@ -17,7 +18,7 @@ ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
 
 
 def define_body() -> None:
-    """Define --spec, --legs and --links, by which a program takes any body."""
+    """Define --spec, --legs and --links, for programs that take any body."""
     flags.DEFINE_string("spec", None, "A body from this JSON file, in place of a robot.")
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
     flags.DEFINE_integer(
@@ -26,7 +27,7 @@ def define_body() -> None:
 
 
 def define_task() -> None:
-    """Define --task and --set, by which a program takes any task and its settings."""
+    """Define --task and --set, for programs that take any task."""
     flags.DEFINE_string("task", "walk", f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
     flags.DEFINE_multi_string(
         "set",
@@ -58,7 +59,7 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     A robot of another package is named `module:name`, and its module imported.
 
     Raises:
-        ValueError: as `made_body`, or an unknown robot, or a robot beside a body; one line.
+        ValueError: as `made_body`, or an unknown robot, or a robot and a body; one line.
         OSError: as `made_body`.
     """
     body = made_body()
@@ -69,7 +70,7 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
         name = checks.name(robot.value, [*ROBOTS, "all"], "robot")
         return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
     if robot.present:
-        raise ValueError(f"--robot={robot.value}: expected no robot beside --spec or --legs")
+        raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
     return {body.name: body}
 
 
@@ -86,8 +87,23 @@ def only_body(robot: flags.FlagHolder) -> Body:
     return body
 
 
+def setups(robot: flags.FlagHolder) -> dict[str, Setup]:
+    """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
+
+    Raises:
+        ValueError: as `bodies` and `task`; one line.
+        OSError: as `bodies`.
+    """
+    return {name: Setup.of(body, *task()) for name, body in bodies(robot).items()}
+
+
+def only_setup(robot: flags.FlagHolder) -> Setup:
+    """Return the setup of a program that takes one body; errors as `only_body` and `task`."""
+    return Setup.of(only_body(robot), *task())
+
+
 def task() -> tuple[str, dict[str, Any]]:
-    """Return the name of the task that --task asks for and its settings, `task_kwargs` of `arc_suite.load`.
+    """Return the name of the task and its settings, `task_kwargs` of `arc_suite.load`.
 
     The modules that the flags name are imported. What settings a task has is checked where an environment is opened.
 

@@ -21,7 +21,7 @@ PROGRAMS = (
     "train",
     "study",
     "export",
-    "census",
+    "survey",
     "doctor",
 )
 

@@ -8,7 +8,7 @@
 
 A PNG of one robot under the demonstrator shows one cycle of its gait; any other PNG, and one after
 --steps=0, shows one moment. A film plays in real time. A page plays in any browser, with a camera to
-turn, footfalls and rewards; several robots walk side by side. The program prints each robot's return up
+turn, foot contacts and rewards; several robots walk side by side. The program prints each robot's return up
 to then, and the file it wrote. No display is needed.
 """
 

@@ -1,4 +1,4 @@
-"""Judge how a robot and each of its legs walk: gait, course, torso, joints and effort.
+"""Measure how a robot and each of its legs walk: gait, course, torso, joints and effort.
 
   arc-suite style --robot queen --policy cpg --preset medium
   arc-suite style --policy my_package.policies:make --compare cpg --output out/style
@@ -12,14 +12,16 @@ browser. What every metric means is written in arc_suite/style/metrics.py.
 """
 
 import contextlib
+import dataclasses
 import math
 import pathlib
 
 from absl import flags
 
 from arc_suite import evaluation, files, policies, style, versions
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, made_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, setups
 from arc_suite.cli.program import progress
+from arc_suite.envs.setup import Setup
 from arc_suite.export import pages
 from arc_suite.style import sources
 
@@ -29,11 +31,11 @@ define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all. [default: the one of stored tracks, else queen]")
 flags.DEFINE_string("policy", "cpg", sources.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
-flags.DEFINE_string("compare", None, "A second policy, file or dataset, shown beside the first.")
+flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
 flags.DEFINE_string("compare_preset", "medium", "Preset of --compare, if that is the cpg.")
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
-flags.DEFINE_string("json", None, "File to write the figures to, as JSON.")
+flags.DEFINE_string("json", None, "File to write the metrics to, as JSON.")
 flags.DEFINE_string(
     "output",
     None,
@@ -45,7 +47,7 @@ flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz)
 
 
 def chosen_sources() -> dict[str, style.Source]:
-    """Return what is shown side by side, by label."""
+    """Return the sources of the columns, by label."""
     first = style.source(FLAGS.policy, FLAGS.preset)
     if FLAGS.compare is None:
         return {first.label: first}
@@ -57,14 +59,13 @@ def chosen_sources() -> dict[str, style.Source]:
     return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
 
 
-def chosen_stages(stored: list[style.Stage]) -> dict[str, style.Stage]:
-    """Return the bodies and the task that flags ask for, else those whose tracks are stored, by the body's name."""
-    name, settings = task()
-    if stored and not (FLAGS["task"].present or FLAGS["set"].present):
-        name, settings = stored[0].task, stored[0].task_kwargs
-    unasked = not _ROBOT.present and made_body() is None
-    chosen = [stored[0].body] if stored and unasked else bodies(_ROBOT).values()
-    return {body.name: style.Stage(body, name, settings) for body in chosen}
+def chosen_setups(asked: dict[str, Setup], stored: Setup | None) -> dict[str, Setup]:
+    """Return setups by name of the body: those of the flags, completed by the setup of stored tracks."""
+    if stored is None:
+        return asked
+    bodies = [setup.body for setup in asked.values()] if _ROBOT.present or made_body() else [stored.body]
+    task = next(iter(asked.values())) if FLAGS["task"].present or FLAGS["set"].present else stored
+    return {body.name: dataclasses.replace(task, body=body) for body in bodies}
 
 
 def number(value: float, decimals: int = 3) -> str:
@@ -81,7 +82,7 @@ def spread(summary: evaluation.Summary) -> str:
 
 
 def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, list[str]]]) -> None:
-    """Print rows of a name, a metric's figures, and a cell for each column."""
+    """Print rows of a name, a metric, and a cell for each column."""
     width = max(8, *(len(text) for text in [*columns, *(cell for _, _, cells in rows for cell in cells)]))
     first = max(18, len(heading))
     line = f"{{:<{first}}} {{:<8}} {{:>10}}" + f"  {{:>{width}}}" * len(columns)
@@ -94,20 +95,20 @@ def print_table(heading: str, columns: list[str], rows: list[tuple[str, dict, li
 
 
 def print_report(robot: str, reports: dict) -> None:
-    """Print the tables of one robot: its own figures, policies side by side, then those of the legs for each policy."""
+    """Print the tables of one robot: its own metrics, policies side by side, then those of the legs for each policy."""
     first = next(iter(reports.values()))
     rows = [(name, {}, [spread(r[name]) for r in reports.values()]) for name in ("return", "length")]
-    asked = [name for name in first["progress"] if name not in first["metrics"]]
-    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in asked]
+    others = [name for name in first["progress"] if name not in first["metrics"]]
+    rows += [(name, {}, [spread(r["progress"][name]) for r in reports.values()]) for name in others]
     rows += [
         (name, metric, [spread(r["metrics"][name]["robot"]) for r in reports.values()])
         for name, metric in first["metrics"].items()
     ]
     print_table(robot, list(reports), rows)
-    for label, figures in reports.items():
+    for label, metrics in reports.items():
         rows = [
             (name, metric, [number(summary.mean) for summary in metric["legs"].values()])
-            for name, metric in figures["metrics"].items()
+            for name, metric in metrics["metrics"].items()
             if metric["legs"]
         ]
         print_table(f"{robot}, {label}", list(first["metrics"]["foot_slip"]["legs"]), rows)
@@ -171,17 +172,15 @@ def saving(robots: list[str]):
 
 def main() -> None:
     """Record, measure, print and write."""
-    # Both import the modules that flags name, which datasets and tracks may need and cannot import.
-    task()
-    bodies(_ROBOT)
+    asked = setups(_ROBOT)  # first: this imports the modules that flags name, which files cannot import
     chosen = chosen_sources()
-    stages = chosen_stages([source.stage for source in chosen.values() if source.stage is not None])
+    chosen_for = chosen_setups(asked, next((source.setup for source in chosen.values() if source.setup), None))
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
-    takes = {
-        robot: {label: source.takes(stage, seeds) for label, source in chosen.items()}
-        for robot, stage in stages.items()
+    recorders = {
+        robot: {label: source.recorders(setup, seeds) for label, source in chosen.items()}
+        for robot, setup in chosen_for.items()
     }
-    robots = list(stages)
+    robots = list(recorders)
     with (
         files.writing_json(FLAGS.json) as file,
         pictures(robots) as draw,
@@ -189,20 +188,21 @@ def main() -> None:
         saving(robots) as save,
     ):
         reports = {}
-        for robot, by_label in takes.items():
+        for robot, by_label in recorders.items():
             tracks = {}
             for label, several in by_label.items():
                 with progress(several, desc=f"{robot}, {label}", unit="episode", leave=False) as bar:
-                    tracks[label] = [take() for take in bar]
+                    tracks[label] = [recorder() for recorder in bar]
             save(next(iter(tracks.values())))
             reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
             print_report(robot, reports[robot])
             firsts = {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()}
             draw(robot, firsts)
             played.update(firsts)
+        setup = next(iter(chosen_for.values()))
         file.update(
-            task=next(iter(stages.values())).task,
-            task_kwargs=next(iter(stages.values())).task_kwargs,
+            task=setup.kind.name,
+            task_kwargs=setup.task_kwargs,
             episodes=FLAGS.episodes,
             seed=FLAGS.seed,
             robots=reports,

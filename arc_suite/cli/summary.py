@@ -1,14 +1,14 @@
-"""A body in a few figures."""
+"""A body in a few numbers."""
 
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 
 
 def summary(body: Body) -> str:
-    """Return a table of what a body is, how it is to walk and what keeps it from that, as text of several lines."""
-    pose, (task, _) = standing(body), prepared(body, "walk")
+    """Return a table of a body's size, gait and flaws, as text of several lines."""
+    pose, task = standing(body), Setup.of(body).definition
     parameters = task.parameters
     links = sorted({len(leg.joints) for leg in body.legs})
     rows = {

@@ -104,8 +104,7 @@ def picture(run: Configuration, folder: Path) -> Callable:
         return lambda step, metrics: None
     from arc_suite.agents import plots
 
-    setup = run.setup
-    expert = None if setup.task_kwargs else evaluation.expert_return(setup.kind.name, setup.body.name)
+    expert = evaluation.expert_return(run.setup)
     lines = {} if expert is None else {"the paper's demonstrator": expert}
 
     def draw(step, metrics):

@@ -1,11 +1,11 @@
-"""Search the numbers of a robot's demonstrator that earn most.
+"""Search the parameters of a robot's demonstrator with the highest return.
 
 It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off
-at any moment, the same command goes on. At the end the best numbers are judged beside the presets
-that there are over many resets and printed as a row for the table of presets.
+at any moment, the same command goes on. At the end the best parameters are compared with the existing presets
+over many resets, and printed as a row for the table of presets.
 
   arc-suite tune_cpg --robot queen --output out/tune/queen
-  arc-suite tune_cpg --robot queen --numbers torques --output out/tune/queen-torques
+  arc-suite tune_cpg --robot queen --space torques --output out/tune/queen-torques
 """
 
 import contextlib
@@ -17,10 +17,10 @@ from arc_suite import checks, evaluation, files, versions
 from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.cpg.presets import TUNINGS, Preset
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 from arc_suite.tasks.contract import STEPS
-from arc_suite.tuning import Journal, Judge, Search
-from arc_suite.tuning.judge import STYLE
+from arc_suite.tuning import Evaluator, Journal, Search
+from arc_suite.tuning.evaluator import STYLE
 from arc_suite.tuning.search import HARD
 from arc_suite.tuning.space import SPACES
 
@@ -28,15 +28,15 @@ FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("robot", "queen", f"One of {', '.join(TUNINGS)}.")
 flags.DEFINE_string(
-    "numbers", "law", "law: those of the paper's law, about `medium`; torques: of what is added to it, about `tuned`."
+    "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
 )
 for name, least, most, what in (
     ("generations", 1, None, "Generations of the search, more make a finished one go on"),
-    ("episodes", 1, None, "Episodes by which a candidate is judged"),
+    ("episodes", 1, None, "Episodes by which a candidate is evaluated"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
     ("starts", 0, None, f"Starts, of which candidates are tried in the {HARD} hardest; 0 for none"),
 ):
-    usual = " and ".join(f"{getattr(kind, name)} for {numbers}" for numbers, kind in SPACES.items())
+    usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
     flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
 flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
@@ -46,19 +46,19 @@ flags.DEFINE_string(
 
 
 def given(name: str) -> int:
-    """Return the value of a flag, or what is usual for the numbers that are searched."""
+    """Return the value of a flag, or the default of the space."""
     value = FLAGS[name].value
-    return getattr(SPACES[FLAGS.numbers], name) if value is None else value
+    return getattr(SPACES[FLAGS.space], name) if value is None else value
 
 
-def search(folder: pathlib.Path) -> tuple[Search, Journal]:
+def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
     """Search behind a progress bar, or go on."""
-    settings = {name: FLAGS[name].value for name in ("robot", "numbers", "seed")}
+    settings = {name: FLAGS[name].value for name in ("space", "seed")}
     settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
-    settings |= dict(zip(("task", "task_kwargs"), task(), strict=True))
-    with contextlib.closing(Journal(folder / "journal.jsonl", settings | {"versions": versions.recorded()})) as journal:
+    known = setup.to_dict() | settings | {"versions": versions.recorded()}
+    with contextlib.closing(Journal(folder / "journal.jsonl", known)) as journal:
         try:
-            course = Search(**settings)
+            course = Search(setup, **settings)
         except ImportError as error:
             raise ValueError(f"a search needs cma: pip install 'arc_suite[tune]' ({error})") from None
         for generation in journal.generations:
@@ -73,11 +73,11 @@ def search(folder: pathlib.Path) -> tuple[Search, Journal]:
     return course, journal
 
 
-def judge(preset: Preset) -> dict:
-    """Return returns, falls and style over the resets: of the result, of what it was searched about, and of medium."""
-    body, there = ROBOTS[FLAGS.robot], TUNINGS[FLAGS.robot]
-    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.numbers].preset, "medium")}
-    score = Judge(body, len(presets), FLAGS.resets, STEPS, *task())(list(presets.values()), range(FLAGS.resets))
+def evaluate(setup: Setup, preset: Preset) -> dict:
+    """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
+    there = TUNINGS[FLAGS.robot]
+    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.space].preset, "medium")}
+    score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
     return {
         name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
         | {cost: float(values[row].mean()) for cost, values in score.style.items()}
@@ -85,18 +85,18 @@ def judge(preset: Preset) -> dict:
     }
 
 
-def violations(figures: dict) -> list[str]:
-    """Return in what the result is not as good as it must be, a line each."""
-    found, medium = figures["found"], figures["medium"]
+def violations(metrics: dict) -> list[str]:
+    """Return the constraints that the result violates, a text for each."""
+    found, medium = metrics["found"], metrics["medium"]
     worse = [f"{name} {found[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if found[name] > medium[name]]
     return worse + [f"{found['falls']} falls"] * bool(found["falls"])
 
 
 def main() -> None:
-    """Search, judge, print and write."""
-    task_name, task_kwargs = task()
+    """Search, evaluate, print and write."""
     checks.name(FLAGS.robot, TUNINGS, "robot")
-    checks.name(FLAGS.numbers, SPACES, "numbers")
+    setup = Setup.of(FLAGS.robot, *task())
+    checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
     try:
@@ -105,28 +105,26 @@ def main() -> None:
         raise ValueError(f"the plot needs matplotlib: pip install 'arc_suite[plot]' ({error})") from None
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
-        course, journal = search(folder)
+        course, journal = search(setup, folder)
         preset = course.result()
         plots.course(FLAGS.robot, course.reward, journal.generations, STEPS).savefig(picture)
-        figures = judge(preset)
+        metrics = evaluate(setup, preset)
         file.update(
-            robot=FLAGS.robot,
-            task=task_name,
-            task_kwargs=task_kwargs,
-            numbers=FLAGS.numbers,
+            **setup.to_dict(),
+            space=FLAGS.space,
             seed=FLAGS.seed,
             generations=len(journal.generations),
             resets=FLAGS.resets,
             preset=preset,
-            figures=figures,
+            metrics=metrics,
             versions=versions.recorded(),
         )
     columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
     header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
     print(header, "-" * len(header), sep="\n")
-    for name, row in figures.items():
+    for name, row in metrics.items():
         total = f"{row['return'].mean:.1f} +- {row['return'].deviation:.1f}"
         print(columns.format(name, total, row["falls"], *(f"{row[cost]:.3f}" for cost in STYLE)))
     print(f"\n{preset}")
-    if broken := violations(figures):
+    if broken := violations(metrics):
         raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")

@@ -210,7 +210,7 @@ TUNINGS = {
 }
 
 # What `refined` adds to `tuned`: steering and torques, by joint, rank and then cosines and sines of three multiples of
-# the leg's phase. Found by `arc-suite tune_cpg --numbers torques`.
+# the leg's phase. Found by `arc-suite tune_cpg --space torques`.
 _REFINEMENTS = {
     "queen": {
         "steering": -0.326,

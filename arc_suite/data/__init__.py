@@ -1,8 +1,8 @@
-"""Datasets in Minari's format, which offline-RL libraries open and which replay to the bit.
+"""Datasets in Minari's format, for offline-RL libraries, with bit-exact replays.
 
 dataset = arc_suite.data.open("arc_suite/queen/walk/cpg-medium-v0")
 episode = dataset[0]
-track = style.record(dataset.environment(), episode.playback(), episode.seed, max_steps=episode.length)
+track = style.record(dataset.settings.setup.load(), episode.playback(), episode.seed, max_steps=episode.length)
 """
 
 try:

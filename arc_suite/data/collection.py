@@ -1,4 +1,4 @@
-"""Collects datasets: plays the episodes that are missing, and keeps what is finished whatever happens."""
+"""Collects datasets: plays the missing episodes, and keeps finished ones if it is killed."""
 
 import contextlib
 import math
@@ -43,30 +43,30 @@ def collect(
         dataset_id: Minari's.
         settings: what the episodes depend on.
         episodes: how many the dataset is to have.
-        rows: how many are played at a time; what is collected does not depend on it.
-        threads: on which to simulate; None for all cores. Nor does it depend on these.
+        rows: how many are played at a time; the data do not depend on it.
+        threads: on which to simulate; None for all cores. The data do not depend on it.
         overwrite: replace a dataset that is there, when the new one is complete.
         progress: makes progress bars as `tqdm` does.
         author: for Minari's metadata; None for none, or for the one that the dataset has already.
-        code_permalink: where the code lies that made the dataset, likewise.
-        wait: until no other process collects the dataset, in place of an error.
+        code_permalink: address of the code that made the dataset; None as for the author.
+        wait: wait for another process that collects the dataset; else that is an error.
 
     Returns:
         The number of episodes that were missing.
 
     Raises:
         ValueError: settings that do not fit, a dataset that is damaged or has other settings, or a
-            policy whose action is none; one line. Episodes finished before are kept.
-        OSError: the disk is full, or the like; likewise.
-        KeyboardInterrupt: likewise.
+            policy with an invalid action; one line. Episodes finished before are kept.
+        OSError: the disk is full, or another error of writing; one line. Finished episodes are kept.
+        KeyboardInterrupt: the same.
     """
     _check(settings, episodes)
     said = {} if author is None else {"author": [author]}  # Minari makes a set of it
     said |= {} if code_permalink is None else {"code_permalink": code_permalink}
-    provenance, specification = settings.provenance(), settings.environment_spec().to_json()
+    provenance = settings.provenance()
     with Storage.opened(dataset_id, overwrite, wait) as storage:
         if storage.metadata is not None:
-            difference = _difference(storage.metadata, provenance, specification)
+            difference = _difference(storage.metadata["arc_suite"], provenance)
             if difference and storage.kept and not overwrite:
                 raise ValueError(f"dataset {dataset_id!r} is another: {difference}; --overwrite replaces it")
             if difference:
@@ -75,7 +75,7 @@ def collect(
         try:
             if missing:
                 if storage.metadata is None:
-                    storage.metadata = _metadata(dataset_id, settings, provenance, specification, threads)
+                    storage.metadata = _metadata(dataset_id, settings, provenance, threads)
                 storage.metadata |= said
                 _play(storage, settings, missing, rows, threads, progress)
             storage.finish(lambda indices: progress(indices, desc="merging", unit="episode", leave=False))
@@ -95,24 +95,18 @@ def _check(settings: Settings, episodes: int) -> None:
 
 
 def _policy(settings: Settings, rows: int, task: Task | None = None) -> policies.Policy:
-    return policies.policy(settings.policy, settings.body, settings.presets, rows, settings.noise, task)
+    return policies.policy(settings.policy, settings.setup.body, settings.presets, rows, settings.noise, task)
 
 
-def _difference(metadata: dict, provenance: dict, specification: str) -> str | None:
-    """Return in words the first difference between what a dataset was and would be collected with; None for none."""
-    was = metadata["arc_suite"]
-    for group in ("settings", "versions"):
-        for name, value in provenance[group].items():
-            if was[group].get(name) == value:
-                continue
+def _difference(was: dict, now: dict) -> str | None:
+    """Return in words the first difference of two provenances; None for none."""
+    was, now = (known["versions"] | known | {"versions": None} for known in (was, now))
+    for name, value in now.items():
+        if was.get(name) != value:
             if name == "presets_sha256":
-                return f"its presets {' and '.join(provenance['settings']['presets'])} had other numbers"
-            return f"its {name} is {checks.quoted(repr(was[group].get(name)))}, and not {value!r}"
-    if was["model_sha256"] != provenance["model_sha256"]:
-        digests = (checks.quoted(digest)[:12] for digest in (was["model_sha256"], provenance["model_sha256"]))
-        return "the sha256 of its model is {}, and not {}".format(*digests)
-    if metadata["env_spec"] != specification:
-        return "its environment is specified otherwise"
+                return f"its presets {' and '.join(now['presets'])} had other numbers"
+            there, here = (checks.quoted(repr(each)) for each in (was.get(name), value))
+            return f"its {name} is {there}, and not {here}"
     return None
 
 
@@ -134,7 +128,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
 
     total, done = len(missing) + len(storage.kept), len(storage.kept)
     with progress(
-        desc=settings.body.name,
+        desc=settings.setup.body.name,
         leave=False,
         total=total * settings.steps,
         initial=done * settings.steps,
@@ -158,8 +152,8 @@ def _play(storage: Storage, settings: Settings, missing: list[int], rows: int, t
             environment.close()
 
 
-def _metadata(dataset_id: str, settings: Settings, provenance: dict, specification: str, threads) -> dict:
-    """Return Minari's metadata, but for the counts."""
+def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) -> dict:
+    """Return Minari's metadata without the counts."""
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
     environment = settings.environment(evaluation.EPISODES, threads)
@@ -171,9 +165,9 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
             "jpeg_encoding": False,
             "observation_space": serialize_space(environment.single_observation_space),
             "action_space": serialize_space(environment.single_action_space),
-            "env_spec": specification,
+            "env_spec": settings.setup.spec(settings.steps).to_json(),
             "algorithm_name": "-".join([settings.policy, *settings.presets]),
-            "description": f"{settings.body.name} in the task {settings.task} by policy {settings.policy}"
+            "description": f"{settings.setup} by policy {settings.policy}"
             f"{presets}{noise}; episode k has seed {settings.seed} + k.",
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
             "ref_min_score": _mean_return(environment, settings._replace(policy="zero", presets=(), noise=0.0)),
@@ -184,8 +178,6 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, specificati
 
 
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
-    """Return the mean return over the seeds of the evaluation protocol, one in each row of the environment."""
-    count = environment.num_envs
-    played = rollouts.play(environment, _policy(settings, count, environment.task), range(count), settings.steps)
-    totals = {episode.seed: episode.total for step in played for episode in step.finished}
-    return float(np.mean([totals[seed] for seed in range(count)]))  # in one order, whichever falls first
+    """Return the mean return by the evaluation protocol."""
+    policy = _policy(settings, environment.num_envs, environment.task)
+    return float(np.mean([episode.total for episode in evaluation.episodes_in_rows(environment, policy)]))

@@ -7,14 +7,11 @@ from pathlib import Path
 
 import h5py
 
-from arc_suite import checks, registry
+from arc_suite import checks
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import Settings
-from arc_suite.envs.dm import load
-from arc_suite.robots import ROBOTS
-from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import body_from_json
+from arc_suite.envs.setup import Setup
 
 METADATA = "metadata.json"
 MAX_BYTES = 1 << 24  # of the metadata, which hold a body of at most 1 << 18
@@ -36,8 +33,8 @@ MAIN = "main_data.hdf5"
 def open(dataset_id: str) -> "Dataset":
     """Open a dataset that `collect` has written.
 
-    Files are data: nothing that they name is imported. A dataset with a robot, task or arena of
-    another package opens where the caller has imported that package.
+    Nothing that the files name is imported: for a dataset with a robot, task or arena of another package, import
+    that package first.
 
     Args:
         dataset_id: such as "arc_suite/queen/walk/cpg-medium-v0"; Minari says where datasets lie.
@@ -50,12 +47,12 @@ def open(dataset_id: str) -> "Dataset":
 
 
 class Dataset:
-    """A dataset of recorded episodes: a sequence of `Episode`s, each read when it is asked for.
+    """A dataset of recorded episodes: a sequence of `Episode`s, each read on access.
 
     Attributes:
         id: Minari's.
         path: its folder.
-        metadata: Minari's for the dataset; "arc_suite" holds `settings`, `versions` and `model_sha256`.
+        metadata: Minari's for the dataset; "arc_suite" holds `Settings.provenance`.
         settings: what the episodes depend on.
     """
 
@@ -63,35 +60,23 @@ class Dataset:
         """Read the metadata; see `open`."""
         self.id, self.path = dataset_id, path
         self.metadata = read_metadata(dataset_id, path)
+        known = self.metadata["arc_suite"]
+        try:
+            setup = Setup.from_dict(known)
+        except ValueError as error:
+            raise ValueError(f"dataset {dataset_id!r}: {METADATA}: {checks.quoted(error)}") from None
         with damages(dataset_id, path / "data" / METADATA):
-            known = self.metadata["arc_suite"]["settings"]
-            names = json.loads(self.metadata["env_spec"])["kwargs"]  # with the modules that register them
-            domain, task = (_typed(name, names[name], str) for name in ("domain_name", "task_name"))
-            task_kwargs = _typed("task_kwargs", known["task_kwargs"], dict)
             presets = _typed("presets", known["presets"], list)
-            fields = {
-                "policy": _typed("policy", known["policy"], str),
-                "presets": tuple(_typed("presets", preset, str) for preset in presets),
-                "noise": checks.number("noise", known["noise"], 0.0),
-                "seed": checks.seed(known["seed"]),
-                "steps": checks.integer("steps", known["steps"], 1),
-                "task": task,
-                "task_kwargs": task_kwargs,
-            }
+            self.settings = Settings(
+                setup=setup,
+                policy=_typed("policy", known["policy"], str),
+                presets=tuple(_typed("presets", preset, str) for preset in presets),
+                noise=checks.number("noise", known["noise"], 0.0),
+                seed=checks.seed(known["seed"]),
+                steps=checks.integer("steps", known["steps"], 1),
+            )
             self._length = checks.integer("total_episodes", self.metadata["total_episodes"], 0, 1 << 32)
             checks.integer("total_steps", self.metadata["total_steps"], 0, 1 << 53)
-        try:
-            for kind, name in (("domain", domain), ("task", task), ("arena", str(task_kwargs.get("arena", "flat")))):
-                if not _is_body(name):
-                    registry.imported(kind, name)
-        except ValueError as error:
-            raise ValueError(f"dataset {dataset_id!r}: {error}") from None
-        with damages(dataset_id, path / "data" / METADATA):
-            self.settings = Settings(_body(domain), **fields)
-
-    def environment(self):
-        """Return the dm_env in which the episodes play."""
-        return load(self.settings.body, self.settings.task, self.settings.task_kwargs)
 
     def __len__(self) -> int:
         return self._length
@@ -104,7 +89,7 @@ class Dataset:
             ValueError: it is damaged; one line.
         """
         index = range(len(self))[index]
-        joints = len(self.settings.body.joint_names)
+        joints = len(self.settings.setup.body.joint_names)
         with self.reading() as file:
             episode = episodes.read(file, index)
             if episode.actions.shape[1] != joints:
@@ -146,7 +131,7 @@ def damages(dataset_id: str, file: Path):
 
 
 def plain(path: Path) -> Path:
-    """Return the path of a file; whatever else it may be, such as a pipe, is not waited for.
+    """Return the path if it is that of a file; reading a pipe would block.
 
     Raises:
         OSError: there is no file.
@@ -154,17 +139,6 @@ def plain(path: Path) -> Path:
     if path.exists() and not path.is_file():
         raise OSError("expected a file")
     return path
-
-
-def _is_body(domain: str) -> bool:
-    """Return whether a domain is the text of a body, and not a name."""
-    return domain.startswith("{")
-
-
-def _body(domain: str) -> Body:
-    if _is_body(domain):
-        return body_from_json(domain)
-    return ROBOTS[checks.name(domain.rpartition(":")[2], ROBOTS, "domain")]
 
 
 def _typed(name: str, value, kind: type):
@@ -187,12 +161,6 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
     with damages(dataset_id, path):
-        for name, kind in (("settings", dict), ("versions", dict), ("model_sha256", str)):
+        for name, kind in (("versions", dict), ("model_sha256", str)):
             _typed(f"{name} of arc_suite", metadata["arc_suite"][name], kind)
-        _typed("env_spec", metadata["env_spec"], str)
-    if "task" not in metadata["arc_suite"]["settings"]:
-        raise ValueError(
-            f"dataset {dataset_id!r} is of an earlier form, which does not tell its task: collect it anew, "
-            "with --overwrite under the same id"
-        )
     return metadata

@@ -25,7 +25,7 @@ class Episode(NamedTuple):
 
     Attributes:
         seed: of its reset.
-        preset: of the demonstrator that walked; None for other policies.
+        preset: of the demonstrator; None for other policies.
         observations: (steps + 1, size) float32; the first is that of the reset.
         actions: (steps, joints) float32 in [-1, 1], as applied.
         rewards: (steps,) float64.
@@ -59,15 +59,14 @@ class Episode(NamedTuple):
         return sum(array.nbytes for array in self.arrays().values())
 
     def playback(self) -> Script:
-        """Return a policy, for one row, that does what was done; after the last recorded action, nothing.
+        """Return a policy, for one environment, that repeats the recorded actions; after the last, all are 0.
 
-        In an environment of the same body and task, whose reset has the episode's seed, it repeats
-        the episode to the bit.
+        In an environment of the same setup, reset with the episode's seed, the episode is repeated bit by bit.
         """
         return Script(lambda seed: self.actions, 1, self.actions.shape[1])
 
     def digest(self) -> str:
-        """Return the sha256 of the whole episode: equal for episodes that are equal to the bit."""
+        """Return the sha256 of the whole episode: equal for bit-equal episodes."""
         total = hashlib.sha256(f"{self.seed} {self.preset}".encode())
         for name, array in sorted(self.arrays().items()):
             total.update(f"{name} {array.dtype.str} {array.shape}".encode())
@@ -102,8 +101,8 @@ def read(file, index: int) -> Episode:
     Sizes are compared with the file's before anything is read, and no link leads out of the dataset's folder.
 
     Raises:
-        ValueError: its attributes, the digest among them, are not those of what is in it, or it is
-            stored otherwise than `write` does.
+        ValueError: its attributes, such as the digest, do not fit its content, or it is stored otherwise than
+            `write` does.
         KeyError: there is no such episode, or something in it is missing.
         OSError: it cannot be read.
     """
@@ -238,5 +237,5 @@ def index(group: str) -> int:
 
 
 def name(index: int) -> str:
-    """Return the name of an episode's group in the HDF5 file, as Minari has it."""
+    """Return Minari's name of an episode's group in the HDF5 file."""
     return f"episode_{index}"

@@ -26,7 +26,7 @@ def play(environment: VectorEnv, policy: Policy, seeds: Sequence[int], steps: in
     """Play one episode for each seed; a row whose episode ends starts the next one at once.
 
     An episode depends on its seed and the policy alone, not on rows, threads or its neighbours.
-    Actions are rounded to float32 before they are applied, so that what is recorded is what was done.
+    Actions are rounded to float32 before they are applied, so that the recorded actions are the applied ones.
 
     Args:
         environment: with at most as many rows as there are seeds.

@@ -1,14 +1,13 @@
-"""Storage of a dataset while it is collected: whenever a kill or a full disk comes, what is there opens.
+"""Storage of a dataset while it is collected, which opens after a kill or a full disk at any moment.
 
-No file is written where it is read. Finished episodes go to part files, `data/parts/<n>.hdf5`, each
-written beside its place and moved there. `main_data.hdf5`, which Minari opens, is a small file of
-links to the episodes before the first that is missing, and is replaced after each part;
-`metadata.json`, which is there before the first part, follows and tells how many there are. In the
-end the parts are merged into one plain `main_data.hdf5`, whose episodes, but not all other bytes, do
-not depend on how they got there.
+Files are written under temporary names and then moved. Finished episodes go to part files,
+`data/parts/<n>.hdf5`. `main_data.hdf5`, which Minari opens, is a small file of links to the episodes
+before the first missing one, and is replaced after each part; then follows `metadata.json`, with the
+number of episodes. In the end the parts are merged into one plain `main_data.hdf5`, whose episodes
+do not depend on the parts.
 
-A new dataset starts in a hidden folder beside its place, and moves there with its first episodes;
-one that replaces another changes places with it when it is complete.
+A new dataset starts in a hidden folder in the same parent, and moves to its place with its first
+episodes; one that replaces another is exchanged with it when it is complete.
 """
 
 import contextlib
@@ -40,12 +39,12 @@ class Storage:
 
     Attributes:
         id: Minari's.
-        metadata: Minari's, but for the counts; None in a new dataset until the caller sets it.
+        metadata: Minari's without the counts; None in a new dataset until the caller sets it.
         merged: whether the dataset is one plain file.
     """
 
     def __init__(self, dataset_id: str, folder: Path, place: Path, early: bool):
-        """Find out what is in the folder, which moves to its place with the first episodes (early), or at the end."""
+        """Read the folder, which moves to its place with the first episodes (early), or at the end."""
         self.id, self.metadata = dataset_id, None
         self._folder, self._place = folder, place
         self._early = early
@@ -53,7 +52,7 @@ class Storage:
         data = folder / "data"
         with damages(dataset_id, folder):
             for inside in (data, data / PARTS):
-                if inside.is_symlink():  # what is written and deleted lies in the dataset's own folder
+                if inside.is_symlink():  # nothing outside the dataset's folder is written or deleted
                     raise ValueError(f"expected a folder, and {inside} is a link")
         if (data / METADATA).exists() or any(data.rglob("*.hdf5")):
             self.metadata = read_metadata(dataset_id, folder)
@@ -103,12 +102,12 @@ class Storage:
         return frozenset(self._where)
 
     def clear(self) -> None:
-        """Forget what an overwriting collection that was given up has left."""
+        """Delete the files of an unfinished collection."""
         data = self._folder / "data"
         (data / MAIN).unlink(missing_ok=True)
         if (data / PARTS).exists():
             shutil.rmtree(data / PARTS)
-        (data / METADATA).unlink()  # last: without it nobody would know what the others are
+        (data / METADATA).unlink()  # last: the other files have no meaning without it
         self._where, self.metadata, self.merged = {}, None, False
 
     def add(self, finished: Mapping[int, Episode]) -> None:
@@ -153,7 +152,7 @@ class Storage:
             progress: wraps an iterable of the episodes' indices, such as `tqdm`.
 
         Raises:
-            OSError: there is no room, for a moment, for the dataset twice; what is there still opens.
+            OSError: the disk has no space for two copies of the dataset; the present one still opens.
         """
         data, count = self._folder / "data", self._count()
         if not self.merged:
@@ -176,7 +175,7 @@ class Storage:
         self._move()
 
     def _scan(self, pattern: str) -> None:
-        """Find out what episodes there are; what is kept is read, and its digests compared."""
+        """Find the episodes on disk, read them and compare their digests."""
         data = self._folder / "data"
         for path in sorted(data.glob(pattern)):
             part = path.relative_to(data).as_posix()

@@ -1,16 +1,15 @@
-"""Verifies datasets: replays them and compares to the bit."""
+"""Verifies datasets: replays them and compares bit by bit."""
 
 import contextlib
 from collections.abc import Callable
 
 from tqdm import tqdm
 
-from arc_suite import checks, registry, versions
+from arc_suite import checks, registry
 from arc_suite.data import rollouts
 from arc_suite.data.collection import ROWS
 from arc_suite.data.dataset import open
 from arc_suite.data.episodes import Episode
-from arc_suite.data.settings import model_sha256
 from arc_suite.policies import Script
 from arc_suite.robots.spec import Body
 
@@ -23,15 +22,15 @@ def verify(
     progress: Callable = tqdm,
     task: str | None = None,
 ) -> int:
-    """Replay every episode of a dataset from its seed and compare everything to the bit.
+    """Replay every episode of a dataset from its seed and compare all arrays bit by bit.
 
     Args:
         dataset_id: Minari's.
-        body: what should have moved; None for any.
+        body: the expected body; None for any.
         rows: how many are replayed at a time.
         threads: on which to simulate; None for all cores.
         progress: makes a progress bar as `tqdm` does.
-        task: name of what should have been done; None for any.
+        task: name of the expected task; None for any.
 
     Returns:
         The number of episodes.
@@ -42,20 +41,20 @@ def verify(
     """
     dataset = open(dataset_id)
     settings, was = dataset.settings, dataset.metadata["arc_suite"]
-    if body not in (None, settings.body):
-        raise ValueError(f"dataset {dataset_id!r} holds episodes of {settings.body.name}, and not of {body.name}")
-    if task is not None and registry.task_of(task) is not registry.task_of(settings.task):
-        raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {settings.task}, and not of {task}")
-    for package, version in versions.recorded().items():
+    if body not in (None, settings.setup.body):
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of {settings.setup.body.name}, and not of {body.name}")
+    setup, now = settings.setup, settings.setup.provenance()
+    if task is not None and registry.task_of(task) is not setup.kind:
+        raise ValueError(f"dataset {dataset_id!r} holds episodes of the task {setup.task}, and not of {task}")
+    for package, version in now["versions"].items():
         if was["versions"].get(package) != version:
             there = f"{package} {checks.quoted(was['versions'].get(package))}"
             raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {version} is installed")
-    version, task = was["settings"].get("task_version"), registry.task_of(settings.task)
-    if version != task.version:
-        there = f"version {checks.quoted(version)} of {task.name}"
-        raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {task.version} is installed")
-    if was["model_sha256"] != model_sha256(settings.body, settings.task, settings.task_kwargs):
-        raise ValueError(f"dataset {dataset_id!r} was collected with another model of {settings.body.name}")
+    if was.get("task_version") != now["task_version"]:
+        there = f"version {checks.quoted(was.get('task_version'))} of {setup.kind.name}"
+        raise ValueError(f"dataset {dataset_id!r} was collected with {there}; {now['task_version']} is installed")
+    if was["model_sha256"] != now["model_sha256"]:
+        raise ValueError(f"dataset {dataset_id!r} was collected with another model of {setup.body.name}")
     count, first = len(dataset), settings.seed
     if not count:
         return 0

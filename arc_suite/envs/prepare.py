@@ -54,7 +54,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
 
 
 def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> Symmetry:
-    """Return the exact mirror maps of a task's observations and actions, left for right.
+    """Return the exact left-right symmetry of a task's observations and actions.
 
     `symmetry(...).observation` maps observation vectors (..., size), `.action` actions (..., joints); see
     `tasks.contract.Task.symmetry`.
@@ -65,7 +65,7 @@ def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         task_kwargs: as in `load`.
 
     Raises:
-        ValueError: the body, the gait or the task has no mirror image, or see `load`; one line.
+        ValueError: the body, the gait or the task is not symmetric, or see `load`; one line.
         OSError: a file that cannot be read.
     """
     return prepared(domain_name, task_name, task_kwargs)[0].symmetry

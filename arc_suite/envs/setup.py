@@ -174,8 +174,9 @@ class Setup:
         else:  # by its name alone: a path of a file is none
             robot = registry.imported("robot", robot).rpartition(":")[2]
             body = ROBOTS[checks.name(robot, ROBOTS, "robot")]
+        registry.imported("task", task)
         registry.imported("arena", str(settings.get("arena", "flat")))
-        return cls.of(body, registry.imported("task", task), settings)
+        return cls.of(body, task, settings)
 
     def __str__(self) -> str:
         return f"{self.body.name}, {self.kind.name}" + (f", {self.settings_json}" if self.settings_json != "{}" else "")

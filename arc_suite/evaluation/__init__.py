@@ -1,4 +1,4 @@
-"""Evaluation of policies: the protocol, and figures over episodes."""
+"""Evaluation of policies: the protocol, and statistics over episodes."""
 
 from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, episodes_in_rows, expert_return, rollout, run
 from arc_suite.evaluation.statistics import (

@@ -5,25 +5,26 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import Policy, alone
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting
 
-# Returns of the paper's demonstrators in the task walk, read off the expert lines of its figures. What ours earn is
-# measured, in the README's table.
+# Returns of the paper's demonstrators in the task walk, read off the expert lines of its figures. The README's table
+# has those of ours.
 EXPERT_RETURNS = {"queen": 2048.0, "bastion": 2311.0, "tick": 1971.0, "leaper": 2630.0}
 
-_PROGRESS = "progress_"  # with which an info's names of the task's figures begin
+_PROGRESS = "progress_"  # prefix of the task's metrics in an info
 
 
 class Episode(NamedTuple):
-    """The figures of one episode.
+    """The results of one episode.
 
     Attributes:
         total: its return.
         length: control steps.
-        progress: the task's figures at its end by name.
+        progress: the task's metrics at its end by name.
     """
 
     total: float
@@ -31,9 +32,10 @@ class Episode(NamedTuple):
     progress: Mapping[str, float]
 
 
-def expert_return(task: str, robot: str) -> float | None:
-    """Return what the paper's demonstrator of a robot earns in a task; None where the paper has none."""
-    return EXPERT_RETURNS.get(robot) if task == "walk" else None
+def expert_return(setup: Setup) -> float | None:
+    """Return what the paper's demonstrator earns; None for other tasks, settings and robots than the paper's."""
+    published = setup.kind.name == "walk" and not setup.task_kwargs
+    return EXPERT_RETURNS.get(setup.body.name) if published else None
 
 
 def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Iterator:
@@ -58,9 +60,9 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
 
 
 def run(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Episode:
-    """Play one episode and sum it up; the arguments are those of `rollout`."""
+    """Play one episode and return its results; for the arguments see `rollout`."""
     rewards = [timestep.reward for timestep in rollout(environment, policy, seed, max_steps) if not timestep.first()]
-    progress = {name: float(figure) for name, figure in environment.task.progress.items()}
+    progress = {name: float(value) for name, value in environment.task.progress.items()}
     return Episode(float(sum(rewards)), len(rewards), progress)
 
 
@@ -70,7 +72,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
     Args:
         environment: of `arc_suite.load`.
         policy: made for one row.
-        seeds: of the episodes; those of the protocol if not given.
+        seeds: of the episodes; by default the protocol's.
     """
     return [run(environment, policy, seed) for seed in seeds]
 
@@ -78,12 +80,12 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 def episodes_in_rows(environment: VectorEnv, policy: Policy, seeds: Sequence[int] = range(EPISODES)) -> list[Episode]:
     """Run one episode for each seed, all at once.
 
-    They are those of `episodes`, to the bit, where the policy takes observations as float32, as networks do.
+    They are bit-equal to those of `episodes` if the policy takes observations as float32, as networks do.
 
     Args:
         environment: one row for each seed, in the mode Disabled.
         policy: made for as many rows.
-        seeds: of the episodes; those of the protocol if not given.
+        seeds: of the episodes; by default the protocol's.
     """
     rows = len(seeds)
     observations, _ = environment.reset(seed=list(seeds))
@@ -97,8 +99,8 @@ def episodes_in_rows(environment: VectorEnv, policy: Policy, seeds: Sequence[int
         lengths += playing
         ended = playing & (terminated | truncated)
         for row in np.flatnonzero(ended):
-            figures = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
-            progress[row] = {name.removeprefix(_PROGRESS): float(values[row]) for name, values in figures.items()}
+            metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}
+            progress[row] = {name.removeprefix(_PROGRESS): float(values[row]) for name, values in metrics.items()}
         playing &= ~ended
         if ended.any() and playing.any():
             environment.rest(~playing)

@@ -1,4 +1,4 @@
-"""Figures over episodes and runs, with stratified bootstrap intervals.
+"""Statistics over episodes and runs, with stratified bootstrap intervals.
 
 Interquartile means, probabilities of improvement, performance profiles and learning curves are those of Agarwal
 et al., "Deep reinforcement learning at the edge of the statistical precipice", 2021.

@@ -21,7 +21,7 @@ RIGS = ("skin", "nodes")
 ROOT_MOTIONS = {"both": (True, False), "moving": (True,), "in_place": (False,)}
 
 _AXES = (1, 2, 0)  # of ours, that are glTF's x, y and z
-_TOLERANCE = 0.004  # of the standing height, by which a face may cut into what is round
+_TOLERANCE = 0.004  # of the standing height, by which a face may cut into a round shape
 
 
 def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str = "both", generator: str = "") -> bytes:
@@ -35,7 +35,7 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
     Args:
         body: any body.
         clips: of the body.
-        rig: skin, or nodes, of which each has the mesh of its part.
+        rig: skin, or nodes, each with the mesh of its part.
         root_motion: moving, in_place, or both, two animations of each clip that moves.
         generator: what the file says that it was made by.
     """
@@ -64,17 +64,17 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
 
 
 def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
-    """Return what is known of clips, by name of the animation: figures, and when feet touch down and lift off."""
-    told = {name: _told(clip) for clip in clips for name in _named(clip, ROOT_MOTIONS[root_motion])}
+    """Return, JSON-able, the metrics and foot contact events of clips by name of the animation."""
+    animations = {name: _metadata(clip) for clip in clips for name in _named(clip, ROOT_MOTIONS[root_motion])}
     return {
         "body": body.name,
         "units": {"length": "m", "time": "s", "angle": "rad"},
         "axes": {"up": "y", "forward": "z", "left": "x"},
-        "clips": told,
+        "clips": animations,
     }
 
 
-def _told(clip: Clip) -> dict[str, Any]:
+def _metadata(clip: Clip) -> dict[str, Any]:
     forward, left, turning = (round(float(value), 6) for value in clip.motion.twist)
     return {
         "seconds": clip.motion.seconds,
@@ -84,9 +84,9 @@ def _told(clip: Clip) -> dict[str, Any]:
         "forward_speed": forward,
         "left_speed": left,
         "turn_rate": turning,
-        "footfalls": [
-            {"foot": footfall.foot, "event": footfall.event, "time": round(footfall.time, 6)}
-            for footfall in clip.footfalls
+        "foot_contacts": [
+            {"foot": contact.foot, "event": contact.event, "time": round(contact.time, 6)}
+            for contact in clip.foot_contacts
         ],
     }
 
@@ -219,7 +219,7 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
                     {"sampler": index, "target": {"node": node, "path": target}}
                     for index, (node, target, _, _) in enumerate(channels)
                 ],
-                "extras": _told(clip),
+                "extras": _metadata(clip),
             },
         )
 

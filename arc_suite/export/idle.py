@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from arc_suite.cpg.kinematics import Legs
-from arc_suite.export.motions import Motion
+from arc_suite.export.root_motion import Motion
 from arc_suite.models.sizing import GRAVITY, control_timestep
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
@@ -13,7 +13,7 @@ from arc_suite.robots.spec import Body
 _BREATH = 0.012  # of the standing height, by which the torso sinks and rises
 _ASTRAY = 0.01  # of the standing height: a breath is shallower where a sole would be further from its place
 _PERIOD = 12.0  # sqrt(h / g): about a breath, which takes longer the larger the animal
-_BENT = 0.05  # of the way to the middle of a joint's range
+_BENT = 0.05  # of the distance to the middle of a joint's range
 _ROUNDS = 50  # of the search for joint angles
 _WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a sole's place: legs of two joints slide rather than sink
 _DAMPING = 0.02  # of the standing height
@@ -30,7 +30,7 @@ def idle(body: Body) -> Motion:
     samples = max(2, round(_PERIOD * math.sqrt(height / GRAVITY) / step))
     # All of the range: some joints stand at an end of it.
     legs, soles = Legs.of(body, used=1.0), standing(body).soles
-    bent = np.tile(_BENT * 0.5 * (legs.low + legs.high), (samples, 1, 1))  # a straight leg knows no way to bend
+    bent = np.tile(_BENT * 0.5 * (legs.low + legs.high), (samples, 1, 1))  # a straight leg is singular
     goals = np.tile(soles, (samples, 1, 1))
     breath = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(samples) / samples)
     depth = _BREATH * height

@@ -20,7 +20,7 @@ class Shape(NamedTuple):
         kind: of `shapes.KINDS`.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
         place: (3,) in the part's frame, m.
-        quaternion: (4,) likewise, w first.
+        quaternion: (4,) in the same frame, w first.
         material: name.
     """
 
@@ -38,8 +38,8 @@ class Part(NamedTuple):
         name: of the body in the MJCF.
         parent: index of the part above; None for the torso.
         place: (3,) in the frame of the part above, m; of the torso, of the standing one.
-        quaternion: (4,) likewise, w first.
-        joint: index of its joint; None for the torso and for what is rigid on the part above.
+        quaternion: (4,) in the same frame, w first.
+        joint: index of its joint; None for the torso and for rigid parts.
         axis: (3,) of the joint; None without one.
         shapes: that it shows.
     """

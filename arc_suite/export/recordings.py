@@ -1,4 +1,4 @@
-"""Recordings of policies at the pace of the physics: every substep, to the bit."""
+"""Recordings of policies at the pace of the physics: every substep, bit-exact."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -32,7 +32,7 @@ def record(
     """Play a policy and record it, once it has settled.
 
     Control steps are taken in the environment; their substeps are then run again from the state in which
-    the recording begins, with the controls that were applied, which gives the same bits.
+    the recording begins, with the controls that were applied, which is bit-exact.
 
     Args:
         environment: of `arc_suite.load`; its next episode is played.

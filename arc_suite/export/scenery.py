@@ -1,4 +1,4 @@
-"""What is around a body in a recorded episode, as plain data: the ground, obstacles, and marks of what is asked."""
+"""Scenery of a recorded episode as plain data: the ground, obstacles, and debug markers of the command."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,21 +7,20 @@ import mujoco
 import numpy as np
 
 from arc_suite import models
-from arc_suite.envs.dm import load
 from arc_suite.export.parts import KINDS
 from arc_suite.marks import Mark
 from arc_suite.style.tracks import Track
 
-_MARGIN = 12.0  # standing heights of ground about the way
+_MARGIN = 12.0  # standing heights of ground around the path
 _SAME = 1e-3  # of the standing height, by which an episode that is repeated may differ from the recorded one
 
 
 def scenery(track: Track) -> dict[str, Any]:
     """Return the scenery of an episode; lengths are in m and the world's axes.
 
-    The episode is begun anew by its seed, which tells where obstacles stand, and repeated by its actions where its
-    task marks what it asks for. Marks end where the repetition is not what was recorded, as where motors are weak:
-    actions are recorded as they are applied.
+    The episode is started again by its seed, which places the obstacles, and replayed by its actions if its task has
+    debug markers. Markers end where the replay differs from the recording, for example with weak motors, as the
+    recorded actions are the applied ones.
 
     Returns:
         A dictionary:
@@ -32,8 +31,7 @@ def scenery(track: Track) -> dict[str, Any]:
             `styles`: of marks, `shape`, `radius` and `colour`;
             `marks`: for every row of the track, of each mark the index of its style, start and end.
     """
-    settings = {name: value for name, value in track.task_kwargs.items() if name not in ("random", "on_divergence")}
-    environment = load(track.body, track.task, settings)
+    environment = track.setup.load()
     environment.reset(track.seed)
     arena = environment.task.definition.scene.arena
     model = mujoco.MjModel.from_xml_string(models.assemble(track.body, arena, decorated=True).to_xml_string())

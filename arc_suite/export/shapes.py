@@ -41,7 +41,7 @@ def shape(kind: str, size, tolerance: float) -> Mesh:
     Args:
         kind: of `KINDS`.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
-        tolerance: m, by which a face may cut into what is round.
+        tolerance: m, by which a face may cut into a round shape.
     """
     if kind == "box":
         return _box(size)

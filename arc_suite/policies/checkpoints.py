@@ -1,9 +1,9 @@
 """Checkpoints of a run's policy: one folder for each evaluation, which any program takes as a policy.
 
     RUN/checkpoints/<step>/policy.npz   the policy
-    RUN/checkpoints/<step>/agent.json   what it is: algorithm, environment steps, seed, mean return
+    RUN/checkpoints/<step>/agent.json   its metadata: algorithm, environment steps, seed, mean return
 
-The folder `RUN/checkpoints` itself is a policy too: its checkpoints take turns from seed to seed.
+The folder `RUN/checkpoints` itself is a policy, too: its checkpoints take turns from seed to seed.
 """
 
 import json
@@ -13,18 +13,18 @@ from typing import NamedTuple
 from arc_suite import checks, files
 
 FOLDER, AGENT = "checkpoints", "agent.json"
-GRADES = ("random", "medium", "expert", "replay")
+QUALITIES = ("random", "medium", "expert", "replay")
 MEDIUM = 1.0 / 3.0  # of the best return, as in D4RL (Fu et al., 2020)
 
 
 class Agent(NamedTuple):
-    """What a checkpoint is.
+    """Metadata of a checkpoint.
 
     Attributes:
-        algorithm: that learned it.
+        algorithm: name of the algorithm that learned it.
         steps: environment steps until then.
-        seed: of the run.
-        mean_return: of its evaluation.
+        seed: seed of the run.
+        mean_return: mean return of its evaluation.
     """
 
     algorithm: str
@@ -34,7 +34,7 @@ class Agent(NamedTuple):
 
 
 def save(folder: Path, agent: Agent) -> None:
-    """Write what a checkpoint is beside its policy.
+    """Write the metadata of a checkpoint into its folder.
 
     Raises:
         OSError: it cannot be written; one line.
@@ -44,7 +44,7 @@ def save(folder: Path, agent: Agent) -> None:
 
 
 def agents(path: Path) -> list[Agent]:
-    """Return what a checkpoint is, or what those of a folder of checkpoints are by their steps; none for neither.
+    """Return the metadata of one checkpoint, or of all in a folder, sorted by step; none of another folder.
 
     Raises:
         ValueError: a damaged file; one line.
@@ -68,23 +68,23 @@ def at(run: Path, step: int) -> Path:
     return run / FOLDER / str(step)
 
 
-def graded(run: Path, grade: str) -> str:
-    """Return the policy of a grade, as offline RL has them.
+def of_quality(run: Path, quality: str) -> str:
+    """Return the policy of a quality, named as in D4RL.
 
-    random is uniform; medium the first checkpoint that earns a third of what the best one does; expert the latest;
+    random is uniform; medium the first checkpoint that earns a third of the best one's return; expert the latest;
     replay all of them in turn.
 
     Raises:
-        ValueError: an unknown grade, a run without checkpoints, or a medium one of a run that never earned more than
-            nothing; one line.
+        ValueError: an unknown quality, a run without checkpoints, or medium of a run without a positive return; one
+            line.
     """
-    checks.name(grade, GRADES, "grade")
+    checks.name(quality, QUALITIES, "quality")
     there = agents(run / FOLDER)
     if not there:
         raise ValueError(f"{run}: keeps no checkpoints")
-    if grade in ("random", "replay"):
-        return "random" if grade == "random" else str(run / FOLDER)
-    if grade == "expert":
+    if quality in ("random", "replay"):
+        return "random" if quality == "random" else str(run / FOLDER)
+    if quality == "expert":
         return str(at(run, there[-1].steps))
     best = max(agent.mean_return for agent in there)
     if best <= 0.0:

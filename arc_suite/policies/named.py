@@ -14,8 +14,7 @@ from arc_suite.policies import network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import body_to_json
-from arc_suite.tasks import TASKS, Task
+from arc_suite.tasks import Task
 
 _ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
@@ -48,14 +47,14 @@ POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
-    "saved, whose pickles are run; or module:attribute, which makes a policy from a robot's name, or from the Body of "
-    "what is no robot of the suite."
+    "saved, whose pickles are run; or module:attribute, a function that makes a policy from a robot's name, or from "
+    "any other Body."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(PRESETS)}, or another that the robot has."
 
 
 def preset_names() -> tuple[str, ...]:
-    """Return the names of the presets that there are for any robot, those of other packages included."""
+    """Return the names of the presets of all robots, including those of other packages."""
     return tuple(dict.fromkeys(itertools.chain(PRESETS, *TUNINGS.values())))
 
 
@@ -80,8 +79,8 @@ def policy(
             that take turns from seed to seed.
         rows: of the batch.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
-        task: that it is to act in: the demonstrator, whose actions are torques, then gives positions where
-            the task asks for them, as `protocol.Positioned`. None for torques. Other policies give what they give.
+        task: the task to act in; None for torques. If its actions are positions, the demonstrator's torques are
+            converted, see `protocol.Positioned`; other policies are used as they are.
 
     Raises:
         ValueError: an unknown name, or a value out of range; one line that names it and the nearest
@@ -132,14 +131,13 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     if path.suffix == _ZIP:
         return _from_zip(path, body)
     made = network.load(path)
-    if made.robot != body.name and made.robot != body_to_json(body):
-        name = "another body" if made.robot.startswith("{") else made.robot
+    setup = made.setup
+    if setup.body != body and not (is_robot(setup.body) and setup.body.name == body.name):
+        name = "another body of that name" if setup.body.name == body.name else setup.body.name
         raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
     if made.joints != len(body.joint_names):
         raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
-    learned = {**TASKS[made.task].modifiers, **made.task_kwargs} if made.task in TASKS else made.task_kwargs
-    actions = learned.get("actions", Task.actions)
-    if task is not None and actions != task.actions:
+    if task is not None and (actions := setup.definition.actions) != task.actions:
         raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
     return made
 

@@ -1,11 +1,12 @@
-"""Policies that are networks: layers of numbers, evaluated by NumPy, whoever trained them.
+"""Policies that are networks: layers of numbers, evaluated by NumPy, however they were trained.
 
-A policy file is an archive of arrays with one JSON text, which tells for what the policy was made:
+A policy file is an archive of arrays with one JSON text:
 
-    robot, task, task_kwargs, blocks    as in `arc_suite.load`; the blocks in the order of the input
-    layers                              the kind of every layer, by which its arrays are named
+    robot, task, task_kwargs    the setup that the policy was trained in
+    blocks                      size of every block of the observation, in the order of the input
+    layers                      kind of every layer, by whose index its arrays are named
 
-It holds no pickle and no code, so that files of others are data.
+It holds no pickle and no code, so reading a file of others runs nothing.
 """
 
 import hashlib
@@ -14,11 +15,12 @@ import os
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import checks, files
+from arc_suite.envs.setup import Setup
 
 EXTENSION = ".npz"
 FILE = f"policy{EXTENSION}"  # in the folder of a run
@@ -80,20 +82,16 @@ def forward(layers: Sequence[Layer], x: np.ndarray) -> np.ndarray:
 
 
 class Network(NamedTuple):
-    """A deterministic policy, and what it was made for.
+    """A deterministic policy, and the setup it was trained in.
 
     Attributes:
         layers: from the flat observation (rows, size) to actions (rows, joints).
-        robot: name of a robot, or the JSON text of a body.
-        task: name of the task.
-        task_kwargs: its settings, as in `arc_suite.load`.
+        setup: body, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
     """
 
     layers: tuple[Layer, ...]
-    robot: str
-    task: str
-    task_kwargs: Mapping[str, Any]
+    setup: Setup
     blocks: Mapping[str, int]
 
     @property
@@ -119,11 +117,13 @@ class Network(NamedTuple):
         """Return the actions (rows, joints) of a control step; see `Policy.act`.
 
         Raises:
-            ValueError: blocks that are not those it was made for; one line.
+            ValueError: other blocks than those it was trained with; one line.
         """
         sizes = {name: block.shape[-1] for name, block in observation.items()}
         if sizes != dict(self.blocks):
-            raise ValueError(f"policy of {self.task}: expected observation blocks {dict(self.blocks)}, got {sizes}")
+            raise ValueError(
+                f"policy of {self.setup.kind.name}: expected observation blocks {dict(self.blocks)}, got {sizes}"
+            )
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
 
@@ -134,7 +134,8 @@ def save(path: str | os.PathLike, network: Network) -> None:
     Raises:
         OSError: it cannot be written; one line.
     """
-    known = network._asdict() | {"layers": [layer.kind for layer in network.layers]}
+    kinds = [layer.kind for layer in network.layers]
+    known = network.setup.to_dict() | {"blocks": dict(network.blocks), "layers": kinds}
     arrays = {
         f"{index}.{place}": array
         for index, layer in enumerate(network.layers)
@@ -145,10 +146,10 @@ def save(path: str | os.PathLike, network: Network) -> None:
 
 
 def load(path: str | os.PathLike) -> Network:
-    """Read a policy file, or that of a run's folder.
+    """Read a policy file, or that of a run's folder; nothing that it names is imported.
 
     Raises:
-        ValueError: a damaged file; one line.
+        ValueError: a damaged file, or a robot, task or arena whose module has not been imported; one line.
         OSError: it cannot be read; one line.
     """
     path = Path(path)
@@ -161,7 +162,11 @@ def load(path: str | os.PathLike) -> Network:
             arrays = {name: stored[name] for name in stored.files}
         network = Network(
             tuple(_layer(kind, index, arrays) for index, kind in enumerate(known["layers"])),
-            **{name: _typed(name, known[name], kind) for name, kind in _KINDS_OF_FIELDS.items()},
+            Setup.from_dict(known),
+            {
+                name: checks.integer(f"block {name}", size, 0)
+                for name, size in checks.mapping("blocks", known["blocks"]).items()
+            },
         )
         if network.joints < 1:  # finds out whether the shapes fit
             raise ValueError("expected actions")
@@ -173,7 +178,7 @@ def load(path: str | os.PathLike) -> Network:
 
 
 def digest(path: str | os.PathLike) -> str:
-    """Return the sha256 of a policy file, of that of a run's folder, or of all those of a folder of checkpoints."""
+    """Return the sha256 of a policy file, of a run's policy file, or of all policy files of a folder of checkpoints."""
     path = Path(path)
     files_of = [path / FILE] if (path / FILE).is_file() else checkpoint_files(path) if path.is_dir() else [path]
     return hashlib.sha256(b"".join(file.read_bytes() for file in files_of)).hexdigest()
@@ -183,15 +188,6 @@ def checkpoint_files(folder: Path) -> list[Path]:
     """Return the policy files of a folder of checkpoints, `FOLDER/<step>/policy.npz`, by their steps."""
     found = [path for path in folder.glob(f"*/{FILE}") if path.parent.name.isdecimal()]
     return sorted(found, key=lambda path: int(path.parent.name))
-
-
-_KINDS_OF_FIELDS = {"robot": str, "task": str, "task_kwargs": dict, "blocks": dict}
-
-
-def _typed(name: str, value: Any, kind: type) -> Any:
-    if not isinstance(value, kind):
-        raise TypeError(f"expected {name} to be a {kind.__name__}")
-    return value
 
 
 def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray]) -> Layer:

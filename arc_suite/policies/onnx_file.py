@@ -1,8 +1,7 @@
 """Policies as ONNX, which game engines and onnxruntime run: all layers of a network, its normaliser among them.
 
 The input `observations` is (rows, size) float32, flat: the task's blocks one after the other. The output
-`actions` is (rows, joints) in [-1, 1]. What else a game needs to know is in the metadata, JSON by name; see
-`metadata`.
+`actions` is (rows, joints) in [-1, 1]. The metadata hold what else a game needs, JSON by name; see `metadata`.
 """
 
 import json
@@ -11,9 +10,7 @@ import os
 import numpy as np
 
 from arc_suite import files
-from arc_suite.envs.prepare import prepared
 from arc_suite.policies.network import EPSILON, Layer, Network
-from arc_suite.registry import body_of
 
 OPSET = 17  # the first with LayerNormalization
 IR_VERSION = 8  # of the same time, so that older runtimes read it
@@ -22,9 +19,9 @@ INPUT, OUTPUT = "observations", "actions"
 
 
 def metadata(network: Network) -> dict:
-    """Return what a file says of a policy, by name.
+    """Return the metadata of a policy's file, by name.
 
-    robot, task, task_kwargs    what it was made for
+    robot, task, task_kwargs    the setup it was trained in
     blocks                      size of every block of the observation by name, in order
     control_timestep            s between two actions
     substeps                    of the simulation between them
@@ -32,12 +29,9 @@ def metadata(network: Network) -> dict:
     gears                       N m that an action of 1 is, by joint
     gait_clock                  how the block of that name follows from time; only where there is one
     """
-    task, model = prepared(body_of(network.robot), network.task, network.task_kwargs)
+    task, model = network.setup.prepared()
     step = task.scene.control_timestep
-    known = {
-        "robot": network.robot,
-        "task": network.task,
-        "task_kwargs": dict(network.task_kwargs),
+    known = network.setup.to_dict() | {
         "blocks": dict(network.blocks),
         "control_timestep": step,
         "substeps": round(step / model.opt.timestep),
@@ -90,7 +84,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
 
 
 def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
-    """The operators of a layer: names, constants beside the input, attributes."""
+    """The operators of a layer: names, constants after the input, attributes."""
     arrays = [np.ascontiguousarray(array, np.float32) for array in layer.arrays]
     one = np.float32(1.0)
     return {

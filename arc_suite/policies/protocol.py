@@ -15,7 +15,7 @@ from arc_suite.tasks.modified import Modified
 class Policy(Protocol):
     """A policy for the rows of a batch, each row an episode of its own.
 
-    What it does in an episode depends on nothing but the episode's seed, observations and rewards.
+    Its actions in an episode depend on the episode's seed, observations and rewards alone.
     """
 
     def begin(self, rows: Sequence[int], seeds: Sequence[int]) -> None:
@@ -26,7 +26,7 @@ class Policy(Protocol):
 
         Args:
             observation: blocks by name, each (rows, size).
-            rewards: (rows,) of the step before; of a first step there is none, and it counts for nothing.
+            rewards: (rows,) of the step before; ignored in the first step of an episode.
 
         Returns:
             (rows, joints), to be clipped to [-1, 1].
@@ -34,7 +34,7 @@ class Policy(Protocol):
 
 
 class Script:
-    """A policy whose actions do not depend on what happens."""
+    """An open-loop policy: its actions do not depend on observations."""
 
     def __init__(self, script: Callable[[int], Iterable[np.ndarray]], rows: int, joints: int):
         """Take a function of a seed that gives the actions (joints,) of its episode; past their end, 0."""
@@ -53,7 +53,7 @@ class Script:
 
 
 class Sum:
-    """A policy whose actions are the sums of those of two."""
+    """The sum of the actions of two policies."""
 
     def __init__(self, first: Policy, second: Policy):
         """Take the policies."""
@@ -70,13 +70,13 @@ class Sum:
 
 
 class Positioned:
-    """A policy of torques where motors hold positions: its actions are the positions for which they give its torques.
+    """A policy of torques in a task of positions: the positions at which the motors apply these torques.
 
-    They do so where the observation is exact, and as far as joints reach.
+    The torques are exact if the observation is, within the range of the joints.
     """
 
     def __init__(self, policy: Policy, task: Modified):
-        """Take a policy, and the task with `actions="position"` that it is to act in."""
+        """Take a policy of torques, and a task with `actions="position"`."""
         self._policy, self._task = policy, task
 
     def begin(self, rows: Sequence[int], seeds: Sequence[int] = ()) -> None:
@@ -87,7 +87,7 @@ class Positioned:
         """Return the positions (rows, joints), as actions in [-1, 1].
 
         Raises:
-            ValueError: an observation without the blocks that tell how the joints are; one line.
+            ValueError: an observation without the blocks of joint angles and velocities; one line.
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
         _, angles, speeds = felt(observation, torques.shape[-1])
@@ -95,7 +95,7 @@ class Positioned:
 
 
 class Mixture:
-    """A policy that is one of several, which take turns from seed to seed."""
+    """Several policies that take turns from seed to seed."""
 
     def __init__(self, policies: Sequence[Policy], rows: int):
         """Take the policies; the episode of seed s is that of the one at s modulo their number."""
@@ -117,8 +117,7 @@ class Mixture:
 class Individuals:
     """A policy of plain functions of a dm_env `TimeStep`, one made anew for every episode.
 
-    A function gets what it would get in the environment of `arc_suite.load`: named blocks, in the
-    precision in which they come.
+    A function gets the observations of the environment of `arc_suite.load`: named blocks.
     """
 
     def __init__(self, make: Callable[[], Callable], rows: int, joints: int, name: str = "policy"):
@@ -142,8 +141,8 @@ class Individuals:
         """Return the actions (rows, joints).
 
         Raises:
-            ValueError: one of another shape, not of numbers, or with NaN; one line that tells the
-                episode and the step.
+            ValueError: an action of another shape, not of numbers, or with NaN; one line that names the episode
+                and the step.
         """
         actions = np.zeros((len(self._functions), self._joints))
         for row, function in enumerate(self._functions):

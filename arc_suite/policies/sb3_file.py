@@ -1,6 +1,6 @@
 """Policies that stable-baselines3 has saved, as zips; it must be installed to import this module.
 
-A zip holds pickles: reading one runs what is in it. What `VecNormalize` has learned lies in another file, so
+A zip holds pickles: reading one runs its code. The statistics of `VecNormalize` lie in another file, so
 that policies of normalised observations need a function of one's own (`--policy module:attribute`).
 """
 
@@ -46,7 +46,7 @@ class Saved:
         """Start episodes: nothing to do, as the policy remembers nothing."""
 
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
-        """Return the actions of a control step; each row is asked alone, as its bits are not to depend on others.
+        """Return the actions of a control step; one prediction for each row, so that its bits do not depend on others.
 
         Raises:
             ValueError: observations of another size; one line.

@@ -10,6 +10,7 @@ import numpy as np
 
 from arc_suite import checks, evaluation, files
 from arc_suite.agents import run_folder
+from arc_suite.envs.setup import Setup
 from arc_suite.studies import results, tables
 from arc_suite.studies.results import STRIP, Result
 from arc_suite.studies.tables import Run, Study
@@ -72,7 +73,9 @@ def _final(result: Result) -> float:
 
 def _of_all(names: Sequence[str]) -> Callable[[str, _Of], float | None]:
     """The least lead of some algorithms over the paper's demonstrator."""
-    return lambda robot, of: _least([_difference(of(robot, n), evaluation.expert_return("walk", robot)) for n in names])
+    return lambda robot, of: _least(
+        [_difference(of(robot, n), evaluation.expert_return(Setup.of(robot))) for n in names]
+    )
 
 
 def _pairs(robot: str, of: _Of) -> float | None:
@@ -247,8 +250,7 @@ def _is_papers(result: Result) -> bool:
 
 def _expert(run: Run) -> float | None:
     """Return the return of the paper's demonstrator in a run's place; None if the paper has none."""
-    setup = run.configuration.setup
-    return None if setup.task_kwargs else evaluation.expert_return(setup.kind.name, setup.body.name)
+    return evaluation.expert_return(run.configuration.setup)
 
 
 def _finals(groups: Groups, demonstrators) -> str:

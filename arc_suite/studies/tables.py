@@ -28,7 +28,7 @@ class Prior(NamedTuple):
 
     def settings(self, setup: Setup) -> Settings:
         """Return the settings of the dataset."""
-        return Settings(setup.body, "cpg", (self.preset,), task=setup.task, task_kwargs=setup.task_kwargs)
+        return Settings(setup, "cpg", (self.preset,))
 
     def dataset_id(self, setup: Setup) -> str:
         """Return the id of the dataset."""

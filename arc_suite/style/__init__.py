@@ -1,8 +1,8 @@
-"""Style of movement, beside what it earns: recorded rollouts, metrics of style, and pictures of both."""
+"""Style of movement: recorded rollouts, metrics of style, and pictures of both."""
 
 from arc_suite.style.files import load, save
 from arc_suite.style.measures import METRICS, measure, report
-from arc_suite.style.sources import Source, Stage, source
+from arc_suite.style.sources import Source, source
 from arc_suite.style.tracks import Track, record
 
-__all__ = ["METRICS", "Source", "Stage", "Track", "load", "measure", "record", "report", "save", "source"]
+__all__ = ["METRICS", "Source", "Track", "load", "measure", "record", "report", "save", "source"]

@@ -1,4 +1,4 @@
-"""Colours of pictures, Okabe and Ito's and Tol's, told apart by colour-blind eyes too."""
+"""Colours of pictures, Okabe and Ito's and Tol's, which colour-blind readers can tell apart."""
 
 import itertools
 from collections.abc import Iterable

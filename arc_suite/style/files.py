@@ -1,7 +1,7 @@
-"""Saves and loads tracks: one .npz file of plain arrays, with the body and the versions that made them, and no pickles.
+"""Saves and loads tracks of one setup: an .npz file of plain arrays, with the versions that made them, and no pickles.
 
-Track i's field positions is the array `i/positions`; what is a mapping or a tuple of names, such as
-the reward's terms, has an array for each, `i/terms/forward`. Numbers are arrays without axes.
+The array `setup` is the setup's JSON. The field positions of track i is the array `i/positions`; a mapping, such as
+the reward's terms, has an array for each entry, `i/terms/forward`. Numbers are arrays without axes.
 """
 
 import io
@@ -15,19 +15,17 @@ from typing import Any
 import numpy as np
 
 from arc_suite import checks, versions
+from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.style.tracks import Track
 from arc_suite.tasks import terms
 
-FORMAT = "arc_suite tracks 2"  # another number for every change of what a file holds
+FORMAT = "arc_suite tracks 3"  # another number for every change of what a file holds
 
 _HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
 # Types of single values, and shapes of arrays.
 _FIELDS = {
-    "task": str,
-    "task_kwargs": str,
     "seed": int,
     **dict.fromkeys(("time_step", "target_velocity", "mass", "gravity"), float),
     **dict.fromkeys(("positions", "linear_velocities", "angular_velocities"), ("steps", 3)),
@@ -36,28 +34,27 @@ _FIELDS = {
     **dict.fromkeys(("torso_heights", "phases"), ("steps",)),
     **dict.fromkeys(("foot_positions", "foot_velocities"), ("steps", "feet", 3)),
     **dict.fromkeys(("foot_heights", "contacts"), ("steps", "feet")),
-    **dict.fromkeys(("legs", "mirrors", "foot_radii"), ("feet",)),
-    "joint_legs": ("joints",),
 }
 _PARAMETERS = dict.fromkeys(terms.Parameters._fields, float) | {"phase_offsets": ("feet",), "healthy_range": (2,)}
-_KINDS = {"contacts": "b", "legs": "U", "mirrors": "i", "joint_legs": "i"}  # of dtype; others are numbers
+_KINDS = {"contacts": "b"}  # of dtype; others are numbers
 
 
 def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
-    """Write tracks of one body.
+    """Write tracks of one setup.
 
     Raises:
-        ValueError: no tracks, tracks of several bodies, or settings of a task that JSON cannot hold;
-            one line.
+        ValueError: no tracks, or tracks of several setups; one line.
         OSError: the file cannot be written.
     """
-    bodies = {track.body for track in tracks}
-    if len(bodies) != 1:
-        raise ValueError(f"tracks: expected those of one body, got {sorted(body.name for body in bodies)}")
-    arrays = {"format": FORMAT, "body": body_to_json(*bodies), "versions": json.dumps(versions.recorded())}
+    setups = {track.setup for track in tracks}
+    if len(setups) != 1:
+        raise ValueError(f"tracks: expected those of one setup, got {sorted(map(str, setups))}")
+    (setup,) = setups
+    known = {"setup": setup.to_dict(), "versions": versions.recorded()}
+    arrays = {"format": FORMAT, **{name: json.dumps(value) for name, value in known.items()}}
     for index, track in enumerate(tracks):
-        fields = track._asdict() | {"task_kwargs": checks.json_text("task_kwargs", track.task_kwargs)}
-        del fields["body"]
+        fields = track._asdict()
+        del fields["setup"]
         arrays |= _flat({name: value for name, value in fields.items() if value is not None}, str(index))
     with open(path, "wb") as file:
         np.savez(file, **arrays)
@@ -74,10 +71,11 @@ def _flat(fields: Mapping, path: str) -> dict:
 
 
 def load(path: str | os.PathLike) -> list[Track]:
-    """Read tracks, equal to the bit to those that were saved.
+    """Read tracks, bit-equal to those that were saved; nothing that the file names is imported.
 
     Raises:
-        ValueError: the file holds no tracks, or those of another format, or is damaged; one line.
+        ValueError: the file holds no tracks, or those of another format, is damaged, or names a module that has not
+            been imported; one line.
         OSError: the file cannot be read; one line.
     """
     try:
@@ -88,10 +86,13 @@ def load(path: str | os.PathLike) -> list[Track]:
         try:
             arrays = _arrays(file)
             if (found := str(arrays.get("format", "no tracks"))[:80]) == FORMAT:
-                body = body_from_json(_value("body", arrays["body"], str))
+                setup = Setup.from_dict(json.loads(_value("setup", arrays["setup"], str)))
                 count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
-                return [_track(body, arrays, index) for index in range(count)]
-        except Exception as error:  # a damaged archive raises whatever its damage leads to
+                tracks = [_track(setup, arrays, index) for index in range(count)]
+                if any(_names(track) != _names(tracks[0]) for track in tracks):
+                    raise ValueError("expected the same progress and gait in all tracks")
+                return tracks
+        except Exception as error:  # a damaged archive may raise anything
             raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
 
@@ -116,8 +117,12 @@ def _arrays(file) -> dict[str, np.ndarray]:
     return arrays
 
 
-def _track(body: Body, arrays: Mapping[str, np.ndarray], index: int) -> Track:
-    """Return the track of an index; arrays without axes become numbers, and those of `Track`'s tuples tuples."""
+def _names(track: Track) -> tuple:
+    return track.terms.keys(), track.progress.keys(), track.parameters is None
+
+
+def _track(setup: Setup, arrays: Mapping[str, np.ndarray], index: int) -> Track:
+    """Return the track of an index; arrays without axes become numbers."""
     fields = {}
     for name, array in arrays.items():
         top, *path = name.split("/")
@@ -126,14 +131,12 @@ def _track(body: Body, arrays: Mapping[str, np.ndarray], index: int) -> Track:
             for key in path[:-1]:
                 mapping = mapping.setdefault(key, {})
             mapping[path[-1]] = array if array.ndim else array.item()
-    _check(fields, body)
+    _check(fields, setup.body)
     if "parameters" in fields:
         low, high = fields["parameters"]["healthy_range"].tolist()
         fields["parameters"] = terms.Parameters(**fields["parameters"] | {"healthy_range": (low, high)})
     absent = {"phases": None, "parameters": None, "progress": {}}
-    task_kwargs = checks.mapping("task_kwargs", json.loads(fields["task_kwargs"]))
-    values = {"legs": tuple(fields["legs"].tolist()), "task_kwargs": task_kwargs}
-    return Track(body=body, **absent | fields | values)
+    return Track(setup=setup, **absent | fields)
 
 
 def _check(fields: Mapping[str, Any], body: Body) -> None:
@@ -157,18 +160,13 @@ def _check(fields: Mapping[str, Any], body: Body) -> None:
             _value(f"parameters/{name}", value, ("joints",) if joints else _PARAMETERS[name], lengths)
         if "phases" not in fields:
             raise ValueError("phases: missing, and there are parameters of a gait")
-    legs = [leg for leg, spec in enumerate(body.legs) for _ in spec.joints]
-    if fields["legs"].tolist() != [leg.name for leg in body.legs] or fields["joint_legs"].tolist() != legs:
-        raise ValueError(f"legs: expected those of {body.name}")
-    if not ((fields["mirrors"] >= -1) & (fields["mirrors"] < lengths["feet"])).all():
-        raise ValueError(f"mirrors: expected indices of legs, got {fields['mirrors'].tolist()}")
     for name in ("time_step", "mass", "gravity"):
         checks.number(name, fields[name], 1e-12)
     checks.seed(fields["seed"])
 
 
 def _value(name: str, value, wanted, lengths: Mapping[str, int] | None = None):
-    """Return a value if it is as wanted: a type of Python's, or the shape of an array, by name or number."""
+    """Return a value if it has the wanted type of Python, or the wanted shape, lengths given by name or number."""
     if isinstance(wanted, type):
         value = value.item() if isinstance(value, np.ndarray) and not value.ndim else value
         if isinstance(value, bool) or not isinstance(value, (int, float) if wanted is float else wanted):

@@ -1,4 +1,4 @@
-"""Reports of style: all metrics of a track by name, and their figures over episodes."""
+"""Reports of style: all metrics of a track by name, and their statistics over episodes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -17,7 +17,7 @@ def _stride_frequency(track: Track) -> float:
 
 
 def _stride_length(track: Track) -> float:
-    """Return the way in a stride at the target speed, m; NaN where no stride or no speed is prescribed."""
+    """Return the displacement in a stride at the target speed, m; NaN where no stride or no speed is prescribed."""
     return track.target_velocity / (_stride_frequency(track) or np.nan)
 
 
@@ -27,7 +27,7 @@ class Metric(NamedTuple):
     Attributes:
         function: of a track.
         unit: shares and indices have none.
-        prescribed: the value that the task asks for, of a track; None where it leaves that open.
+        prescribed: the value that the task prescribes, of a track; None if it prescribes none.
         of_gait: whether it needs the prescribed gait or pose; left out in a task without one.
     """
 
@@ -71,7 +71,7 @@ METRICS = {
 
 
 def measure(track: Track) -> dict[str, Measurement]:
-    """Return the metrics of a track by name; those of the gait if its task prescribes one.
+    """Return the metrics of a track by name; metrics of the gait only if the task prescribes one.
 
     A robot's phase error is the mean size of its legs' errors, so that early and late do not
     cancel. Legs whose value is NaN do not count; NaN if that is all of them.
@@ -93,10 +93,10 @@ def _measurement(track, name, values) -> Measurement:
 
 
 def report(tracks: Sequence[Track]) -> dict:
-    """Return the figures of a policy, over tracks of one body and task.
+    """Return the metrics of a policy, over tracks of one setup.
 
     Returns:
-        `return` and `length` as summaries of the evaluation protocol, `progress` likewise by name, and
+        `return` and `length` as summaries of the evaluation protocol, `progress` as summaries by name, and
         under `metrics`, by name, the `unit`, the value `prescribed` or None, the summary of the `robot`,
         and of each of the `legs`.
     """
@@ -124,6 +124,6 @@ def report(tracks: Sequence[Track]) -> dict:
 
 
 def _prescribed(metric: Metric, track: Track) -> float | None:
-    """Return the value that the task asks for; None where it asks for none."""
+    """Return the prescribed value of a metric, or None."""
     value = metric.prescribed and metric.prescribed(track)
     return None if value is None or np.isnan(value) else value

@@ -2,7 +2,7 @@
 
 A metric of legs gives one value for each, (feet,), and the robot's value is their mean; any other
 gives a number. A value is NaN where what it measures did not happen, such as the stride of a robot
-that stands. A robot that gets nowhere, over less than 5 % of the way that the target speed asks
+that stands. A robot that gets nowhere, over less than 5 % of the distance that the target speed asks
 for, has no course, and its expenses per metre are infinite.
 """
 
@@ -13,7 +13,7 @@ from arc_suite.style.tracks import Track
 
 TWO_PI = 2.0 * np.pi
 
-_NOWHERE = 0.05  # of the way asked for
+_NOWHERE = 0.05  # of the distance at the target speed
 _UNLOCKED = 0.1  # of the schedule's own vector strength; below it a leg follows another rhythm or none
 _BINS = 20  # of a cycle, over which paths of feet are averaged
 
@@ -49,9 +49,9 @@ def phase_error(track: Track) -> np.ndarray:
 
 
 def phase_scatter(track: Track) -> float:
-    """Circular variance of the legs' phase errors (Fisher, 1993), by which they differ from one another; 0 to 1.
+    """Circular variance of the legs' phase errors (Fisher, 1993), 0 to 1.
 
-    0 if all legs are late by the same time, so that the gait is the prescribed one but for a lag;
+    0 if all legs are late by the same time, so that the gait is the prescribed one with a lag;
     1 if half of the legs are half a cycle off the others, as in a hop. NaN for fewer than two legs
     that have a phase.
     """
@@ -61,7 +61,7 @@ def phase_scatter(track: Track) -> float:
 
 
 def stride_length(track: Track) -> np.ndarray:
-    """Mean way of a foot from touchdown to touchdown along world x, the way to go (Alexander, 1984), m; (feet,).
+    """Mean displacement of a foot from touchdown to touchdown along world x (Alexander, 1984), m; (feet,).
 
     Negative backwards. NaN for a foot without two touchdowns. A touchdown ends a swing in which the
     foot rose over half of its clearance: a foot that bounces in stance does not stride.
@@ -72,7 +72,7 @@ def stride_length(track: Track) -> np.ndarray:
 def stride_frequency(track: Track) -> np.ndarray:
     """Strides, from touchdown to touchdown, in a second (Alexander, 1984), Hz; (feet,).
 
-    Touchdowns are those of the stride's length; NaN for a foot without two of them.
+    Touchdowns are those of `stride_length`; NaN for a foot without two of them.
     """
     return 1.0 / _between_touchdowns(track, lambda leg, rows: track.time_step * (rows[1] - rows[0]))
 
@@ -91,7 +91,7 @@ def _between_touchdowns(track, difference) -> np.ndarray:
 
 
 def foot_slip(track: Track) -> np.ndarray:
-    """Way that a foot slides over the ground while it touches, by the way that the torso travels, m/m; (feet,).
+    """Path of a foot that slides on the ground, divided by the displacement of the torso, m/m; (feet,).
 
     Integral of the horizontal speed of the foot's lowest point, so that rolling does not count (the
     foot slippage of Hwangbo et al., "Learning agile and dynamic motor skills for legged robots",
@@ -119,7 +119,7 @@ def _heights(track) -> np.ndarray:
 
 
 def speed(track: Track) -> float:
-    """Mean velocity of the torso along world x, the way to go (the paper's Section 4), m/s; NaN for a single step."""
+    """Mean velocity of the torso along world x (the paper's Section 4), m/s; NaN for a single step."""
     seconds = _seconds(track)
     return float((track.positions[-1, 0] - track.positions[0, 0]) / seconds) if seconds else np.nan
 
@@ -131,7 +131,7 @@ def heading_error(track: Track) -> float:
 
 
 def lateral_drift(track: Track) -> float:
-    """Way to the side, along world y, for each m of the straight line from start to end, m/m; 0 to 1.
+    """Displacement along world y, divided by the straight line from start to end, m/m; 0 to 1.
 
     The sine of the angle between the course and world x: 1 for a robot that walks sideways. NaN
     for a robot that gets nowhere.
@@ -176,7 +176,7 @@ def torque(track: Track) -> np.ndarray:
 
 
 def asymmetry(track: Track) -> np.ndarray:
-    """Distance between a foot's mean path and the mirror image of that of the foot across, m; (feet,).
+    """Distance between a foot's mean path and the reflected one of its left-right counterpart, m; (feet,).
 
     Paths are relative to the torso, averaged over the leg's own cycle of the schedule in bins of a
     twentieth; the distance is the root mean square over the cycle. 0 for a symmetrical gait in
@@ -197,10 +197,10 @@ def asymmetry(track: Track) -> np.ndarray:
 
 
 def cost_of_transport(track: Track) -> float:
-    """Positive work of the motors by weight and way (Collins et al., "Efficient bipedal robots", 2005), J/(N m).
+    """Positive work of the motors by weight and displacement, J/(N m).
 
-    The motors do not win back what they brake. Torque is constant over a control step, so that its
-    work is torque times the turn of the joint.
+    See Collins et al., "Efficient bipedal robots based on passive-dynamic walkers", 2005. Braking recovers no energy.
+    Torque is constant over a control step, so that its work is torque times the turn of the joint.
     """
     work = (track.torques[1:] * np.diff(track.joint_angles, axis=0)).clip(0.0).sum()
     return float(_per_metre(track, work / (track.mass * track.gravity)))
@@ -217,9 +217,9 @@ def _seconds(track) -> float:
 
 def _travelled(track) -> float:
     """Return the length of the straight line from start to end, m; 0 for a robot that gets nowhere."""
-    way = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
-    asked = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
-    return way if way > _NOWHERE * asked else 0.0
+    displacement = float(np.hypot(*(track.positions[-1] - track.positions[0])[:2]))
+    target = 0.0 if np.isnan(track.target_velocity) else abs(track.target_velocity) * _seconds(track)
+    return displacement if displacement > _NOWHERE * target else 0.0
 
 
 def _per_metre(track, amount):

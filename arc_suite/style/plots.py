@@ -1,4 +1,4 @@
-"""Pictures of tracks: footfalls against the schedule, reward by term, speed against target, path of the torso.
+"""Pictures of tracks: foot contacts against the schedule, reward by term, speed against target, path of the torso.
 
 Each function takes labelled tracks, one or two to compare, and returns a figure. Needs matplotlib
 (extra `plot`).
@@ -37,7 +37,7 @@ _LOOK = {
 }
 _WIDTH = 9.5  # inches
 _BELOW = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}  # a legend
-_WINDOW = 4.0  # s of footfalls
+_WINDOW = 4.0  # s of foot contacts
 
 
 def _drawn(draw):
@@ -184,14 +184,14 @@ def path(tracks: Mapping[str, Track]) -> Figure:
     height = max(1.3 * (high - low), 0.16 * width)
     figure = Figure(figsize=(_WIDTH, 0.92 * _WIDTH * height / width + 1.5), layout="constrained")
     axis = figure.subplots()
-    straight = not np.isnan(next(iter(tracks.values())).target_velocity)  # whether x is the way to go
+    straight = not np.isnan(next(iter(tracks.values())).target_velocity)  # whether the target is along x
     if straight:
         axis.axhline(0.0, color=INK, linewidth=1, linestyle=(0, (5, 3)), zorder=0)
     for (label, track), colour in zip(tracks.items(), (BLUE, VERMILION), strict=False):
         x, y = track.positions[:, 0], track.positions[:, 1]
         axis.plot(x, y, color=colour, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
-        way = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
-        arrows = np.flatnonzero(np.diff(way // (0.08 * width))) + 1
+        path = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
+        arrows = np.flatnonzero(np.diff(path // (0.08 * width))) + 1
         axis.quiver(
             x[arrows],
             y[arrows],
@@ -211,7 +211,7 @@ def path(tracks: Mapping[str, Track]) -> Figure:
     axis.set_aspect("equal")
     axis.locator_params(axis="y", nbins=4)
     axis.set_title("Path of the torso from above")
-    axis.set_xlabel("x (m), the way to go" if straight else "x (m)")
+    axis.set_xlabel("x (m), target direction" if straight else "x (m)")
     axis.set_ylabel("y (m)")
     figure.legend(ncols=2, **_BELOW)
     return figure

@@ -1,4 +1,4 @@
-"""Strips of frames: one gait cycle at equal phases, by which policies are compared by eye."""
+"""Strips of frames: one gait cycle at equal phases, to compare policies by eye."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +12,7 @@ from arc_suite.policies import Policy
 FRAMES = 6
 SETTLED = 4  # cycles before the one that is shown
 WIDTH, HEIGHT, GAP = 168, 126, 4  # pixels of a frame, and between two
-CAMERA = "profile"  # goes along and does not turn with the body, so that who walks sideways is seen to
+CAMERA = "profile"  # follows the body without turning, so that walking sideways shows
 
 _AHEAD = (1.0, 0.0, 0.0)  # the command, in units of the body's own speed
 _WHITE = 255
@@ -23,7 +23,7 @@ def ticks(frequency: float, control_timestep: float, length: int, count: int = F
     """Return the ticks of the gait clock, one a control step, at which the frames of a strip are taken.
 
     They are the nearest to equal phases of one gait cycle, from phase 0 on: the cycle after `SETTLED` others, or
-    in a shorter episode the latest of which all frames are there.
+    in a shorter episode the latest whole one.
 
     Args:
         frequency: of the gait, Hz.
@@ -43,7 +43,7 @@ def ticks(frequency: float, control_timestep: float, length: int, count: int = F
 def strip(environment, policy: Policy, seed: int = 0) -> np.ndarray | None:
     """Return a picture of one gait cycle in an episode: `FRAMES` views side by side.
 
-    A task that follows a command is told to go straight ahead.
+    In a task with a command, the command is straight ahead.
 
     Args:
         environment: of `arc_suite.load`.

@@ -1,12 +1,13 @@
 """Records rollouts as plain arrays: all that a report of style needs."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from arc_suite import evaluation
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.clock import wanted_stance
@@ -17,9 +18,7 @@ class Track(NamedTuple):
     """A recorded rollout: one row for the end of every control step, SI units, angles in rad.
 
     Attributes:
-        body: what moved.
-        task: name of the task.
-        task_kwargs: its settings, as in `arc_suite.load`.
+        setup: body, task and settings.
         seed: of the episode; the actions repeat it, unless motors were weak or actions late.
         time_step: s between rows.
         positions: (steps, 3) of the torso.
@@ -38,20 +37,14 @@ class Track(NamedTuple):
         phases: (steps,) of the gait clock, rad; None in a task without a gait.
         terms: the reward's unweighted terms by name, each (steps,).
         weights: signed weight of every term.
-        progress: the task's figures at the end by name.
-        target_velocity: m/s along world x, that the task asks for all the time; NaN if it does not.
+        progress: the task's metrics at the end by name.
+        target_velocity: constant target of the task along world x, m/s; NaN if it has none.
         parameters: prescribed schedule and standing pose; None in a task without a gait.
         mass: kg, of the whole body.
         gravity: m/s^2, downwards.
-        legs: (feet,) names.
-        joint_legs: (joints,) index of the leg that a joint belongs to.
-        mirrors: (feet,) index of the leg across the x-z plane, -1 if there is none.
-        foot_radii: (feet,)
     """
 
-    body: Body
-    task: str
-    task_kwargs: Mapping[str, Any]
+    setup: Setup
     seed: int
     time_step: float
     positions: np.ndarray
@@ -75,10 +68,35 @@ class Track(NamedTuple):
     parameters: Parameters | None
     mass: float
     gravity: float
-    legs: tuple[str, ...]
-    joint_legs: np.ndarray
-    mirrors: np.ndarray
-    foot_radii: np.ndarray
+
+    @property
+    def body(self) -> Body:
+        """The body that moved."""
+        return self.setup.body
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Names of the legs."""
+        return tuple(leg.name for leg in self.body.legs)
+
+    @property
+    def joint_legs(self) -> np.ndarray:
+        """Index of the leg that a joint belongs to, (joints,)."""
+        return np.array([index for index, leg in enumerate(self.body.legs) for _ in leg.joints])
+
+    @property
+    def foot_radii(self) -> np.ndarray:
+        """Radii of the feet, (feet,) m."""
+        return np.array([leg.foot.radius for leg in self.body.legs])
+
+    @property
+    def mirrors(self) -> np.ndarray:
+        """For each leg the index of its left-right counterpart, (feet,), -1 if there is none."""
+        stands = np.array([leg.foot_position for leg in self.body.legs])
+        distances = np.linalg.norm(stands[:, None] - stands * (1, -1, 1), axis=-1)
+        nearest = distances.argmin(axis=1)
+        apart = nearest != np.arange(len(stands))
+        return np.where(apart & (distances.min(axis=1) < 1e-6), nearest, -1)
 
     @property
     def times(self) -> np.ndarray:
@@ -114,10 +132,14 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
 
     Returns:
         The track; without phases and parameters if the task prescribes no gait.
+
+    Raises:
+        ValueError: a setting of the environment's task that JSON cannot hold, such as an `Arena`; one line.
     """
     run, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
     task = run.definition
     body, layout = task.scene.body, task.scene.layout
+    setup = Setup.of(body, task.name, environment.task_kwargs)
     feet = [model.body(name).id for name in body.foot_names]
     radii = np.array([leg.foot.radius for leg in body.legs])
     rows, terms = [], []
@@ -146,33 +168,18 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
         terms.append(run.terms)
     recorded = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
     return Track(
-        body=body,
-        task=task.name,
-        task_kwargs=environment.task_kwargs,
+        setup=setup,
         seed=int(seed),
         time_step=environment.control_timestep(),
         **{"phases": None} | recorded,
         terms={name: np.array([row[name] for row in terms]) for name in terms[0]},
         weights=dict(task.settings.weights),
-        progress={name: float(figure) for name, figure in run.progress.items()},
+        progress={name: float(value) for name, value in run.progress.items()},
         target_velocity=np.nan if task.target_velocity is None else task.target_velocity,
         parameters=task.parameters,
         mass=float(model.body_mass.sum()),
         gravity=float(-model.opt.gravity[2]),
-        legs=tuple(leg.name for leg in body.legs),
-        joint_legs=np.array([index for index, leg in enumerate(body.legs) for _ in leg.joints]),
-        mirrors=mirrors(body),
-        foot_radii=radii,
     )
-
-
-def mirrors(body: Body) -> np.ndarray:
-    """Return (legs,) for each leg the index of the leg that stands across the x-z plane, -1 if there is none."""
-    stands = np.array([leg.foot_position for leg in body.legs])
-    distances = np.linalg.norm(stands[:, None] - stands * (1, -1, 1), axis=-1)
-    nearest = distances.argmin(axis=1)
-    apart = nearest != np.arange(len(stands))
-    return np.where(apart & (distances.min(axis=1) < 1e-6), nearest, -1)
 
 
 def lowest_point_velocities(model, data, feet, radii) -> np.ndarray:

@@ -6,22 +6,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from arc_suite.tuning.judge import STYLE
+from arc_suite.tuning.evaluator import STYLE
 from arc_suite.tuning.search import Generation
 
-# Okabe and Ito's colours, told apart by colour-blind eyes too.
+# Okabe and Ito's colours, which colour-blind readers can tell apart.
 _BLUE, _GREEN, _GREY = "#0072B2", "#009E73", "#8C8C8C"
 _STYLE_COLOURS = ("#D55E00", "#CC79A7", "#E69F00")
 
 
 def course(robot: str, reward: float, generations: Sequence[Generation], length: int) -> Figure:
-    """Draw returns and style over generations, beside those of the preset `medium`.
+    """Draw returns and style over generations, with those of the preset `medium`.
 
     Args:
         robot: whose search it was.
         reward: mean reward of `medium`.
         generations: of the search.
-        length: control steps of an episode, by which rewards become returns.
+        length: control steps of an episode, to convert rewards to returns.
     """
     figure = Figure(figsize=(8.0, 6.0), dpi=120, layout="constrained")
     returns, style = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))

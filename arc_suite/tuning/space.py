@@ -1,7 +1,7 @@
-"""Spaces of a search: the numbers in which presets of a robot may differ, as vectors.
+"""Spaces of a search: parameters of presets as vectors.
 
-`SPACES` names them: those of the paper's law about `medium`, and those of the torques that are added
-to it about `tuned`.
+`SPACES` names them: the parameters of the paper's law around `medium`, and those of the torques added
+to it around `tuned`.
 """
 
 import math
@@ -47,7 +47,7 @@ _BY_JOINT_AND_RANK = {
     "stance": Range(8.0, -120.0, 120.0, 1),
     "swing": Range(10.0, -120.0, 120.0, 1),
 }
-_DECIMALS = 4  # of all numbers of a preset
+_DECIMALS = 4  # of all parameters of a preset
 LEADS = 20  # of all legs over the clock, from which a search about the law may set out
 HARMONICS = 3  # of torques
 _AMPLITUDE = Range(0.08, -1.0, 1.0, 3)
@@ -56,7 +56,7 @@ _STEERED = -0.2  # from which a search for torques sets out; without it, what it
 
 
 class Space(NamedTuple):
-    """A space of vectors of numbers about a preset.
+    """A space of vectors of parameters around a preset.
 
     A vector holds the stiffness, the damping, how it settles and ramps up, and the duty factor; for
     each rank of legs its lead over the preset's clock (cycles), the sweep and the centre of the hip
@@ -82,7 +82,7 @@ class Space(NamedTuple):
         return [*_SHARED.values(), *(number for number in by_rank for _ in range(self.ranks))]
 
     def origins(self) -> list[np.ndarray]:
-        """Return vectors (size,), the best of which a search starts from: the preset with leads over its clock."""
+        """Return possible starting points (size,): the preset with leads over its clock."""
         return [self.vector(lead / LEADS) for lead in range(LEADS)]
 
     def rounded(self, vector: np.ndarray) -> np.ndarray:
@@ -90,7 +90,7 @@ class Space(NamedTuple):
         return _rounded(vector, self.ranges())
 
     def vector(self, lead: float = 0.0) -> np.ndarray:
-        """Return the vector (size,) of the preset itself, but for a lead of all legs in cycles."""
+        """Return the vector (size,) of the preset itself with a lead of all legs, cycles."""
         preset = self.origin
         angles = [lead, preset.sweep, preset.centre.get("hip", 0.0)]
         for name, bend in preset.bends.items():
@@ -129,7 +129,7 @@ class Torques(NamedTuple):
     """A space of vectors of torques that are added to a preset.
 
     A vector holds for each joint and each rank of legs the amplitudes of the cosines and then of the
-    sines of the leg's phase and its multiples, and last the steering. All other numbers are the
+    sines of the leg's phase and its multiples, and last the steering. All other parameters are the
     preset's.
 
     Attributes:
@@ -149,7 +149,7 @@ class Torques(NamedTuple):
         return [*[_AMPLITUDE] * math.prod(self._shape), _STEERING]
 
     def origins(self) -> list[np.ndarray]:
-        """Return the vector (size,) at which a search starts: no torques but for steering."""
+        """Return the vector (size,) at which a search starts: no torques except for steering."""
         return [np.array([*[0.0] * math.prod(self._shape), _STEERED])]
 
     def rounded(self, vector: np.ndarray) -> np.ndarray:
@@ -170,17 +170,17 @@ def _rounded(vector: np.ndarray, ranges: Iterable[Range]) -> np.ndarray:
 
 
 class Kind(NamedTuple):
-    """What a search may be for, and how it judges unless it is told otherwise.
+    """A kind of search with its default settings.
 
     Attributes:
-        space: of the numbers.
+        space: of the parameters.
         preset: about which it searches.
         generations: of the search.
-        candidates: of a generation; None for as many as the number of numbers asks for.
-        episodes: by which a candidate is judged.
+        candidates: of a generation; None for the default of CMA-ES.
+        episodes: by which a candidate is evaluated.
         steps: control steps of each.
         skipped: steps at their beginning that earn nothing, as a robot that sets out is no walker yet.
-        starts: of which the hard ones are taken; 0 for none.
+        starts: to choose the hard ones from; 0 for none.
     """
 
     space: type[Space] | type[Torques]

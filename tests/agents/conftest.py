@@ -71,8 +71,7 @@ def prior(tmp_path_factory):
     """Id of a dataset of Tick, 30 episodes of 40 steps."""
     patch = pytest.MonkeyPatch()
     patch.setenv("MINARI_DATASETS_PATH", str(tmp_path_factory.mktemp("datasets")))
-    setup = Setup.of("tick", "walk", SHORT)
-    settings = data.Settings(setup.body, "cpg", ("medium",), task=setup.task, task_kwargs=setup.task_kwargs)
+    settings = data.Settings(Setup.of("tick", "walk", SHORT), "cpg", ("medium",))
     data.collect(settings.dataset_id(), settings, 30, rows=15, threads=1)
     yield settings.dataset_id()
     patch.undo()

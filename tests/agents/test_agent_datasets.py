@@ -1,4 +1,4 @@
-"""Datasets of agents: from a run's checkpoints, in grades, replayed to the bit."""
+"""Datasets of agents: from a run's checkpoints, by quality, replayed bit by bit."""
 
 import functools
 import pathlib
@@ -66,8 +66,8 @@ def test_checkpoints_take_turns(run):
     ("flag", "label", "steps"),
     [
         ("--checkpoint=200", "200", [200]),
-        ("--grade=expert", "expert", [300]),
-        ("--grade=replay", "replay", [100, 200, 300]),
+        ("--quality=expert", "expert", [300]),
+        ("--quality=replay", "replay", [100, 200, 300]),
     ],
 )
 def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
@@ -77,7 +77,7 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
     (dataset_id,) = data.ids.existing()
     assert f"/tiny_studies_CLIMB-0-{label}-set" in dataset_id
     dataset = data.open(dataset_id)
-    agents = dataset.metadata["arc_suite"]["settings"]["agents"]
+    agents = dataset.metadata["arc_suite"]["agents"]
     assert [agent["steps"] for agent in agents] == steps
     assert all(agent.keys() == {"algorithm", "steps", "seed", "mean_return"} for agent in agents)
     assert len(dataset) == 6
@@ -89,8 +89,8 @@ def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
         assert summary["return"] == pytest.approx(table["return"][index], abs=1e-6), "of the evaluation, seed by seed"
 
 
-def test_random_is_a_grade_too(collected):
-    assert collected("--grade=random").returncode == 0
+def test_random_is_a_quality_too(collected):
+    assert collected("--quality=random").returncode == 0
     (dataset_id,) = data.ids.existing()
     assert "/tiny_studies_CLIMB-0-random-set" in dataset_id
     assert data.open(dataset_id).settings.policy == "random"
@@ -101,7 +101,7 @@ def test_medium_is_the_first_that_earns_a_third_of_the_best(tmp_path):
         folder = tmp_path / "checkpoints" / str(step)
         folder.mkdir(parents=True)
         checkpoints.save(folder, checkpoints.Agent("sac", step, 3, mean))
-    found = {grade: checkpoints.graded(tmp_path, grade) for grade in checkpoints.GRADES}
+    found = {quality: checkpoints.of_quality(tmp_path, quality) for quality in checkpoints.QUALITIES}
     at = {step: str(tmp_path / "checkpoints" / str(step)) for step in (30, 50)}
     assert found == {"random": "random", "medium": at[30], "expert": at[50], "replay": str(tmp_path / "checkpoints")}
 
@@ -112,7 +112,7 @@ def test_of_a_run_that_earned_nothing_none_is_medium(tmp_path):
         folder.mkdir(parents=True)
         checkpoints.save(folder, checkpoints.Agent("sac", step, 3, mean))
     with pytest.raises(ValueError) as error:
-        checkpoints.graded(tmp_path, "medium")
+        checkpoints.of_quality(tmp_path, "medium")
     line = "none is medium, as the best earns -30.0; there are random, expert and replay"
     assert str(error.value) == f"{tmp_path}: {line}"
 
@@ -121,9 +121,9 @@ def test_of_a_run_that_earned_nothing_none_is_medium(tmp_path):
     ("flags", "line"),
     [
         (["--checkpoint=150"], "keeps no checkpoint at 150 (there are: 100, 200, 300)"),
-        (["--checkpoint=100", "--grade=medium"], "expected one of --checkpoint and --grade, got both"),
-        (["--policy=runs/none", "--grade=medium"], "runs/none: keeps no checkpoints"),
-        (["--policy=cpg", "--grade=random"], "cpg: keeps no checkpoints"),
+        (["--checkpoint=100", "--quality=medium"], "expected one of --checkpoint and --quality, got both"),
+        (["--policy=runs/none", "--quality=medium"], "runs/none: keeps no checkpoints"),
+        (["--policy=cpg", "--quality=random"], "cpg: keeps no checkpoints"),
     ],
 )
 def test_errors_are_one_line(flags, line, collected):

@@ -94,4 +94,4 @@ def test_a_run_of_any_body(tmp_path):
     setup, folder = Setup.of(generator.random_body(0), "walk", {"time_limit": 1.0}), tmp_path / "run"
     assert train(Configuration.of(setup, "dagger", SMALL, steps=160, evaluate_every=160), folder)
     assert len(run_folder.table(folder, "evaluations")["return"]) == 10
-    assert network.load(folder).task == "walk"
+    assert network.load(folder).setup.kind.name == "walk"

@@ -39,7 +39,7 @@ def test_collect_continue_verify_and_minaris_own_command(root):
     again = run("--steps=20", "--episodes=3")
     assert (again.returncode, again.stdout, again.stderr) == (0, f"{ID}: has its 3 episodes already\n", "")
     verified = run(f"--verify={ID}")
-    assert (verified.returncode, verified.stdout) == (0, f"{ID}: 3 episodes replayed, equal to the bit\n")
+    assert (verified.returncode, verified.stdout) == (0, f"{ID}: 3 episodes replayed, all bit-equal\n")
     minari = pathlib.Path(sys.executable).with_name("minari")
     listed = subprocess.run([minari, "list", "local"], capture_output=True, text=True, check=True).stdout
     assert ID in listed
@@ -53,7 +53,7 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     assert done.returncode == 0, done.stderr
     dataset_id = "arc_suite/walker_4x2/walk/cpg-slow-fast-noise0_1-10steps-v0"
     assert done.stdout.startswith(f"{dataset_id}: 2 episodes")
-    assert len(data.open(dataset_id).settings.body.legs) == 4
+    assert len(data.open(dataset_id).settings.setup.body.legs) == 4
     done = run(f"--verify={dataset_id}", "--robot=queen")
     assert done.stderr == f"collect.py: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
 

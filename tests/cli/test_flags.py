@@ -51,7 +51,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--spec=a.json"], "cannot read a.json: no such file or directory"),
         (["--spec=a.json", "--legs=4"], "expected one of --spec and --legs, got both"),
         (["--links=4"], "--links=4: goes with --legs"),
-        (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot beside --spec or --legs"),
+        (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
     ],
 )

@@ -14,11 +14,11 @@ from arc_suite.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-TASKED = ("build_model", "render", "animate", "view", "evaluate", "style", "collect", "tune_cpg", "train", "census")
+TASKED = ("build_model", "render", "animate", "view", "evaluate", "style", "collect", "tune_cpg", "train", "survey")
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS}
-TOOLS |= {"census": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_suite" / "doctor.py"}
+TOOLS |= {"survey": ROOT / "tools" / "walk_census.py", "doctor": ROOT / "arc_suite" / "doctor.py"}
 
 
 def run(*arguments):
@@ -32,7 +32,7 @@ def test_help_lists_the_programs(arguments):
     lines = done.stdout.splitlines()
     assert lines[0] == "arc-suite PROGRAM [flags]"
     assert [line.split()[0] for line in lines if line.startswith("  ")] == list(main.PROGRAMS)
-    assert "  census       Let random bodies walk and count those that do." in lines
+    assert "  survey       Let random bodies walk and count those that do." in lines
     assert max(map(len, lines)) <= 100
 
 
@@ -47,7 +47,7 @@ def test_version():
     assert (done.returncode, done.stdout, done.stderr) == (0, VERSION, "")
 
 
-@pytest.mark.parametrize(("argument", "near"), [("rendr", "render"), ("walk_census", "census"), ("stile", "style")])
+@pytest.mark.parametrize(("argument", "near"), [("rendr", "render"), ("surveys", "survey"), ("stile", "style")])
 def test_an_unknown_program_is_one_line_with_the_nearest(argument, near):
     done = run(argument, "--robot=queen")
     line = f"arc-suite: unknown program {argument!r}; did you mean {near!r}? (there are: {', '.join(main.PROGRAMS)})\n"

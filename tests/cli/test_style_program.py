@@ -10,6 +10,7 @@ import programs
 import pytest
 
 from arc_suite import data, style
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 from arc_suite.style import METRICS
 from arc_suite.tasks import TASKS
@@ -96,7 +97,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
-        "arc_suite/tick/noisy-v0", data.Settings(ROBOTS["tick"], "cpg", ("medium",), 0.2, steps=50), episodes=2
+        "arc_suite/tick/noisy-v0", data.Settings(Setup.of("tick"), "cpg", ("medium",), 0.2, steps=50), episodes=2
     )
     done = run("--policy=arc_suite/tick/noisy-v0", "--compare=cpg", "--episodes=2", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr
@@ -193,7 +194,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         (["--save=tracks.json"], "--save=tracks.json: expected a file that ends in .npz"),
         (["--save=a.npz", "--robot=all"], "--save=a.npz: expected one robot, got queen, bastion, tick, leaper"),
         (["--save=nowhere/a.npz"], "cannot write nowhere/a.npz: no such file or directory"),
-        ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot beside --spec or --legs"),
+        ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
         (
             ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],

@@ -44,7 +44,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
         assert (broken / name).read_bytes() == (straight / name).read_bytes()
 
     result = json.loads((straight / "result.json").read_text())
-    found, medium = result["figures"]["found"], result["figures"]["medium"]
+    found, medium = result["metrics"]["found"], result["metrics"]["medium"]
     worse = [cost for cost in ("posture", "smoothness", "tilt") if found[cost] > medium[cost]]
     assert done.returncode == (1 if worse or found["falls"] else 0)
     broken = "tune_cpg.py: the result breaks its constraints: "
@@ -67,7 +67,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
         (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'?"),
         (["--generations=0"], "flag --generations=0: 0 is not a positive integer"),
         (["--steps=1001"], "flag --steps=1001: "),
-        (["--numbers=torqes"], "unknown numbers 'torqes'; did you mean 'torques'?"),
+        (["--space=torqes"], "unknown space 'torqes'; did you mean 'torques'?"),
         (["--starts=7"], "flag --starts=7: expected 8 or more, or 0"),
         (["queen"], "unexpected argument 'queen'; see --help"),
         (["--output=/dev/null/tune"], "cannot make folder /dev/null/tune: not a directory"),

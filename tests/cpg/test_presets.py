@@ -10,8 +10,9 @@ import arc_suite
 from arc_suite import evaluation
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import TUNINGS
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
-from arc_suite.tuning import Judge
+from arc_suite.tuning import Evaluator
 
 
 @pytest.mark.parametrize("robot", tiers(RETURNS, never, lambda robot: robot in ("tick", "leaper")))
@@ -27,7 +28,7 @@ def test_medium_earns_the_published_return(robot):
 @pytest.mark.parametrize("robot", RETURNS)
 def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
     presets = [TUNINGS[robot][name] for name in ("refined", "tuned", "medium")]
-    score = Judge(ROBOTS[robot], presets=3, episodes=10, steps=1000)(presets, range(10))
+    score = Evaluator(Setup.of(robot), presets=3, episodes=10, steps=1000)(presets, range(10))
     returns, (refined, tuned, _) = RETURNS[robot], 1000 * score.rewards.mean(axis=-1)
     assert_allclose(tuned, returns.tuned, rtol=returns.tuned_within)
     assert_allclose(refined, returns.refined, rtol=returns.tuned_within)

@@ -1,6 +1,5 @@
 """Datasets made in bad faith: nothing is imported, nothing outside the dataset is read, one line says what is wrong."""
 
-import json
 import os
 import pathlib
 import resource
@@ -51,26 +50,15 @@ def refused(use, *parts):
         assert part in message
 
 
-def spec(metadata, **names):
-    """Change what the environment is made with."""
-    env_spec = json.loads(metadata["env_spec"])
-    env_spec["kwargs"].update(names)
-    metadata["env_spec"] = json.dumps(env_spec)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
-    [
-        lambda metadata: spec(metadata, domain_name="strolling:queen"),
-        lambda metadata: spec(metadata, task_name="strolling:walk"),
-        lambda metadata: metadata["arc_suite"]["settings"].update(task_kwargs={"arena": "strolling:flat"}),
-    ],
-    ids=["domain", "task", "arena"],
+    [{"robot": "strolling:queen"}, {"task": "strolling:walk"}, {"task_kwargs": {"arena": "strolling:flat"}}],
+    ids=["robot", "task", "arena"],
 )
 def test_metadata_import_nothing(root, module, change):
     collect(ID, SETTINGS, 1)
-    edited(root, change)
+    edited(root, lambda metadata: metadata["arc_suite"].update(change))
     for use in (*READERS.values(), style.source):
         refused(use, "files import nothing; import 'strolling' first")
     done = subprocess.run([sys.executable, TOOL, f"--verify={ID}"], capture_output=True, text=True)
@@ -88,9 +76,10 @@ def test_what_the_caller_names_is_imported(module):
     named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")
     assert run(*named).returncode == 0
     assert run(f"--verify={ID}").stderr == (
-        f"collect.py: dataset {ID!r}: task 'strolling:stroll': files import nothing; import 'strolling' first\n"
+        f"collect.py: dataset {ID!r}: metadata.json: task 'strolling:stroll': files import nothing; "
+        "import 'strolling' first\n"
     )
-    assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, equal to the bit\n"
+    assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, all bit-equal\n"
     assert run(f"--verify={ID}", "--set=arena=strolling:lawn", "--task=walk").stderr == (
         f"collect.py: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
     )
@@ -102,17 +91,17 @@ def test_versions_are_told_in_one_line(root, value):
     edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=value))
     refused(verify, "was collected with numpy ")
     edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=np.__version__))
-    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update(task_version=value))
+    edited(root, lambda metadata: metadata["arc_suite"].update(task_version=value))
     refused(verify, "was collected with version ", " of walk; ")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "domain", ["/dev/zero", "spider.json", "", "nobody", "{", "{}", "[" * 9999, None, 3, ["queen"], {"name": "queen"}]
+    "robot", ["/dev/zero", "spider.json", "", "nobody", "{", "{}", "[" * 9999, None, 3, ["queen"], {"name": "queen"}]
 )
-def test_domains_are_registered_names_and_inline_bodies_alone(root, domain):
+def test_robots_are_registered_names_and_inline_bodies_alone(root, robot):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: spec(metadata, domain_name=domain))
+    edited(root, lambda metadata: metadata["arc_suite"].update(robot=robot))
     refused(data.open, "metadata.json: ")
 
 
@@ -130,7 +119,7 @@ def test_domains_are_registered_names_and_inline_bodies_alone(root, domain):
 )
 def test_settings_of_another_type_are_named(root, name, value):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update({name: value}))
+    edited(root, lambda metadata: metadata["arc_suite"].update({name: value}))
     for use in READERS.values():
         refused(use, f"metadata.json: {name}" if name in ("seed", "steps", "noise") else f"expected {name} ")
 
@@ -145,7 +134,7 @@ def test_counts_of_another_type_are_named(root, name, value):
 
 def test_steps_that_no_episode_has_are_not_allocated(root):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"]["settings"].update(steps=10**15))
+    edited(root, lambda metadata: metadata["arc_suite"].update(steps=10**15))
     refused(verify, "20 steps were recorded, 21 replayed")
 
 

@@ -19,7 +19,7 @@ window.opened = async (base64, times) => {
       scene.traverse((node) => (places[node.name] = node.getWorldPosition(new Vector3()).toArray()));
       frames.push(places);
     }
-    clips[clip.name] = { frames, footfalls: clip.userData.footfalls.length };
+    clips[clip.name] = { frames, contacts: clip.userData.foot_contacts.length };
   }
   let bones = 0;
   scene.traverse((node) => (bones += node.isBone ? 1 : 0));

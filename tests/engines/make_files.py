@@ -11,6 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite import export
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 
@@ -29,7 +30,7 @@ def main(folder: str, few: str = "") -> None:
         bodies |= {path.stem: spec_files.load_body(path) for path in examples}
         bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(50)}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
-        clips = export.clips(body, FEW if name in ROBOTS else ("walk", "idle"))
+        clips = export.clips(Setup(body), FEW if name in ROBOTS else ("walk", "idle"))
         for rig in export.RIGS if name in ROBOTS else ("skin",):
             (out / f"{name}-{rig}.glb").write_bytes(export.glb(body, clips, rig))
         np.savez(out / f"{name}.npz", **truth(body, clips))

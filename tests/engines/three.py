@@ -40,7 +40,7 @@ def check(tab, path: pathlib.Path) -> str:
     assert opened["bones"] == (len(parts) + 1 if rig == "skin" else 0)
     worst = 0.0
     for clip, told in opened["clips"].items():
-        assert (told["footfalls"] > 0) == (not clip.startswith("idle"))
+        assert (told["contacts"] > 0) == (not clip.startswith("idle"))
         for time, places in zip(TIMES, told["frames"], strict=True):
             frame = time * (len(truth[clip]) - 1)
             if frame % 1.0:

@@ -7,6 +7,8 @@ from returns import RETURNS
 import arc_suite
 from arc_suite import evaluation
 from arc_suite.cpg import Demonstrator
+from arc_suite.envs.setup import Setup
+from arc_suite.robots import generator
 
 
 def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
@@ -52,9 +54,10 @@ def test_policies_get_named_rows_and_the_reward_of_the_step_before():
 
 def test_returns_of_the_papers_demonstrators():
     for robot, returns in RETURNS.items():
-        assert evaluation.expert_return("walk", robot) == returns.paper
-        assert evaluation.expert_return("steer", robot) is None
-    assert evaluation.expert_return("walk", "spider") is None
+        assert evaluation.expert_return(Setup.of(robot)) == returns.paper
+        assert evaluation.expert_return(Setup.of(robot, "steer")) is None
+        assert evaluation.expert_return(Setup.of(robot, "walk", {"gait": "wave"})) is None
+    assert evaluation.expert_return(Setup.of(generator.generate(4, 2))) is None
 
 
 def test_the_protocol_is_ten_episodes():

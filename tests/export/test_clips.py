@@ -11,7 +11,8 @@ from tiers import never, tiers
 
 import arc_suite
 from arc_suite import export, policies
-from arc_suite.export import footfalls, recordings
+from arc_suite.envs.setup import Setup
+from arc_suite.export import foot_contacts, recordings
 from arc_suite.export.clips import CLIPS
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import policy
@@ -27,7 +28,7 @@ NAMES = ("walk", "turn_left", "stop", "idle")
 
 @functools.cache
 def made(robot, *names):
-    return {clip.name: clip for clip in export.clips(ROBOTS[robot], names or NAMES, fps=20)}
+    return {clip.name: clip for clip in export.clips(Setup.of(robot), names or NAMES, fps=20)}
 
 
 @functools.cache
@@ -82,7 +83,7 @@ def test_the_bytes_hold_the_kinematics(robot, rig):
 @pytest.mark.parametrize("name", tiers(["crab", "millipede", "starfish"], never, lambda name: name == "crab"))
 def test_of_any_body(name):
     body = spec_files.load_body(f"examples/{name}.json")
-    clips = export.clips(body, ["walk", "idle"])
+    clips = export.clips(Setup(body), ["walk", "idle"])
     assert_kinematics(body, gltf_reader.read(export.glb(body, clips)), clips)
 
 
@@ -213,7 +214,7 @@ def test_forward_is_z_and_left_is_x():
 def test_presets_return(robot, preset):
     """Within half a degree before the seam is mended; as fast as the walk; two events a foot and cycle for tuned."""
     body = ROBOTS[robot]
-    (clip,) = export.clips(body, ["walk"], preset=preset)
+    (clip,) = export.clips(Setup(body), ["walk"], preset=preset)
     assert np.degrees(clip.motion.seam) <= 0.5
     environment = arc_suite.load(body, "walk", {"random": 0})
     recording = recordings.record(environment, policy("cpg", body, preset), 200, 700)
@@ -223,17 +224,17 @@ def test_presets_return(robot, preset):
     speed = np.hypot(*np.diff(path, axis=0).T).mean() / recording.step
     assert np.hypot(*clip.motion.twist[:2]) == pytest.approx(speed, rel=0.01)
     if preset == "tuned":
-        assert len(clip.footfalls) == 2 * len(body.legs) * clip.cycles
+        assert len(clip.foot_contacts) == 2 * len(body.legs) * clip.cycles
         assert clip.cycles == 3
 
 
 @pytest.mark.parametrize("seed", tiers(range(20), never, lambda seed: seed == 0))
 def test_random_bodies_step_once_a_cycle(seed):
     body = random_body(seed)
-    (clip,) = export.clips(body, ["walk"])
-    falls = [(footfall.foot, footfall.event) for footfall in clip.footfalls]
+    (clip,) = export.clips(Setup(body), ["walk"])
+    falls = [(contact.foot, contact.event) for contact in clip.foot_contacts]
     for foot in body.foot_names:
-        for event in (footfalls.TOUCH_DOWN, footfalls.LIFT_OFF):
+        for event in (foot_contacts.TOUCH_DOWN, foot_contacts.LIFT_OFF):
             assert falls.count((foot, event)) == clip.cycles
 
 
@@ -243,9 +244,9 @@ def test_clips_are_in_step(robot):
     first = ROBOTS[robot].foot_names[0]
     assert clips["walk"].cycles == clips["turn_left"].cycles
     for name in ("walk", "turn_left"):
-        assert clips[name].footfalls[0].time == 0.0
-        assert (first, footfalls.TOUCH_DOWN, 0.0) in [(f.foot, f.event, f.time) for f in clips[name].footfalls]
-        times = [footfall.time for footfall in clips[name].footfalls]
+        assert clips[name].foot_contacts[0].time == 0.0
+        assert (first, foot_contacts.TOUCH_DOWN, 0.0) in [(f.foot, f.event, f.time) for f in clips[name].foot_contacts]
+        times = [contact.time for contact in clips[name].foot_contacts]
         assert times == sorted(times) and times[-1] < clips[name].motion.seconds
 
 
@@ -257,9 +258,9 @@ def test_soles_stand_on_the_ground(robot):
         soles = feet_of(body, clip.motion.qpos())[..., 2] - [leg.foot.radius for leg in body.legs]
         stance = np.zeros(soles.shape, bool)
         for leg, foot in enumerate(body.foot_names):
-            events = [footfall for footfall in clip.footfalls if footfall.foot == foot]
-            for time_of_down in (e.time for e in events if e.event == footfalls.TOUCH_DOWN):
-                later = [e.time for e in events if e.event == footfalls.LIFT_OFF and e.time > time_of_down]
+            events = [contact for contact in clip.foot_contacts if contact.foot == foot]
+            for time_of_down in (e.time for e in events if e.event == foot_contacts.TOUCH_DOWN):
+                later = [e.time for e in events if e.event == foot_contacts.LIFT_OFF and e.time > time_of_down]
                 end = min(later, default=clip.motion.seconds)
                 stance[:, leg] |= (clip.times >= time_of_down) & (clip.times <= end)
         assert abs(np.median(soles[stance])) < 0.002 * body.torso.standing_height
@@ -268,7 +269,7 @@ def test_soles_stand_on_the_ground(robot):
 @pytest.mark.parametrize("robot", EACH)
 def test_idle_breathes_on_its_feet(robot):
     body, clip = ROBOTS[robot], made(robot)["idle"]
-    assert clip.cycles == 0 and not clip.footfalls and not clip.moves
+    assert clip.cycles == 0 and not clip.foot_contacts and not clip.moves
     height = body.torso.standing_height
     feet = feet_of(body, clip.motion.qpos())
     assert np.ptp(feet, axis=0).max() < 0.012 * height
@@ -292,8 +293,8 @@ def test_a_stop_walks_and_then_stands(robot):
 def test_between_frames_a_clip_is_near_the_physics(robot):
     """Played at every substep, parts are within 6 mm of where substeps have them."""
     body = ROBOTS[robot]
-    fine = export.clips(body, ["walk"], fps=1000.0 / 2.0)[0]
-    coarse = gltf_reader.read(export.glb(body, export.clips(body, ["walk"])))
+    fine = export.clips(Setup(body), ["walk"], fps=1000.0 / 2.0)[0]
+    coarse = gltf_reader.read(export.glb(body, export.clips(Setup(body), ["walk"])))
     world = gltf_reader.played(coarse, "walk_loop", fine.times)
     feet = feet_of(body, fine.motion.qpos())
     for leg, foot in enumerate(body.foot_names):
@@ -315,8 +316,11 @@ def test_the_recording_is_the_episode_to_the_bit():
 
 @pytest.mark.long
 def test_the_same_bytes():
-    first, second = (export.glb(ROBOTS["tick"], export.clips(ROBOTS["tick"], ["walk", "idle"])) for _ in range(2))
+    first, second = (export.glb(ROBOTS["tick"], export.clips(Setup.of("tick"), ["walk", "idle"])) for _ in range(2))
     assert first == second
+
+
+SHORT = Setup.of("tick", "walk", {"time_limit": 1.0})
 
 
 @pytest.mark.parametrize(
@@ -327,12 +331,15 @@ def test_the_same_bytes():
         ({"names": ["walk"], "fps": 0.0}, "fps: expected a number from 1 to 1000"),
         ({"names": ["walk"], "policy": "zero"}, "tick, clip walk: the pose does not return within"),
         ({"names": ["walk"], "policy": "random"}, "tick, clip walk: "),
-        ({"names": ["walk"], "task_kwargs": {"time_limit": 1.0}}, "tick, clip walk: the episode ends after 20"),
+        (
+            {"names": ["walk"], "setup": Setup.of("tick", "walk", {"time_limit": 1.0})},
+            "tick, clip walk: the episode ends after 20",
+        ),
     ],
 )
 def test_errors_are_one_line(arguments, message):
     with pytest.raises(ValueError) as caught:
-        export.clips(ROBOTS["tick"], **arguments)
+        export.clips(**{"setup": Setup.of("tick"), **arguments})
     assert str(caught.value).startswith(message) and "\n" not in str(caught.value)
 
 
@@ -340,7 +347,7 @@ def test_errors_are_one_line(arguments, message):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_clip_can_be_made(robot):
     body = ROBOTS[robot]
-    clips = export.clips(body, list(CLIPS))
+    clips = export.clips(Setup(body), list(CLIPS))
     (cycles,) = {clip.cycles for clip in clips if clip.loops and clip.name != "idle"}
     assert cycles == (6 if robot == "bastion" else 3)  # whose strides to a side alternate
     data = export.glb(body, clips)
@@ -361,7 +368,7 @@ def test_every_clip_can_be_made(robot):
 def test_a_clip_goes_as_fast_beside_others():
     """Bastion's fast does not return together with its strides to a side, and still goes as fast as alone."""
     together, alone = (
-        {clip.name: clip for clip in export.clips(ROBOTS["bastion"], names)}["fast"]
+        {clip.name: clip for clip in export.clips(Setup.of("bastion"), names)}["fast"]
         for names in (["fast", "walk", "strafe_left"], ["fast"])
     )
     assert together.cycles != alone.cycles

@@ -86,7 +86,7 @@ THIRD_PARTY = {
     "export.gltf": {"numpy"},
     "export.shapes": {"numpy"},
     "export.pages": {"numpy"},
-    "export.motions": {"numpy"},
+    "export.root_motion": {"numpy"},
 }
 
 # Modules of the suite that these may import, and no others.

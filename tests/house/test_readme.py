@@ -12,7 +12,7 @@ import test_layers
 import arc_suite
 from arc_suite import data
 from arc_suite.cli import main
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 from arc_suite.tasks import walk
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -29,7 +29,7 @@ COMMANDS = sorted({" ".join(text.split()) for page in PAGES for text in _COMMAND
 def dataset(tmp_path, monkeypatch):
     """A little of what the README collects."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    settings = data.Settings(ROBOTS["queen"], "cpg", ("tuned",))
+    settings = data.Settings(Setup.of("queen"), "cpg", ("tuned",))
     assert f"--verify {settings.dataset_id()}\n" in README
     data.collect(settings.dataset_id(), settings._replace(steps=5), episodes=1)
 

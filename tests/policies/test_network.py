@@ -7,11 +7,11 @@ import pytest
 
 import arc_suite
 from arc_suite import evaluation, policies
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
 from arc_suite.policies.network import Layer, Network
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec_files import body_to_json
 
 
 def drawn(seed):
@@ -37,8 +37,7 @@ def made(robot="tick", task="walk", hidden=32):
         Layer("tanh"),
         Layer("clip"),
     )
-    name = robot if isinstance(robot, str) else body_to_json(robot)
-    return Network(layers, name, task, {}, blocks)
+    return Network(layers, Setup.of(robot, task), blocks)
 
 
 @pytest.fixture
@@ -97,7 +96,7 @@ def test_is_a_policy_of_every_program(saved, name, monkeypatch):
         arc_suite.load("tick", "walk"), policy, range(3)
     )
     monkeypatch.chdir(saved.parent)
-    assert policies.policy(saved.name, "tick").robot == "tick"
+    assert policies.policy(saved.name, "tick").setup.robot == "tick"
 
 
 def test_of_another_body(saved):
@@ -106,7 +105,7 @@ def test_of_another_body(saved):
     body = generator.random_body(3)
     network.save(saved / "policy.npz", made(body))
     assert policies.policy(str(saved), body).joints == len(body.joint_names)
-    with pytest.raises(ValueError, match=r"^policy .*: made for another body, and not for tick$"):
+    with pytest.raises(ValueError, match=f"^policy .*: made for {body.name}, and not for tick$"):
         policies.policy(str(saved), "tick")
 
 
@@ -139,8 +138,9 @@ def test_damaged_files(saved, kept):
         ({"layers": ["relu"]}, r"policy\.npz: moves 199 joints, and tick has 18$"),
         ({"layers": [*["relu"] * 9, "linear"]}, "a damaged one: '9.0'"),
         ({"blocks": {"posture": 3}}, "broadcast"),
-        ({"blocks": 3}, "expected blocks to be a dict"),
+        ({"blocks": 3}, "blocks: expected a mapping"),
         ({"robot": None}, "expected robot to be a str"),
+        ({"task": "strolling:stroll"}, "import 'strolling' first$"),
     ],
 )
 def test_files_made_in_bad_faith(saved, change, line):
@@ -164,5 +164,5 @@ def test_a_policy_of_torques_is_refused_where_positions_are_taken(saved):
     with pytest.raises(ValueError, match="its actions are a torque a joint, and walk takes a position$"):
         policies.policy(str(saved), "tick", task=task)
     assert policies.policy(str(saved), "tick", task=arc_suite.load("tick", "walk").task.definition) is not None
-    network.save(saved / "policy.npz", made()._replace(task_kwargs={"actions": "position"}))
+    network.save(saved / "policy.npz", made()._replace(setup=Setup.of("tick", "walk", {"actions": "position"})))
     assert policies.policy(str(saved), "tick", task=task) is not None

@@ -1,17 +1,21 @@
 """Sources of tracks: policies, files and datasets."""
 
+import json
+
+import numpy as np
 import pytest
 from synthetic import assert_same
 
 import arc_suite
 from arc_suite import data, style
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.style import Stage, record, source
+from arc_suite.style import record, source
 from arc_suite.tasks import walk
 
 BODY = generator.generate(5, 2)
-SETTINGS = data.Settings(ROBOTS["leaper"], "cpg", ("medium",), noise=0.1, seed=7, steps=30)
+SETTINGS = data.Settings(Setup.of("leaper"), "cpg", ("medium",), noise=0.1, seed=7, steps=30)
 
 
 @pytest.fixture(scope="module")
@@ -34,30 +38,29 @@ def dataset(tmp_path, monkeypatch):
     return data.open("arc_suite/leaper/noisy-v0")
 
 
-LEAPER, TICK = Stage(ROBOTS["leaper"]), Stage(ROBOTS["tick"])
+LEAPER, TICK = Setup.of("leaper"), Setup.of("tick")
 
 
-def take(opened, stage, seeds):
-    return [made() for made in opened.takes(stage, seeds)]
+def take(opened, setup, seeds):
+    return [recorder() for recorder in opened.recorders(setup, seeds)]
 
 
 def test_policies_walk_any_body_once_for_each_seed():
     opened = source("zero")
-    assert (opened.label, opened.stage) == ("zero", None)
-    for stage in (
-        TICK._replace(task_kwargs={"time_limit": 1.0}),
-        Stage(BODY, "steer", {"time_limit": 1.0, "arena": "bumps"}),
+    assert (opened.label, opened.setup) == ("zero", None)
+    for setup in (
+        Setup.of("tick", "walk", {"time_limit": 1.0}),
+        Setup.of(BODY, "steer", {"time_limit": 1.0, "arena": "bumps"}),
     ):
-        tracks = take(opened, stage, (5, 6))
-        assert [(track.body, track.seed) for track in tracks] == [(stage.body, 5), (stage.body, 6)]
-        assert {(track.task, str(track.task_kwargs)) for track in tracks} == {(stage.task, str(stage.task_kwargs))}
+        tracks = take(opened, setup, (5, 6))
+        assert [(track.setup, track.seed) for track in tracks] == [(setup, 5), (setup, 6)]
         assert not tracks[0].actions.any()
     assert source("cpg", "fast").label == "cpg fast"
 
 
 def test_files_have_the_tracks_that_they_have(leaper, saved):
     opened = source(str(saved))
-    assert (opened.label, opened.stage) == ("leaper.npz", LEAPER)
+    assert (opened.label, opened.setup) == ("leaper.npz", LEAPER)
     for count, expected in ((1, 1), (2, 2), (10, 2)):
         tracks = take(opened, LEAPER, range(count))
         assert len(tracks) == expected
@@ -75,32 +78,28 @@ def test_what_is_no_source_is_refused_before_any_work(saved):
         assert str(error.value).startswith(message)
     for body, other in ((ROBOTS["tick"], "leaper"), (ROBOTS["leaper"].replace(density=7.0), "another body")):
         with pytest.raises(ValueError, match=f"^{saved}: expected tracks of {body.name}, got those of {other}"):
-            source(str(saved)).takes(Stage(body), (0,))
-    with pytest.raises(ValueError, match=f"^{saved}: expected tracks of the task steer, got those of walk$"):
-        source(str(saved)).takes(LEAPER._replace(task="steer"), (0,))
-    with pytest.raises(ValueError) as error:
-        source(str(saved)).takes(LEAPER._replace(task_kwargs={"arena": "bumps"}), (0,))
-    assert str(error.value) == f'{saved}: expected tracks with the settings {{"arena": "bumps"}}, got those with {{}}'
+            source(str(saved)).recorders(Setup.of(body), (0,))
+    for arguments, text in ((("steer",), "steer"), (("walk", {"arena": "bumps"}), 'walk, {"arena": "bumps"}')):
+        with pytest.raises(ValueError) as error:
+            source(str(saved)).recorders(Setup.of("leaper", *arguments), (0,))
+        assert str(error.value) == f"{saved}: expected tracks of leaper, {text}, got those of leaper, walk"
 
 
-def test_stored_tracks_tell_their_stage(tmp_path, monkeypatch):
+def test_stored_tracks_tell_their_setup(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    stage = Stage(ROBOTS["tick"], "steer", {"healthy_range": [0.05, 0.5], "arena": "bumps"})
-    environment = arc_suite.load(stage.body, stage.task, {"healthy_range": (0.05, 0.5), "arena": "bumps"})
-    style.save(tmp_path / "tick.npz", [record(environment, policy("cpg", stage.body), 0, 5)])
-    settings = data.Settings(stage.body, steps=5, task=stage.task, task_kwargs=environment.task_kwargs)
-    data.collect("arc_suite/tick/steers-v0", settings, episodes=1)
+    setup = Setup.of("tick", "steer", {"healthy_range": (0.05, 0.5), "arena": "bumps"})
+    style.save(tmp_path / "tick.npz", [record(setup.load(), policy("cpg", "tick"), 0, 5)])
+    data.collect("arc_suite/tick/steers-v0", data.Settings(setup, steps=5), episodes=1)
     for name in (str(tmp_path / "tick.npz"), "arc_suite/tick/steers-v0"):
-        assert source(name).stage == stage
-        for same in (stage, stage._replace(task="arc_suite:steer", task_kwargs=environment.task_kwargs)):
-            (track,) = take(source(name), same, range(1))
-            assert (track.task, len(track.times)) == ("steer", 5)
+        assert source(name).setup == setup
+        (track,) = take(source(name), setup, range(1))
+        assert (track.setup, len(track.times)) == (setup, 5)
 
 
 def test_datasets_are_replayed(dataset):
     opened = source(dataset.id)
-    assert (opened.label, opened.stage) == (dataset.id, LEAPER)
-    assert len(opened.takes(LEAPER, range(1))) == 1
+    assert (opened.label, opened.setup) == (dataset.id, LEAPER)
+    assert len(opened.recorders(LEAPER, range(1))) == 1
     tracks = take(opened, LEAPER, range(10))
     assert [track.seed for track in tracks] == [7, 8]
     for track, episode in zip(tracks, dataset, strict=True):
@@ -114,12 +113,12 @@ def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
     with pytest.raises(ValueError) as error:
         take(source(dataset.id), LEAPER, range(1))
     assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")
-    assert str(error.value).endswith(f"; arc-suite collect --verify={dataset.id} tells more")
+    assert str(error.value).endswith(f"; arc-suite collect --verify={dataset.id} shows more")
 
 
 def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
     with pytest.raises(ValueError, match=f"^{dataset.id}: expected tracks of tick, got those of leaper$"):
-        source(dataset.id).takes(TICK, range(1))
+        source(dataset.id).recorders(TICK, range(1))
     for name, message in (
         ("arc_suite/leaper/niosy-v0", f"unknown dataset 'arc_suite/leaper/niosy-v0'; did you mean {dataset.id!r}?"),
         ("noisy-v0", "unknown dataset 'noisy-v0' (there are: arc_suite/leaper/noisy-v0)"),
@@ -138,13 +137,11 @@ def test_tracks_import_nothing(leaper, tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(tmp_path)
     path = tmp_path / "tracks.npz"
     for change in ({"task": "strolling:walk"}, {"task_kwargs": {"arena": "strolling:flat"}}):
-        style.save(path, [track._replace(**change) for track in leaper])
+        style.save(path, leaper)
+        with np.load(path) as stored:
+            arrays = dict(stored)
+        arrays["setup"] = json.dumps(LEAPER.to_dict() | change)
+        np.savez(path, **arrays)
         with pytest.raises(ValueError, match=f"^{path}: .*: files import nothing; import 'strolling' first$"):
             source(str(path))
     assert not (tmp_path / "imported").exists()
-
-
-def test_tracks_of_several_tasks_are_no_source(leaper, tmp_path):
-    style.save(tmp_path / "two.npz", [leaper[0], leaper[1]._replace(progress={})])
-    with pytest.raises(ValueError, match="two.npz: expected tracks of one task with the same settings$"):
-        source(str(tmp_path / "two.npz"))

@@ -11,6 +11,7 @@ from synthetic import assert_same
 import arc_suite
 from arc_suite import style
 from arc_suite.arenas import FLAT
+from arc_suite.envs.setup import Setup
 from arc_suite.policies import Script, policy
 from arc_suite.robots import generator
 from arc_suite.style import load, record, save
@@ -40,7 +41,7 @@ def saved(leaper, tmp_path_factory):
 def test_tracks_survive_the_way_there_and_back(body, task, tmp_path):
     settings = {"arena": "bumps", "gait": "ripple", "weights": {"posture": -1e-9}}
     tracks = recorded(body, (0, 2**32 - 1), task=task, **settings)
-    assert (tracks[0].task, tracks[0].task_kwargs) == (task, settings)
+    assert tracks[0].setup == Setup.of(body, task, settings)
     save(tmp_path / "tracks.npz", tracks)
     loaded = load(str(tmp_path / "tracks.npz"))
     assert len(loaded) == 2
@@ -53,16 +54,16 @@ def test_tracks_survive_the_way_there_and_back(body, task, tmp_path):
 def test_tracks_of_a_task_without_a_gait_survive_too(tmp_path):
     with gaitless.registered():
         tracks = recorded("leaper", task="stay", weights={"control": -0.1})
+        save(tmp_path / "tracks.npz", tracks)
+        (track,) = load(tmp_path / "tracks.npz")
     assert tracks[0].phases is tracks[0].parameters is None
-    save(tmp_path / "tracks.npz", tracks)
-    (track,) = load(tmp_path / "tracks.npz")
     assert_same(track, tracks[0])
     assert style.report([track])["metrics"].keys() == style.report(tracks)["metrics"].keys()
 
 
 def test_a_file_says_what_made_it(saved):
     with np.load(saved, allow_pickle=False) as arrays:
-        assert arrays["format"] == "arc_suite tracks 2"
+        assert arrays["format"] == "arc_suite tracks 3"
         assert '"mujoco": "3.17' in str(arrays["versions"])
 
 
@@ -73,11 +74,11 @@ def test_seed_and_actions_repeat_a_track(leaper):
 
 
 def test_what_cannot_be_saved_is_refused(leaper, tmp_path):
-    for tracks, found in (([], r"\[\]"), (leaper + recorded("tick", steps=2), r"\['leaper', 'tick'\]")):
-        with pytest.raises(ValueError, match=f"^tracks: expected those of one body, got {found}$"):
+    for tracks, found in (([], r"\[\]"), (leaper + recorded("tick", steps=2), r"\['leaper, walk', 'tick, walk'\]")):
+        with pytest.raises(ValueError, match=f"^tracks: expected those of one setup, got {found}$"):
             save(tmp_path / "a.npz", tracks)
     with pytest.raises(ValueError, match="^task_kwargs: expected values that JSON can hold: Object of type Flat is"):
-        save(tmp_path / "a.npz", recorded("tick", steps=2, arena=FLAT))
+        recorded("tick", steps=2, arena=FLAT)
     assert not list(tmp_path.iterdir())
 
 
@@ -122,10 +123,10 @@ def one_array():
         (b"", "not a file of tracks, or a damaged one: File is not a zip file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
         (one_array(), "not a file of tracks, or a damaged one: "),
-        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 2', got 'no tracks'; record them anew"),
-        (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 2', got 'arc_suite tracks 1'"),
-        (archive(format="arc_suite tracks 2"), "not a file of tracks, or a damaged one: 'body'"),
-        (archive(format="arc_suite tracks 2", body="{}"), "not a file of tracks, or a damaged one: name: missing"),
+        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 3', got 'no tracks'; record them anew"),
+        (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 3', got 'arc_suite tracks 1'"),
+        (archive(format="arc_suite tracks 3"), "not a file of tracks, or a damaged one: 'setup'"),
+        (archive(format="arc_suite tracks 3", setup="{}"), "not a file of tracks, or a damaged one: expected robot"),
         (archive(format=np.array([print], dtype=object)), "not a file of tracks, or a damaged one: Object arrays"),
     ],
 )
@@ -182,15 +183,15 @@ BAD_ARRAYS = {
     "offsets": ("1/parameters/phase_offsets", np.zeros(3)),
     "range": ("1/parameters/healthy_range", np.array(["low", "high"])),
     "parameter": ("1/parameters/speed", np.float64(1.0)),
-    "legs": ("1/legs", np.array(["a", "b", "c", "d"])),
-    "legs of joints": ("1/joint_legs", np.full(12, 9)),
-    "mirrors": ("1/mirrors", np.full(4, 4)),
     "field": ("1/altitude", np.zeros(12)),
-    "settings": ("1/task_kwargs", np.array("[1]")),
-    "body": ("body", np.zeros(3)),
+    "setup": ("setup", np.zeros(3)),
+    "setup of another type": ("setup", np.array("[1]")),
+    "settings": ("setup", np.array('{"robot": "leaper", "task": "walk", "task_kwargs": [1]}')),
+    "another body": ("setup", np.array('{"robot": "tick", "task": "walk", "task_kwargs": {}}')),
+    "progress of one track": ("1/progress/goals", np.float64(1.0)),
     "deep": ("1/positions/x", np.zeros(12)),
-    "index": ("99999999999/task", np.array("walk")),
-    "name": ("one/task", np.array("walk")),
+    "index": ("99999999999/seed", np.int64(0)),
+    "name": ("one/seed", np.int64(0)),
 }
 
 

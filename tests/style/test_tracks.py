@@ -5,15 +5,17 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from synthetic import synthetic
 
 import arc_suite
 from arc_suite import evaluation
-from arc_suite.arenas import FLAT
+from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.arenas.bumps import Bumps
 from arc_suite.cpg import Demonstrator
+from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
 from arc_suite.style import measure, record
-from arc_suite.style.tracks import lowest_point_velocities, mirrors
+from arc_suite.style.tracks import lowest_point_velocities
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -44,14 +46,16 @@ def test_tracks_agree_with_the_reward(robot):
 
 @pytest.mark.parametrize("task", ["steer", "stay"])
 @pytest.mark.parametrize("arena", [FLAT, Bumps(0.2)], ids=["flat", "bumps"])  # small bumps, which begin near the start
-def test_tracks_of_any_task_and_ground(task, arena):
-    settings = {"time_limit": 2.0, "arena": arena}
+def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
+    monkeypatch.setitem(ARENAS, "here", lambda body: arena)
+    settings = {"time_limit": 2.0, "arena": "here"}
     with gaitless.registered():
-        environment = arc_suite.load("queen", task, settings)
+        setup = Setup.of("queen", task, settings)
+        environment = setup.load()
+        track = record(environment, Demonstrator("queen"), seed=3)
     definition = environment.task.definition
-    track = record(environment, Demonstrator("queen"), seed=3)
     episode = evaluation.run(environment, Demonstrator("queen"), seed=3)
-    assert (track.task, track.task_kwargs, track.weights) == (task, settings, definition.settings.weights)
+    assert (track.setup, track.weights) == (setup, definition.settings.weights)
     assert len(track.times) == episode.length == 40
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
     assert track.progress == episode.progress
@@ -75,18 +79,23 @@ def test_recording_is_seeded():
     assert (first.positions != other.positions).all()
 
 
+def standing(body):
+    """A track of a body, for what it tells of the body alone."""
+    return synthetic(cycles=1)._replace(setup=Setup(body))
+
+
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_leg_has_its_mirror(robot):
     across = {"l": "r", "r": "l"}
     names = [leg.name for leg in ROBOTS[robot].legs]
-    for name, mirror in zip(names, mirrors(ROBOTS[robot]), strict=True):
+    for name, mirror in zip(names, standing(ROBOTS[robot]).mirrors, strict=True):
         expected = name[0] + across[name[1]] if robot == "leaper" else across[name[0]] + name[1]
         assert names[mirror] == expected
 
 
 def test_legs_without_a_mirror():
     left = ROBOTS["queen"].replace(legs=ROBOTS["queen"].legs[:4])  # l1 l2 l3 r1
-    assert_array_equal(mirrors(left), [3, -1, -1, 0])
+    assert_array_equal(standing(left).mirrors, [3, -1, -1, 0])
 
 
 def test_velocities_of_lowest_points_are_their_motion():

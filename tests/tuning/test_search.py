@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from arc_suite.cpg.presets import TUNINGS
-from arc_suite.robots import ROBOTS
-from arc_suite.tuning import Judge, Search
+from arc_suite.envs.setup import Setup
+from arc_suite.tuning import Evaluator, Search
 
-SETTINGS = {"robot": "bastion", "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
+SETTINGS = {"setup": Setup.of("bastion"), "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
 
 
 @pytest.mark.long
@@ -24,7 +24,7 @@ def test_a_search_goes_on_where_it_was_broken_off():
 
 @pytest.mark.slow
 def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_tuned():
-    settings = SETTINGS | {"robot": "leaper", "numbers": "torques", "episodes": 1, "steps": 40, "starts": 0}
+    settings = SETTINGS | {"setup": Setup.of("leaper"), "space": "torques", "episodes": 1, "steps": 40, "starts": 0}
     straight, resumed = Search(**settings), Search(**settings)
     generations = [straight.step() for _ in range(3)]
     for generation in generations[:2]:
@@ -44,6 +44,6 @@ def test_a_search_learns():
     for _ in range(14):
         last = search.step()
     assert np.median(last.fitness) > np.median(first.fitness)
-    score = Judge(ROBOTS["bastion"], 2, 2, 80)([search.result(), TUNINGS["bastion"]["medium"]], [0, 1])
+    score = Evaluator(Setup.of("bastion"), 2, 2, 80)([search.result(), TUNINGS["bastion"]["medium"]], [0, 1])
     tuned, medium = score.rewards.mean(axis=-1)
     assert tuned > medium

@@ -11,8 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite import data
-from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.setup import Setup
 
 ROWS = 64
 POLICIES = ("cpg", "random")  # long episodes and short ones
@@ -35,7 +34,7 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
     turns = iter(tqdm(range(len(robots) * len(POLICIES) * rounds), unit="round", disable=None))
     for robot in robots:
         for policy in POLICIES:
-            settings = data.Settings(ROBOTS[robot], policy, ("medium",) if policy == "cpg" else ())
+            settings = data.Settings(Setup.of(robot), policy, ("medium",) if policy == "cpg" else ())
             speeds = []
             for _ in range(rounds):
                 next(turns)
@@ -56,7 +55,7 @@ def _collecting(settings: data.Settings, episodes: int) -> float:
 
 def _bare(settings: data.Settings) -> float:
     """Steps the actions of the dataset's first episodes, row by row, again and again where they are over."""
-    environment = VectorEnv(settings.body, "walk", ROWS)
+    environment = settings.environment(ROWS)
     dataset = data.open(_ID)
     recorded = [dataset[row % len(dataset)].actions for row in range(ROWS)]
     actions = np.stack([np.resize(episode, (settings.steps, episode.shape[1])) for episode in recorded], axis=1)

@@ -1,7 +1,7 @@
-"""Judges many presets of a robot at once, on the vector environment."""
+"""Evaluates many presets of a robot at once, on the vector environment."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,8 +9,7 @@ from arc_suite import rotations
 from arc_suite.cpg.demonstrator import Prescribed
 from arc_suite.cpg.law import felt
 from arc_suite.cpg.presets import Preset
-from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots.spec import Body
+from arc_suite.envs.setup import Setup
 
 TERMS = ("posture", "smoothness")  # of the reward, unweighted
 STYLE = (*TERMS, "tilt")  # costs by which presets may not be worse than another
@@ -33,39 +32,29 @@ class Score(NamedTuple):
     tipping: np.ndarray
 
 
-class Judge:
-    """A judge that plays seeded episodes of presets, each in a row of one vector environment."""
+class Evaluator:
+    """Plays seeded episodes of presets, all in one vector environment."""
 
-    def __init__(
-        self,
-        body: Body,
-        presets: int,
-        episodes: int,
-        steps: int,
-        task: str = "walk",
-        task_kwargs: Mapping[str, Any] | None = None,
-        skipped: int = 0,
-    ):
-        """Allocate the rows.
+    def __init__(self, setup: Setup, presets: int, episodes: int, steps: int, skipped: int = 0):
+        """Open the environment.
 
         Args:
-            body: of the robot.
-            presets: how many are judged at once.
+            setup: body and task, whose reward has the terms of `TERMS`.
+            presets: how many are evaluated at once.
             episodes: of each.
             steps: control steps of an episode.
-            task: name of the task, whose reward has the terms of `TERMS`.
-            task_kwargs: its settings, as in `arc_suite.load`.
             skipped: first steps that count for neither rewards nor style.
 
         Raises:
             ValueError: a task whose reward has other terms; one line.
         """
-        self._body, self._shape, self._steps, self._skipped = body, (presets, episodes), steps, skipped
-        self._environment = VectorEnv(body, task, presets * episodes, task_kwargs=task_kwargs)
+        self._body, self._shape, self._steps, self._skipped = setup.body, (presets, episodes), steps, skipped
+        self._environment = setup.make_vec(presets * episodes)
         there = self._environment.task.settings.weights
         if not set(TERMS) <= there.keys():
             self.close()
-            raise ValueError(f"task {task}: expected a reward with terms {' and '.join(TERMS)}, got {', '.join(there)}")
+            name, terms = setup.kind.name, " and ".join(TERMS)
+            raise ValueError(f"task {name}: expected a reward with terms {terms}, got {', '.join(there)}")
 
     def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> Score:
         """Play the episodes of these seeds, which are the same for all presets."""
@@ -98,5 +87,5 @@ class Judge:
         )
 
     def close(self) -> None:
-        """Free the rows."""
+        """Close the environment."""
         self._environment.close()

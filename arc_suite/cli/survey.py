@@ -1,11 +1,11 @@
 """Let random bodies walk and count those that do.
 
-Bodies are told by seed, so that anyone can try some that nobody has seen. A body walks if it does
-not fall, its torso touches the ground for less than 1 % of the time, it gets more than one body
-length and 0.02 sqrt(g h) forward, and drifts sideways less than that.
+Every seed is a body. A body walks if it does not fall, its torso touches the ground for less than 1 % of
+the time, it moves forward by more than one body length and faster than 0.02 sqrt(g h), and drifts sideways
+less than that.
 
-  arc-suite census --first 0 --count 500
-  arc-suite census --first 7000 --count 100 --legs 4 --picture failures.png
+  arc-suite survey --first 0 --count 500
+  arc-suite survey --first 7000 --count 100 --legs 4 --picture failures.png
 """
 
 import contextlib
@@ -18,7 +18,8 @@ from arc_suite import checks, files
 from arc_suite.cli import films
 from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import progress
-from arc_suite.evaluation import census
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import survey
 from arc_suite.robots import generator
 
 FLAGS = flags.FLAGS
@@ -31,18 +32,18 @@ flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0
 flags.DEFINE_float(
     "froude",
     None,
-    "Wanted speed in units of sqrt(g h), h being the standing height; negative for backwards. [default: 0.25]",
+    "Desired speed in units of sqrt(g h), h being the standing height; negative for backwards. [default: 0.25]",
 )
-flags.DEFINE_bool("in_phase", False, "Move all legs at once: a check that the census tells bad from good.")
+flags.DEFINE_bool("in_phase", False, "Move all legs at once: a check that the survey tells bad from good.")
 flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
 flags.DEFINE_string("picture", None, "File to write a picture of up to twelve failures to.")
 
 
-def picture(outcomes: list[census.Outcome]) -> np.ndarray:
-    """Return how up to twelve bodies ended, each with its seed and what it failed by: (height, width, 3) uint8."""
+def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
+    """Return the ends of up to twelve walks, each with its seed and failures: (height, width, 3) uint8."""
     views = []
     for outcome in outcomes[:12]:
-        environment, _ = census.follow(outcome.trial)
+        environment, _ = survey.play(outcome.trial)
         caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
         views.append(films.captioned(environment.physics.render(300, 400, "portrait"), caption))
         environment.close()
@@ -52,18 +53,20 @@ def picture(outcomes: list[census.Outcome]) -> np.ndarray:
 
 
 def main() -> None:
-    """Run the census and print it."""
-    trials = [
-        census.Trial(seed, FLAGS.legs, FLAGS.links, FLAGS.seconds, FLAGS.froude, FLAGS.in_phase, *task())
-        for seed in range(FLAGS.first, FLAGS.first + FLAGS.count)
-    ]
+    """Run the survey and print it."""
+    name, settings = task()
+    settings = {"time_limit": FLAGS.seconds} | settings
+    trials = []
+    for seed in range(FLAGS.first, FLAGS.first + FLAGS.count):
+        setup = Setup.of(generator.random_body(seed, FLAGS.legs, FLAGS.links), name, settings)
+        trials.append(survey.Trial(setup, seed, FLAGS.froude, FLAGS.in_phase))
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
             checks.extension(FLAGS.picture, [".png"])
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
-        outcomes = list(census.census(trials, FLAGS.processes, progress))
-        print(census.table(outcomes))
-        print(census.summary(outcomes))
+        outcomes = list(survey.survey(trials, FLAGS.processes, progress))
+        print(survey.table(outcomes))
+        print(survey.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]
         for outcome in failed:
             print(

@@ -1,24 +1,24 @@
-"""Footfalls of a motion, told by the heights of the feet: contacts chatter."""
+"""Foot contact events of a motion, from the heights of the feet, as the contacts of the simulation chatter."""
 
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite.export.motions import Motion
+from arc_suite.export.root_motion import Motion
 from arc_suite.robots.spec import Body
 
 TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 
-# Of a foot's way up and down in the motion: a swing rises above the upper share, and lasts while the foot is
-# above the lower one.
+# Shares of the range of a foot's height: a swing rises above the upper one, and lasts while the foot is above the
+# lower one.
 _RISES, _LASTS = 0.5, 0.2
 _BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
 _LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
 
 
-class Footfall(NamedTuple):
-    """One foot comes down or leaves the ground.
+class FootContact(NamedTuple):
+    """A touchdown or liftoff of one foot.
 
     Attributes:
         foot: name of its body.
@@ -56,8 +56,8 @@ def swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.
 
     Args:
         heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
-        least: m, that it rises where it swings at all.
-        bounce: samples; it goes on swinging while it touches for fewer.
+        least: m; a foot that rises less does not swing.
+        bounce: samples; a shorter contact does not end a swing.
         loops: whether the first sample follows the last.
     """
     low, lift = heights.min(), np.ptp(heights)
@@ -80,24 +80,26 @@ def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
 
 
-def footfalls(
+def foot_contacts(
     motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool
-) -> tuple[list[Footfall], np.ndarray]:
-    """Return the footfalls of a motion in the order of time, and which feet stand when, (samples, feet).
+) -> tuple[list[FootContact], np.ndarray]:
+    """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
 
     Args:
         motion: of the body.
         body: its spec.
         heights: (samples, feet) of the soles, m.
         cycle: of the gait, s.
-        loops: whether the motion is a loop; its last sample is its first one then, and has no footfalls.
+        loops: whether the motion is a loop; its last sample is its first one then, and has no events.
     """
     least, bounce = _LEAST_LIFT * body.torso.standing_height, _BOUNCE * cycle / motion.step
     end = len(heights) - 1 if loops else len(heights)
     found, swing = [], np.zeros(heights.shape, bool)
 
     def mark(foot, event, at):
-        found.extend(Footfall(foot, event, int(sample), float(sample * motion.step)) for sample in np.flatnonzero(at))
+        found.extend(
+            FootContact(foot, event, int(sample), float(sample * motion.step)) for sample in np.flatnonzero(at)
+        )
 
     for leg, foot in enumerate(body.foot_names):
         up = swings(heights[:end, leg], least, bounce, loops)
@@ -106,4 +108,4 @@ def footfalls(
         mark(foot, TOUCH_DOWN, ~up & before)
         swing[:end, leg] = up
     swing[end:] = swing[:1]
-    return sorted(found, key=lambda footfall: (footfall.sample, footfall.foot, footfall.event)), ~swing
+    return sorted(found, key=lambda contact: (contact.sample, contact.foot, contact.event)), ~swing

@@ -1,11 +1,11 @@
-"""A census of random bodies: their demonstrators walk, and each walk is judged."""
+"""A robustness survey: the demonstrators of random bodies walk, and each walk is assessed."""
 
 import collections
 import functools
 import math
 import multiprocessing
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from dm_control.rl import control
@@ -13,10 +13,9 @@ from tqdm import tqdm
 
 from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.dm import load
+from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import GRAVITY
-from arc_suite.robots import gaits, generator
-from arc_suite.robots.spec import Body
+from arc_suite.robots import gaits
 
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
 MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
@@ -24,63 +23,58 @@ MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body ha
 
 
 class Trial(NamedTuple):
-    """What one walk of a census is to be.
+    """One walk of a survey.
 
     Attributes:
-        seed: of the random body and of its initial pose.
-        legs, links: None to draw them too.
-        seconds: to walk.
-        froude: wanted speed as a share of sqrt(g h); None for the medium one, negative for backwards.
-        in_phase: move all legs at once, which no body walks with.
-        task: name of the task, which is to be a kind of walk.
-        task_kwargs: its settings, as in `arc_suite.load`.
+        setup: a body in a kind of walk, whose settings have a `time_limit`.
+        seed: of the initial pose.
+        froude: desired speed in units of sqrt(g h); None for the medium one, negative for backwards.
+        in_phase: move all legs at once, with which no body walks.
     """
 
-    seed: int
-    legs: int | None = None
-    links: int | None = None
-    seconds: float = 20.0
+    setup: Setup
+    seed: int = 0
     froude: float | None = None
     in_phase: bool = False
-    task: str = "walk"
-    task_kwargs: Mapping[str, Any] = {}
-
-    @property
-    def body(self) -> Body:
-        """The random body."""
-        return generator.random_body(self.seed, self.legs, self.links)
 
 
 class Outcome(NamedTuple):
-    """What became of a walk.
+    """The result of a walk.
 
     Attributes:
-        trial: what was tried.
-        legs, links: of the body.
-        froude: mean forward speed as a share of sqrt(g h).
-        lengths: progress in body lengths.
-        drift: sideways displacement as a share of progress.
+        trial: the walk.
+        froude: mean forward speed in units of sqrt(g h).
+        lengths: forward displacement in body lengths.
+        drift: sideways displacement as a share of the forward one.
         touching: share of the time that the torso touched the ground.
-        failures: why it does not count as walking; empty if it does.
+        failures: reasons why it does not count as walking; empty if it does.
     """
 
     trial: Trial
-    legs: int
-    links: int
     froude: float
     lengths: float
     drift: float
     touching: float
     failures: tuple[str, ...]
 
+    @property
+    def legs(self) -> int:
+        """Number of legs."""
+        return len(self.trial.setup.body.legs)
 
-class Course(NamedTuple):
-    """The course of the torso in a walk; leading axis: control steps, the start included.
+    @property
+    def links(self) -> int:
+        """Number of links of a leg."""
+        return len(self.trial.setup.body.legs[0].joints)
+
+
+class Trajectory(NamedTuple):
+    """The torso in a walk; leading axis: control steps, the start included.
 
     Attributes:
         positions: (n, 2) m, x and y.
         touching: (n,) whether the torso touches the ground.
-        ending: "time" if it lasted as long as it should, or "fall" or "divergence".
+        ending: "time" at the time limit, else "fall" or "divergence".
     """
 
     positions: np.ndarray
@@ -88,15 +82,13 @@ class Course(NamedTuple):
     ending: str
 
 
-def follow(trial: Trial) -> tuple[control.Environment, Course]:
+def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
     """Play the walk of one body.
 
     Returns:
         The environment as the walk left it, and the walk.
     """
-    body = trial.body
-    settings = {"time_limit": trial.seconds, "random": trial.seed} | dict(trial.task_kwargs)
-    environment = load(body, trial.task, settings)
+    body, environment = trial.setup.body, trial.setup.load(trial.seed)
     gait = gaits.Gait(0.6, (0.0,) * len(body.legs)) if trial.in_phase else None
     demonstrator = Demonstrator(body, froude=trial.froude, gait=gait)
     data = environment.physics.data.ptr
@@ -112,26 +104,25 @@ def follow(trial: Trial) -> tuple[control.Environment, Course]:
                 ending = "fall"
     except control.PhysicsError:
         ending = "divergence"
-    return environment, Course(np.array(positions), np.array(touching), ending)
+    return environment, Trajectory(np.array(positions), np.array(touching), ending)
 
 
-def judge(trial: Trial, course: Course) -> Outcome:
-    """Return whether a course is a walk, and if not, why: a fall, dragging, slowness or drift."""
-    body = trial.body
-    forward, sideways = course.positions[-1] - course.positions[0]
+def assess(trial: Trial, trajectory: Trajectory) -> Outcome:
+    """Return whether a trajectory is a walk, and if not, why: a fall, dragging, slowness or drift."""
+    body = trial.setup.body
+    forward, sideways = trajectory.positions[-1] - trajectory.positions[0]
     length = 2.0 * body.torso.solids[0].size[0]
-    froude = forward / (trial.seconds * math.sqrt(GRAVITY * body.torso.standing_height))
-    touching = course.touching.mean()
+    seconds = trial.setup.task_kwargs["time_limit"]
+    froude = forward / (seconds * math.sqrt(GRAVITY * body.torso.standing_height))
+    touching = trajectory.touching.mean()
     failures = {
-        course.ending: course.ending != "time",
+        trajectory.ending: trajectory.ending != "time",
         "touch": touching >= MOST_TOUCHING,
         "slow": not (forward > length and froude > LEAST_FROUDE),
         "drift": not abs(sideways) < abs(forward),
     }
     return Outcome(
         trial=trial,
-        legs=len(body.legs),
-        links=len(body.legs[0].joints),
         froude=float(froude),
         lengths=float(forward / length),
         drift=float(abs(sideways) / max(abs(forward), 1e-9)),
@@ -140,15 +131,15 @@ def judge(trial: Trial, course: Course) -> Outcome:
     )
 
 
-def attempt(trial: Trial) -> Outcome:
-    """Play the walk of one body and judge it."""
-    environment, course = follow(trial)
+def run(trial: Trial) -> Outcome:
+    """Play the walk of one body and assess it."""
+    environment, trajectory = play(trial)
     environment.close()
-    return judge(trial, course)
+    return assess(trial, trajectory)
 
 
-def census(trials: Sequence[Trial], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
-    """Play and judge the walks of many bodies.
+def survey(trials: Sequence[Trial], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
+    """Run many trials.
 
     Args:
         trials: to run.
@@ -160,15 +151,15 @@ def census(trials: Sequence[Trial], processes: int | None = None, progress: Call
     """
     progress = functools.partial(progress, total=len(trials), unit="body", desc="walk")
     if processes == 1:
-        yield from progress(map(attempt, trials))
+        yield from progress(map(run, trials))
         return
     # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
     with multiprocessing.get_context("spawn").Pool(processes) as pool:
-        yield from progress(pool.imap(attempt, trials))
+        yield from progress(pool.imap(run, trials))
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Return as text how many bodies walked, and their median speed, by legs and links."""
+    """Return a table of the bodies that walked and their median speed, by legs and links."""
     links = sorted({outcome.links for outcome in outcomes})
     lines = ["legs " + "".join(f"{f'{k} link' + 's' * (k > 1):>18}" for k in links) + f"{'all':>18}"]
     for legs in sorted({outcome.legs for outcome in outcomes}):
@@ -188,7 +179,7 @@ def _cell(outcomes: Sequence[Outcome]) -> str:
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
-    """Return a census in a few lines of text."""
+    """Return a survey in a few lines of text."""
     walked = sum(not outcome.failures for outcome in outcomes)
     reasons = collections.Counter(reason for outcome in outcomes for reason in outcome.failures)
     speed, drift = (np.median([getattr(outcome, name) for outcome in outcomes]) for name in ("froude", "drift"))

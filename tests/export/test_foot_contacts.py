@@ -1,8 +1,8 @@
-"""Footfalls from heights: bounces and feet that never leave the ground."""
+"""Foot contact events from heights: bounces and feet that never leave the ground."""
 
 import numpy as np
 
-from arc_suite.export.footfalls import swings
+from arc_suite.export.foot_contacts import swings
 
 PHASE = np.linspace(0.0, 3.0, 600, endpoint=False)  # cycles of 200 samples
 HEIGHTS = 0.1 * np.sin(2.0 * np.pi * PHASE).clip(0.0) + 0.003 * np.sin(40.0 * PHASE)

@@ -1,4 +1,4 @@
-"""The judge of presets: rows of one vector environment, equal to ordinary ones."""
+"""The evaluator of presets: episodes of one vector environment equal those of single ones."""
 
 import gaitless
 import gymnasium
@@ -9,13 +9,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.presets import TUNINGS
-from arc_suite.robots import ROBOTS
-from arc_suite.tuning import Judge
+from arc_suite.envs.setup import Setup
+from arc_suite.tuning import Evaluator
 
 
-def test_judge_plays_the_episodes_of_ordinary_environments():
+def test_evaluator_plays_the_episodes_of_ordinary_environments():
     presets = [TUNINGS["leaper"][name] for name in ("slow", "fast")]
-    score = Judge(ROBOTS["leaper"], presets=2, episodes=2, steps=30)(presets, range(5, 7))
+    score = Evaluator(Setup.of("leaper"), presets=2, episodes=2, steps=30)(presets, range(5, 7))
     environment = gymnasium.make("arc_suite/leaper-walk-v0")
     for row, preset in enumerate(presets):
         for episode in range(2):
@@ -35,10 +35,10 @@ def test_judge_plays_the_episodes_of_ordinary_environments():
     assert not score.falls.any()
 
 
-def test_judge_counts_falls_and_pays_nothing_after_them():
+def test_evaluator_counts_falls_and_pays_nothing_after_them():
     medium = TUNINGS["leaper"]["medium"]
     folding = medium._replace(stiffness=3.0, centre={"knee": -120.0, "ankle": -120.0}, sweep=0.0)
-    score = Judge(ROBOTS["leaper"], presets=2, episodes=1, steps=60)([folding, medium], [0])
+    score = Evaluator(Setup.of("leaper"), presets=2, episodes=1, steps=60)([folding, medium], [0])
     assert_array_equal(score.falls, [[True], [False]])
     environment, policy, total, fallen = (
         gymnasium.make("arc_suite/leaper-walk-v0"),
@@ -60,7 +60,7 @@ def test_judge_counts_falls_and_pays_nothing_after_them():
 def test_first_steps_may_count_for_nothing():
     presets = [TUNINGS["leaper"]["medium"]]
     whole, first, last = (
-        Judge(ROBOTS["leaper"], 1, 2, steps, skipped=skipped)(presets, range(2))
+        Evaluator(Setup.of("leaper"), 1, 2, steps, skipped=skipped)(presets, range(2))
         for steps, skipped in ((30, 0), (12, 0), (30, 12))
     )
     assert_allclose(30 * whole.rewards, 12 * first.rewards + 18 * last.rewards, rtol=1e-12)
@@ -68,8 +68,8 @@ def test_first_steps_may_count_for_nothing():
         assert_allclose(30 * costs, 12 * first.style[name] + 18 * last.style[name], rtol=1e-9)
 
 
-def test_the_judge_asks_for_the_terms_of_style():
+def test_the_evaluator_needs_the_terms_of_style():
     with gaitless.registered(), pytest.raises(ValueError) as error:
-        Judge(ROBOTS["tick"], 1, 1, 5, "stay")
+        Evaluator(Setup.of("tick", "stay"), 1, 1, 5)
     message = "task stay: expected a reward with terms posture and smoothness, got upright, control"
     assert str(error.value) == message

@@ -1,4 +1,4 @@
-"""tools/walk_census.py lets random bodies walk and tells those that do from those that do not."""
+"""tools/walk_census.py surveys random bodies and tells those that walk from those that do not."""
 
 from pathlib import Path
 
@@ -9,12 +9,12 @@ TOOL = Path(__file__).parents[2] / "tools" / "walk_census.py"
 BODIES = ("--first=40", "--legs=6", "--links=3", "--seconds=12")
 
 
-def census(*arguments):
+def survey(*arguments):
     return programs.run(TOOL, "--processes=1", *arguments)
 
 
 def test_bodies_walk():
-    done = census(*BODIES, "--count=3")
+    done = survey(*BODIES, "--count=3")
     assert (done.returncode, done.stderr) == (0, "")
     lines = done.stdout.splitlines()
     assert lines[0].split() == ["legs", "3", "links", "all"]
@@ -24,14 +24,14 @@ def test_bodies_walk():
 
 
 def test_legs_in_phase_fail_and_their_bodies_are_named():
-    done = census(*BODIES, "--count=1", "--in_phase")
+    done = survey(*BODIES, "--count=1", "--in_phase")
     assert done.returncode == 0, done.stderr
     assert "0 of 1 bodies walk (0.0 %)\nfailures: slow 1\n" in done.stdout
     assert done.stdout.endswith("seed 40: 6 legs, 3 links: slow\n")
 
 
 def test_a_reversed_sweep_walks_backwards():
-    done = census(*BODIES, "--count=1", "--froude=-0.25")
+    done = survey(*BODIES, "--count=1", "--froude=-0.25")
     assert float(done.stdout.split("median speed ")[1].split()[0]) < -0.1
 
 
@@ -46,7 +46,7 @@ def test_a_reversed_sweep_walks_backwards():
     ],
 )
 def test_bad_arguments_are_one_line(argument, message):
-    done = census(argument)
+    done = survey(argument)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.splitlines()[-1] == f"walk_census.py: {message}"
 
@@ -54,7 +54,7 @@ def test_bad_arguments_are_one_line(argument, message):
 @pytest.mark.slow
 def test_failures_are_shown_in_a_picture(tmp_path):
     path = tmp_path / "failures.png"
-    done = census(*BODIES, "--count=1", "--in_phase", "--picture", path)
+    done = survey(*BODIES, "--count=1", "--in_phase", "--picture", path)
     if "cannot render" in done.stderr:
         pytest.skip("no OpenGL here")
     assert done.returncode == 0, done.stderr

@@ -1,8 +1,8 @@
-"""From recordings to motions: a root that moves over the ground, and a body that moves on it.
+"""Root motion of recordings: a root that moves over the ground, and a body that moves relative to it.
 
 A loop is found by recurrence: the pose is compared with the pose a whole number of control steps
-later, since a gait cycle need be none and the control would be out of step with it. What is left
-over at the seam is spread over the loop.
+later, as a gait cycle may not be a whole number of them. The difference at the seam is spread over
+the loop.
 """
 
 from collections.abc import Mapping
@@ -14,8 +14,8 @@ from arc_suite import rotations
 from arc_suite.export.recordings import Recording
 from arc_suite.models.sizing import SUBSTEPS
 
-CLOSED = np.radians(0.5)  # a seam that needs no longer loop
-OPEN = np.radians(2.0)  # a seam that is none
+CLOSED = np.radians(0.5)  # a seam up to which no longer loop is tried
+OPEN = np.radians(2.0)  # a seam from which a loop is refused
 MOST_CYCLES = 12  # of a loop
 
 _RETURNED = 0.3  # of the largest distance between two poses: a cycle later the distance is less
@@ -36,7 +36,7 @@ class Motion(NamedTuple):
         quaternions: (samples, 4) of the torso in the root's frame, w first.
         joints: (samples, joints) rad.
         twist: (3,) mean velocity of the root in its own frame: forward and left, m/s, turning, rad/s.
-        seam: rad, by which the pose had not returned before it was mended; 0 for what is no loop.
+        seam: rad, difference of the last pose and the first before it was closed; 0 if the motion is no loop.
     """
 
     step: float
@@ -53,7 +53,7 @@ class Motion(NamedTuple):
         return self.step * (len(self.joints) - 1)
 
     def qpos(self) -> np.ndarray:
-        """Return the poses (samples, 7 + joints) in the world, as MuJoCo takes them."""
+        """Return MuJoCo's positions in the world, (samples, 7 + joints)."""
         heading = self.root[:, 2]
         ahead, left, height = self.positions.T
         across = rotations.headed(np.stack([ahead, left], axis=-1), -heading)
@@ -65,7 +65,7 @@ class Motion(NamedTuple):
         return self._replace(positions=self.positions - (0.0, 0.0, height))
 
     def begun(self, sample: int) -> "Motion":
-        """Return the loop as it begins at another of its samples."""
+        """Return the loop with another of its samples first."""
 
         def rolled(values):
             turned = np.roll(values[:-1], -sample, axis=0)
@@ -76,14 +76,14 @@ class Motion(NamedTuple):
         )
 
     def part(self, first: int, samples: int) -> "Motion":
-        """Return a part of the motion, of so many samples after the first one, as its root begins there."""
+        """Return a part of the motion, `samples` after the first one, whose root starts at 0."""
         rows = slice(first, first + samples + 1)
         fields = {name: getattr(self, name)[rows] for name in ("positions", "quaternions", "joints")}
         root = relative(self.root[first], self.root[rows])
         return self._replace(root=root, **fields, twist=logarithm(root[-1]) / (self.step * (len(root) - 1)))
 
     def at(self, times: np.ndarray) -> "Motion":
-        """Return the motion at even times (frames,), s, between whose neighbours it is interpolated."""
+        """Return the motion at even times (frames,), s, interpolated between samples."""
         place = (np.asarray(times) / self.step).clip(0.0, len(self.joints) - 1)
         before = np.minimum(place.astype(int), len(self.joints) - 2)
         share = (place - before)[:, None]
@@ -103,7 +103,7 @@ class Motion(NamedTuple):
 
 
 def period(recording: Recording) -> float | None:
-    """Return the time, s, after which poses come back for the first time; None where they do not.
+    """Return the period of the poses, s; None if they do not return.
 
     It is the first minimum of the mean distance of two poses by the time between them, among those that
     are well below the largest distance.
@@ -123,7 +123,7 @@ class Closing(NamedTuple):
     """How well a recording closes to loops of one length.
 
     Attributes:
-        seam: rad, by which the pose has not returned in the best of them.
+        seam: rad, difference of the poses at both ends of the best of them.
         samples: of a loop; the sample after the last is the first one again.
     """
 
@@ -158,7 +158,7 @@ class Stretch(NamedTuple):
     Attributes:
         first: sample with which it begins.
         samples: of it; the sample after the last is the first one again.
-        usual: whether its root goes as fast as that of the whole recording does on the mean, to 1 %.
+        usual: whether its root has the mean speed of the whole recording, to 1 %.
     """
 
     first: int
@@ -167,10 +167,9 @@ class Stretch(NamedTuple):
 
 
 def usual(recording: Recording, samples: int) -> Stretch:
-    """Return the loop of a number of samples that goes most as all do on the mean, of those that close.
+    """Return the most typical loop with a number of samples, among those that close, or nearly so if none does.
 
-    It is judged by the way of its root: the torso's own depends on where in its sway the loop begins. Where none closes
-    it is one of those that come nearest to it.
+    Loops are compared by the displacement of the root, as the torso's depends on where in its sway the loop begins.
     """
     place = _places(recording.qpos)
     mean = logarithm(relative(place[:-samples], place[samples:]))
@@ -178,9 +177,9 @@ def usual(recording: Recording, samples: int) -> Stretch:
     seams = _seams(recording.qpos[:-samples], recording.qpos[samples:])
     firsts = np.flatnonzero(seams <= max(CLOSED, _NEAREST * seams.min()))
     firsts = firsts[:: -(-len(firsts) // _TRIED)]
-    ways = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
-    wrong = abs(np.hypot(ways[:, 0], ways[:, 1]) - speed)
-    astray = abs(ways[:, 1] - left) + recording.qpos[:, 2].mean() * abs(ways[:, 2] - turning)
+    displacements = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
+    wrong = abs(np.hypot(displacements[:, 0], displacements[:, 1]) - speed)
+    astray = abs(displacements[:, 1] - left) + recording.qpos[:, 2].mean() * abs(displacements[:, 2] - turning)
     best = (_SPEED * wrong + astray).argmin()
     return Stretch(int(firsts[best]), samples, bool(wrong[best] <= _USUAL * speed))
 
@@ -188,14 +187,14 @@ def usual(recording: Recording, samples: int) -> Stretch:
 def loop(recording: Recording, stretch: Stretch) -> Motion:
     """Return a part of a recording as a loop: a root of constant velocity, and a pose that returns exactly."""
     qpos = recording.qpos[stretch.first : stretch.first + stretch.samples + 1]
-    way, local = _rooted(_places(qpos))
-    root = along(way, np.linspace(0.0, 1.0, len(qpos)))
-    motion = _mended(_on_root(recording, qpos, root, local))
-    return motion._replace(twist=way / motion.seconds, seam=float(_seams(qpos[:1], qpos[-1:])[0]))
+    displacement, local = _rooted(_places(qpos))
+    root = along(displacement, np.linspace(0.0, 1.0, len(qpos)))
+    motion = _closed(_on_root(recording, qpos, root, local))
+    return motion._replace(twist=displacement / motion.seconds, seam=float(_seams(qpos[:1], qpos[-1:])[0]))
 
 
 def _seams(before, later) -> np.ndarray:
-    """Return by how much poses (n, nq) differ: the largest angle (n,) of a joint's or the torso's tilt, rad."""
+    """Return the differences of poses (n, nq): the largest of joint angles and the torso's tilt, (n,) rad."""
     apart = abs(later[:, 7:] - before[:, 7:]).max(axis=-1)
     # Of two unit vectors, the vertical as the torso sees it: nearly the angle between them.
     tilt = rotations.matrix(later[:, 3:7])[:, 2] - rotations.matrix(before[:, 3:7])[:, 2]
@@ -203,9 +202,9 @@ def _seams(before, later) -> np.ndarray:
 
 
 def _rooted(place) -> tuple[np.ndarray, np.ndarray]:
-    """Return the way (3,) of a loop's root, and where the torso is (samples, 3) in its frame, seen from above.
+    """Return the displacement (3,) of a loop's root, and the torso's places (samples, 3) in the root's frame.
 
-    The root runs below the middle of the torso's way, and heads as the torso does on the mean.
+    The root runs below the middle of the torso's path, with the torso's mean heading.
 
     Args:
         place: (samples, 3) of the torso in the world, both ends included.
@@ -217,12 +216,12 @@ def _rooted(place) -> tuple[np.ndarray, np.ndarray]:
 
 
 def passage(recording: Recording, first: int, samples: int, window: int) -> Motion:
-    """Return a part of a recording as it is, under which the root runs along the torso's mean way.
+    """Return a part of a recording unchanged, whose root follows the moving average of the torso's path.
 
     Args:
         recording: with half a window more at both ends.
         first: sample with which the motion begins.
-        samples: of it, but for the last.
+        samples: of it, without the last.
         window: samples that the mean is taken over, a gait cycle.
     """
     qpos = recording.qpos
@@ -253,8 +252,8 @@ def _on_root(recording: Recording, qpos, root, local) -> Motion:
     )
 
 
-def _mended(motion: Motion) -> Motion:
-    """Return the motion with what its last pose differs from the first spread over it, half to either end."""
+def _closed(motion: Motion) -> Motion:
+    """Close a loop: spread the difference of its last pose and its first over it, half to either end."""
     share = np.linspace(-0.5, 0.5, len(motion.joints))[:, None]
     joints = motion.joints - share * (motion.joints[-1] - motion.joints[0])
     positions = motion.positions - share * (motion.positions[-1] - motion.positions[0])
@@ -265,12 +264,12 @@ def _mended(motion: Motion) -> Motion:
     back = np.concatenate([np.cos(share * angle), -np.sin(share * angle) * axis], axis=-1)
     quaternions = rotations.product(back, motion.quaternions)
     for values in (joints, positions, quaternions):
-        values[-1] = values[0]  # but for rounding they are equal already
+        values[-1] = values[0]  # up to rounding they are equal already
     return motion._replace(joints=joints, positions=positions, quaternions=quaternions)
 
 
 def _continuous(quaternions) -> np.ndarray:
-    """Return the same orientations (samples, 4), each with the sign that is near the one before."""
+    """Return the same orientations (samples, 4) with continuous signs."""
     flips = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0.0
     signs = np.concatenate([[1.0], np.cumprod(np.where(flips, -1.0, 1.0))])
     return quaternions * (np.sign(quaternions[0, 0]) or 1.0) * signs[:, None]
@@ -280,14 +279,14 @@ def _continuous(quaternions) -> np.ndarray:
 
 
 def relative(origin, place) -> np.ndarray:
-    """Return places as seen from others."""
+    """Return places relative to others."""
     origin, place = np.asarray(origin, float), np.asarray(place, float)
     offset = rotations.headed(place[..., :2] - origin[..., :2], origin[..., 2])
     return np.concatenate([offset, place[..., 2:] - origin[..., 2:]], axis=-1)
 
 
 def along(twist, times) -> np.ndarray:
-    """Return the places (times, 3) that a constant velocity in one's own frame leads to from 0.
+    """Return the places (times, 3) to which a constant velocity in the moving frame leads from 0.
 
     Args:
         twist: (3,) forward, left, m/s, and turning, rad/s.
@@ -296,17 +295,17 @@ def along(twist, times) -> np.ndarray:
     angle = 0.5 * twist[2] * times
     # A chord of the arc: its length is the arc's by sin(a) / a, its direction that of half the turn.
     chord = times * np.sinc(angle / np.pi)
-    way = rotations.headed(np.stack([chord * twist[0], chord * twist[1]], axis=-1), -angle)
-    return np.concatenate([way, 2.0 * angle[:, None]], axis=-1)
+    displacement = rotations.headed(np.stack([chord * twist[0], chord * twist[1]], axis=-1), -angle)
+    return np.concatenate([displacement, 2.0 * angle[:, None]], axis=-1)
 
 
 def logarithm(place) -> np.ndarray:
     """Return the constant velocities (..., 3) that lead from 0 to places (..., 3) in a unit of time."""
     half = 0.5 * place[..., 2]
-    way = rotations.headed(place[..., :2], half) / np.sinc(half / np.pi)[..., None]
-    return np.concatenate([way, place[..., 2:]], axis=-1)
+    displacement = rotations.headed(place[..., :2], half) / np.sinc(half / np.pi)[..., None]
+    return np.concatenate([displacement, place[..., 2:]], axis=-1)
 
 
 def after(first, second) -> np.ndarray:
-    """Return the place (3,) that is `second` as seen from `first`."""
+    """Return the place (3,) that `second` is relative to `first`."""
     return np.append(first[:2] + rotations.headed(np.asarray(second[:2]), -first[2]), first[2] + second[2])
