@@ -140,8 +140,8 @@ class _Evaluator:
         return self._configuration.setup.make_vec(evaluation.EPISODES, **options)
 
     def __call__(self, run_files: RunFolder, found: Slice) -> float:
-        configuration, task = self._configuration, self._environment.task
-        policy = Network(tuple(found.policy), configuration.setup, dict(task.blocks))
+        configuration = self._configuration
+        policy = Network(tuple(found.policy), configuration.setup, dict(self._environment.task.blocks))
         network.save(run_files.path / network.FILE, policy)
         kept = files.folder(run_files.path / checkpoints.FOLDER / str(found.step))
         network.save(kept / network.FILE, policy)
