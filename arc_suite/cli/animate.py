@@ -1,4 +1,4 @@
-"""Make animation clips of a robot for game engines: glTF (.glb), and their metrics (.json).
+"""Make animation clips of a robot for game engines (.glb), and their metrics (.json).
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb

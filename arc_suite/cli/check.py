@@ -11,22 +11,22 @@ there is any flaw or difference.
 
 from absl import flags
 
-from arc_suite.cli.flags import ROBOT_HELP
+from arc_suite.cli.flags import ROBOT_HELP, define_task, task
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec_files import load_body
 
 FLAGS = flags.FLAGS
-flags.DEFINE_string("task", None, "Task to check, module:name of one that another package has.")
+define_task()
 flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
 
 
 def main(spec: str | None = None) -> int:
     """Print the flaws of the body in a spec file, or how a task differs, and return the exit status."""
-    if (spec is None) == (FLAGS.task is None):
+    if (spec is None) != FLAGS["task"].present:
         raise ValueError("expected a spec file or --task; see --help")
-    return _check_body(spec) if FLAGS.task is None else _check_task()
+    return _check_task() if spec is None else _check_body(spec)
 
 
 def _check_body(spec: str) -> int:
@@ -40,7 +40,7 @@ def _check_body(spec: str) -> int:
 
 
 def _check_task() -> int:
-    setup = Setup.of(FLAGS.robot, FLAGS.task)
+    setup = Setup.of(FLAGS.robot, *task())
     found = conformance.difference(setup)
     same = f"a batch of environments equals each of them alone over {conformance.STEPS} steps"
     print(f"{setup}: {same}" if found is None else f"{setup}: a batch of environments differs from one alone: {found}")

@@ -1,4 +1,4 @@
-"""Collect a dataset in Minari's format, or replay one and check that it is bit-equal.
+"""Collect a dataset in Minari's format, or replay one and check every bit.
 
 Both use all cores. Killed or interrupted, the same command continues. Minari keeps datasets in
 ~/.minari/datasets, or where MINARI_DATASETS_PATH points; `minari list local` shows them.

@@ -1,4 +1,4 @@
-"""Evaluate a policy: the task's own metrics, then return and length of its episodes.
+"""Evaluate a policy: the task's metrics, and return and length of episodes.
 
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
 return is compared with that of the paper's demonstrator, where the task is the paper's. IQM is the

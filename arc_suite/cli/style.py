@@ -1,4 +1,4 @@
-"""Measure how a robot and each of its legs walk: gait, course, torso, joints and effort.
+"""Measure the style of a walk: gait, course, torso, joints and effort.
 
   arc-suite style --robot queen --policy cpg --preset medium
   arc-suite style --policy my_package.policies:make --compare cpg --output out/style

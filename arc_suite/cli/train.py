@@ -1,4 +1,4 @@
-"""Train a policy: from nothing to a folder that every program takes as `--policy`.
+"""Train a policy, into a folder that every program takes as `--policy`.
 
 Killed at any moment, the same command resumes, bit-exactly. The folder holds tables of returns and losses, a
 checkpoint, the policy, and a picture of its returns, drawn anew after each evaluation.

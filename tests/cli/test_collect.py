@@ -99,6 +99,6 @@ def test_help_shows_examples_and_the_flags():
         "--id",
         "--[no]overwrite",
         "--verify",
-        "--rows",
+        "--num_envs",
     ):
         assert flag in done.stdout

@@ -10,7 +10,7 @@ import pytest
 from programs import arc_suite as arc_suite_program
 
 import arc_suite
-from arc_suite.cpg.presets import PRESETS
+from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.gym import Env
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import load_body
@@ -52,7 +52,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
         (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
-        (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(PRESETS)})"),
+        (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(preset_names())})"),
     ],
 )
 def test_bad_arguments_are_one_line(program, arguments, message, tmp_path):

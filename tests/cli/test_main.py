@@ -14,7 +14,19 @@ from arc_suite.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-TASKED = ("build_model", "render", "animate", "view", "evaluate", "style", "collect", "tune_cpg", "train", "survey")
+TASKED = (
+    "build_model",
+    "check",
+    "render",
+    "animate",
+    "view",
+    "evaluate",
+    "style",
+    "collect",
+    "tune_cpg",
+    "train",
+    "survey",
+)
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS} | {"survey": ROOT / "tools" / "walk_census.py"}

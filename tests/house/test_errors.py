@@ -253,7 +253,7 @@ CASES = [
     ),
     (
         rows(task_kwargs={"on_divergence": "raise"}),
-        "unknown on_divergence of rows 'raise' (there are: terminate)",
+        "unknown on_divergence of many environments 'raise' (there are: terminate)",
     ),
     (
         make(render_mode="ansi"),
