@@ -16,7 +16,7 @@ import numpy as np
 import optax
 
 from arc_suite import policies
-from arc_suite.agents import learner, networks, normaliser
+from arc_suite.agents import learner, networks
 from arc_suite.agents.hyperparameters import DAgger
 from arc_suite.agents.learner import RunContext, Slice, generator
 from arc_suite.agents.normaliser import Moments
@@ -74,7 +74,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             step = min(done * hp.num_envs, context.steps)
             for name, array in dataset.items():
                 array[:done] = saved[name]
-            normalise = normaliser.restored(saved)
+            normalise = networks.restored_layer("normaliser", normalise, saved)
             observation = learner.restore_environment(environment, saved)
         for earlier in range(done):  # the demonstrator's memory is not saved
             _label(teacher, task, dataset["observations"][earlier], dataset["ages"][earlier])
@@ -122,7 +122,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             **networks.named("state", state),
             **{name: array[:done] for name, array in dataset.items()},
             "age": age,
-            **normaliser.stored(normalise),
+            **networks.named("normaliser", normalise.arrays),
             **learner.environment_arrays(environment),
         }
         yield Slice(step, metrics, policy(normalise, state), checkpoint)

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.agents import learner, networks, normaliser
+from arc_suite.agents import learner, networks
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.learner import Diverged, RunContext, Slice, generator
@@ -51,7 +51,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         with learner.restoring():
             state = networks.restored("state", state, saved)
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
-            normalise = normaliser.restored(saved)
+            normalise = networks.restored_layer("normaliser", normalise, saved)
             iterations = int(saved["iterations"])
             observation = learner.restore_environment(environment, saved)
 
@@ -96,7 +96,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         checkpoint = {
             **networks.named("state", state),
             **networks.named("moments", moments),
-            **normaliser.stored(normalise),
+            **networks.named("normaliser", normalise.arrays),
             "iterations": np.array(iterations),
             **learner.environment_arrays(environment),
         }

@@ -15,7 +15,6 @@ from arc_suite import data, files
 from arc_suite.agents import run_folder
 from arc_suite.agents.configuration import PRIOR_SHA256
 from arc_suite.studies import publication
-from arc_suite.studies.results import table
 from arc_suite.studies.tables import Run
 
 _PAUSE = 0.2  # s between two looks at the processes
@@ -140,7 +139,7 @@ def states(
     for run in runs:
         state, word = known.get(run.name), words[run.name]
         if state is None or state.word != word or word in ("running", "elsewhere"):
-            times, evaluations = (table(folder / run.name, name) for name in ("times", "evaluations"))
+            times, evaluations = (run_folder.table(folder / run.name, name) for name in ("times", "evaluations"))
             step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
             result = float(run_folder.latest_returns(evaluations).mean()) if evaluations else None
             state = State(run, word, int(step), result, float(wall), float(cpu))
