@@ -16,16 +16,9 @@ import numpy as np
 import optax
 
 from arc_suite import policies
-from arc_suite.agents import networks, normaliser
+from arc_suite.agents import learner, networks
 from arc_suite.agents.hyperparameters import DAgger
-from arc_suite.agents.learner import (
-    RunContext,
-    Slice,
-    environment_arrays,
-    generator,
-    restore_environment,
-    restoring,
-)
+from arc_suite.agents.learner import RunContext, Slice, generator
 from arc_suite.agents.normaliser import Moments
 from arc_suite.cpg import suited_preset
 from arc_suite.policies.network import Layer, forward
@@ -75,14 +68,14 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     age = np.zeros(hp.num_envs, int)
 
     if (saved := context.checkpoint) is not None:
-        with restoring():
+        with learner.restoring():
             state = networks.restored("state", state, saved)
             done, age = len(saved["labels"]), saved["age"]
             step = min(done * hp.num_envs, context.steps)
             for name, array in dataset.items():
                 array[:done] = saved[name]
-            normalise = normaliser.restored(saved)
-            observation = restore_environment(environment, saved)
+            normalise = networks.restored_layer("normaliser", normalise, saved)
+            observation = learner.restore_environment(environment, saved)
         for earlier in range(done):  # the demonstrator's memory is not saved
             _label(teacher, task, dataset["observations"][earlier], dataset["ages"][earlier])
 
@@ -129,8 +122,8 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             **networks.named("state", state),
             **{name: array[:done] for name, array in dataset.items()},
             "age": age,
-            **normaliser.stored(normalise),
-            **environment_arrays(environment),
+            **networks.named("normaliser", normalise.arrays),
+            **learner.environment_arrays(environment),
         }
         yield Slice(step, metrics, policy(normalise, state), checkpoint)
 

@@ -141,5 +141,10 @@ def restored(prefix: str, template, arrays: Mapping[str, np.ndarray]):
     return jax.tree_util.tree_unflatten(structure, values)
 
 
+def restored_layer(prefix: str, layer: Layer, arrays: Mapping[str, np.ndarray]) -> Layer:
+    """Return a layer of a policy like the given one with the arrays that `named` gave for `layer.arrays`."""
+    return layer._replace(arrays=tuple(map(np.asarray, restored(prefix, layer.arrays, arrays))))
+
+
 def _text(path) -> str:
     return "/" + jax.tree_util.keystr(path, simple=True, separator="/")

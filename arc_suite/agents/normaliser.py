@@ -1,6 +1,5 @@
 """Running mean and variance of observations, for normalised inputs of networks."""
 
-from collections.abc import Mapping
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -8,7 +7,6 @@ import numpy as np
 from arc_suite.policies.network import Layer
 
 LIMIT = 5.0  # of a normalised number
-_NAME = "normaliser"
 _LEAST = 1e-3  # lower bound of the standard deviation, for near-constant inputs
 
 
@@ -48,17 +46,3 @@ class Moments(NamedTuple):
         deviation = np.sqrt(self.squares / max(self.count, 1.0))
         factor = 1.0 / np.maximum(deviation, _LEAST) if self.count else np.ones_like(deviation)
         return Layer("normalise", tuple(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))
-
-
-def stored(layer: Layer) -> dict[str, np.ndarray]:
-    """Return the arrays of a normalising layer by name: part of a checkpoint."""
-    return {f"{_NAME}/{place}": array for place, array in enumerate(layer.arrays)}
-
-
-def restored(arrays: Mapping[str, np.ndarray]) -> Layer:
-    """Return the layer of the arrays that `stored` gave.
-
-    Raises:
-        KeyError: arrays of it are missing.
-    """
-    return Layer("normalise", tuple(arrays[f"{_NAME}/{place}"] for place in range(3)))

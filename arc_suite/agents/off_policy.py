@@ -13,18 +13,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.agents import networks, priors
+from arc_suite.agents import learner, networks, priors
 from arc_suite.agents import soft_actor_critic as sac
 from arc_suite.agents.hyperparameters import SoftActorCritic
-from arc_suite.agents.learner import (
-    Diverged,
-    RunContext,
-    Slice,
-    environment_arrays,
-    generator,
-    restore_environment,
-    restoring,
-)
+from arc_suite.agents.learner import Diverged, RunContext, Slice, generator
 from arc_suite.agents.replay import Protected, Replay, Transitions
 from arc_suite.agents.stopping import Patience
 
@@ -85,12 +77,12 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
     phase = None
 
     if (saved := context.checkpoint) is not None:
-        with restoring():
+        with learner.restoring():
             state, sums = networks.restored("state", state, saved), networks.restored("sums", sums, saved)
             steps, updates, phase_updates, summed = map(int, saved["count"])
             episode_return, latest_return = map(float, saved["earned"])
             buffer.restore(*map(int, saved["replay"]))
-            observation = restore_environment(environment, saved)[0]
+            observation = learner.restore_environment(environment, saved)[0]
             if saved["phase"].size:
                 done, held_out, best, waited = saved["phase"]
                 phase = _phase(seed, steps, sources, state.policy, int(held_out))
@@ -162,7 +154,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
             "earned": np.array([episode_return, latest_return]),
             "replay": np.array([buffer.total, buffer.ends]),
             "phase": np.array((phase.updates, phase.held_out, *phase.patience) if phase else (), float),
-            **environment_arrays(environment),
+            **learner.environment_arrays(environment),
         }
         yield Slice(steps - (phase is not None), metrics, sac.exported(state), checkpoint)
 

@@ -13,18 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.agents import networks, normaliser
+from arc_suite.agents import learner, networks
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.hyperparameters import ProximalPolicy
-from arc_suite.agents.learner import (
-    Diverged,
-    RunContext,
-    Slice,
-    environment_arrays,
-    generator,
-    restore_environment,
-    restoring,
-)
+from arc_suite.agents.learner import Diverged, RunContext, Slice, generator
 from arc_suite.agents.normaliser import Moments
 from arc_suite.policies import network
 from arc_suite.policies.network import Layer
@@ -56,12 +48,12 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         environment.restore(environment.snapshot() | {"steps": ages})
 
     if (saved := context.checkpoint) is not None:
-        with restoring():
+        with learner.restoring():
             state = networks.restored("state", state, saved)
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
-            normalise = normaliser.restored(saved)
+            normalise = networks.restored_layer("normaliser", normalise, saved)
             iterations = int(saved["iterations"])
-            observation = restore_environment(environment, saved)
+            observation = learner.restore_environment(environment, saved)
 
     while True:
         # Schedules over the length of the run.
@@ -104,9 +96,9 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         checkpoint = {
             **networks.named("state", state),
             **networks.named("moments", moments),
-            **normaliser.stored(normalise),
+            **networks.named("normaliser", normalise.arrays),
             "iterations": np.array(iterations),
-            **environment_arrays(environment),
+            **learner.environment_arrays(environment),
         }
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, layers, checkpoint)
 

@@ -166,11 +166,11 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     A line that is still being written is left out.
 
     Raises:
-        ValueError: no such table, or a damaged one; one line.
+        ValueError: a damaged table; one line.
     """
     path = Path(path) / f"{name}.csv"
     try:
-        text = path.read_text()
+        text = path.read_text() if path.exists() else ""
         header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
         if not lines:
             return {}

@@ -1,7 +1,6 @@
 """Training: from a configuration to a folder with a policy, resumed bit-exactly after a kill at any moment."""
 
 import contextlib
-import functools
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -67,8 +66,9 @@ def train(
             checkpoint=run_files.arrays,
         )
         slices = stack.enter_context(contextlib.closing(module.learn(definition.hyperparameters, context)))
-        evaluator = stack.enter_context(contextlib.closing(_Evaluator(configuration, threads)))
-        clock, step = _Clock(state), state["evaluated"]
+        vector = setup.make_vec(evaluation.EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED)
+        environment = stack.enter_context(contextlib.closing(vector))
+        clocks, step = (time.monotonic(), time.process_time()), state["evaluated"]
         bar = progress(total=context.steps, initial=step, desc=Path(folder).name, unit="step", unit_scale=True)
         stack.enter_context(bar)
         while state["evaluated"] < context.steps:
@@ -87,10 +87,11 @@ def train(
                 on_metrics(found.step, found.metrics)
                 bar.set_postfix_str(_postfix(found.metrics, state), refresh=False)
             if is_evaluated:
-                state["return"] = evaluator(run_files, found)
+                state["return"] = _evaluate(configuration, environment, run_files, found)
                 state["evaluated"] = found.step
                 on_metrics(found.step, {"return": state["return"]})
-            clock.read(run_files, found.step, write=found.metrics is not None or is_evaluated)
+            is_written = found.metrics is not None or is_evaluated
+            clocks = _write_times(run_files, state, clocks, found.step, is_written)
             run_files.save(found.checkpoint, state)
     return True
 
@@ -112,47 +113,28 @@ def _postfix(metrics: Mapping[str, float], state: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} {value:.4g}" for name, value in shown.items())
 
 
-class _Clock:
-    """Adds up the seconds of all processes of a run."""
-
-    def __init__(self, state: dict[str, Any]):
-        self._state, self._latest = state, (time.monotonic(), time.process_time())
-
-    def read(self, run_files: RunFolder, step: int, write: bool) -> None:
-        now = time.monotonic(), time.process_time()
-        self._state["wall"] += now[0] - self._latest[0]
-        self._state["cpu"] += now[1] - self._latest[1]
-        self._latest = now
-        if write:
-            seconds = {f"{name}_seconds": round(self._state[name], 3) for name in ("wall", "cpu")}
-            run_files.append("times", {"step": step, **seconds})
+def _write_times(run_files: RunFolder, state: dict[str, Any], latest: tuple, step: int, write: bool) -> tuple:
+    """Add up the seconds of all processes of a run, write a line of them, and return the clocks."""
+    now = time.monotonic(), time.process_time()
+    for name, was, is_now in zip(("wall", "cpu"), latest, now, strict=True):
+        state[name] += is_now - was
+    if write:
+        run_files.append(
+            "times", {"step": step} | {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
+        )
+    return now
 
 
-class _Evaluator:
-    """Evaluates a policy by the protocol, and writes it and its returns into the folder."""
-
-    def __init__(self, configuration: Configuration, threads: int):
-        self._configuration, self._threads = configuration, threads
-
-    @functools.cached_property
-    def _environment(self) -> VectorEnv:
-        options = {"num_threads": self._threads, "autoreset_mode": AutoresetMode.DISABLED}
-        return self._configuration.setup.make_vec(evaluation.EPISODES, **options)
-
-    def __call__(self, run_files: RunFolder, found: Slice) -> float:
-        configuration = self._configuration
-        policy = Network(tuple(found.policy), configuration.setup, dict(self._environment.task.blocks))
-        network.save(run_files.path / network.FILE, policy)
-        kept = files.folder(run_files.path / checkpoints.FOLDER / str(found.step))
-        network.save(kept / network.FILE, policy)
-        episodes = evaluation.episodes_in_batch(self._environment, policy)
-        for seed, episode in enumerate(episodes):
-            numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
-            run_files.append("evaluations", {"step": found.step, **numbers})
-        mean = float(np.mean([episode.total for episode in episodes]))
-        checkpoints.save(kept, Agent(configuration.algorithm, found.step, configuration.seed, mean))
-        return mean
-
-    def close(self) -> None:
-        if "_environment" in vars(self):
-            self._environment.close()
+def _evaluate(configuration: Configuration, environment: VectorEnv, run_files: RunFolder, found: Slice) -> float:
+    """Evaluate a policy by the protocol, write it and its returns into the folder, and return their mean."""
+    policy = Network(tuple(found.policy), configuration.setup, dict(environment.task.blocks))
+    network.save(run_files.path / network.FILE, policy)
+    kept = files.folder(run_files.path / checkpoints.FOLDER / str(found.step))
+    network.save(kept / network.FILE, policy)
+    episodes = evaluation.episodes_in_batch(environment, policy)
+    for seed, episode in enumerate(episodes):
+        numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
+        run_files.append("evaluations", {"step": found.step, **numbers})
+    mean = float(np.mean([episode.total for episode in episodes]))
+    checkpoints.save(kept, Agent(configuration.algorithm, found.step, configuration.seed, mean))
+    return mean

@@ -11,7 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 _SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
 
 
-class Take:
+class Footage:
     """One robot in one episode under a policy, and a camera on it.
 
     Attributes:
@@ -75,20 +75,20 @@ class Take:
         self._environment.close()
 
 
-def cycle(take: Take, count: int) -> Iterator[np.ndarray]:
+def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:
     """Yield views of the next whole gait cycle, evenly spaced, captioned with the gait clock's phase.
 
     Args:
-        take: whose gait clock advanced in the latest step.
+        footage: whose gait clock advanced in the latest step.
         count: of views.
     """
-    while not take.ended and not (take.phase + 0.5 * take.advance) % 1.0 < take.advance:
-        take.step()
-    start = take.steps
+    while not footage.ended and not (footage.phase + 0.5 * footage.advance) % 1.0 < footage.advance:
+        footage.step()
+    start = footage.steps
     for i in range(count):
-        while not take.ended and take.steps < start + round(i / (count * take.advance)):
-            take.step()
-        yield captioned(take.view(), f"phase {take.phase:.2f}")
+        while not footage.ended and footage.steps < start + round(i / (count * footage.advance)):
+            footage.step()
+        yield captioned(footage.view(), f"phase {footage.phase:.2f}")
 
 
 def steps_per_frame(control_timestep: float) -> int:

@@ -75,16 +75,16 @@ def main() -> None:
             write_page(temporary, environments, policies, steps)
         else:
             size = (FLAGS.width or _SIZES[extension][0], FLAGS.height or _SIZES[extension][1])
-            takes = []
+            footages = []
             for name, walker in policies.items():
-                takes.append(films.Take(name, environments[name], alone(walker, FLAGS.seed), camera, size))
-                stack.callback(takes[-1].close)
-            takes[0].view()  # finds out at once whether there is OpenGL
-            stride = films.steps_per_frame(takes[0].control_timestep)
-            frames = still(takes, steps) if extension == ".png" else film(takes, steps, stride)
-            films.WRITERS[extension](temporary, frames, stride * takes[0].control_timestep)
-            for take in takes:
-                print(f"{take.robot}: return {take.earned:.1f} in {take.steps} steps")
+                footages.append(films.Footage(name, environments[name], alone(walker, FLAGS.seed), camera, size))
+                stack.callback(footages[-1].close)
+            footages[0].view()  # finds out at once whether there is OpenGL
+            stride = films.steps_per_frame(footages[0].control_timestep)
+            frames = still(footages, steps) if extension == ".png" else film(footages, steps, stride)
+            films.WRITERS[extension](temporary, frames, stride * footages[0].control_timestep)
+            for footage in footages:
+                print(f"{footage.robot}: return {footage.earned:.1f} in {footage.steps} steps")
     print(f"wrote {FLAGS.output}")
 
 
@@ -101,31 +101,31 @@ def write_page(path: Path, environments: Mapping, policies: Mapping[str, Policy]
         print(f"{name}: return {track.rewards.sum():.1f} in {len(track.times)} steps")
 
 
-def still(takes: list[films.Take], steps: int) -> Iterator[np.ndarray]:
+def still(footages: list[films.Footage], steps: int) -> Iterator[np.ndarray]:
     """Yield one picture after so many steps: a gait cycle of a lone demonstrator, else a moment."""
     for _ in progress(range(steps), "walking", leave=False):
-        for take in takes:
-            take.step()
-    if len(takes) == 1 and FLAGS.policy == "cpg" and takes[0].advance:
-        views = progress(films.cycle(takes[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
+        for footage in footages:
+            footage.step()
+    if len(footages) == 1 and FLAGS.policy == "cpg" and footages[0].advance:
+        views = progress(films.cycle(footages[0], _CYCLE_VIEWS), "rendering", _CYCLE_VIEWS, leave=False)
         yield films.grid(list(views), _CYCLE_COLUMNS)
     else:
-        yield panel(takes)
+        yield panel(footages)
 
 
-def film(takes: list[films.Take], steps: int, stride: int) -> Iterator[np.ndarray]:
+def film(footages: list[films.Footage], steps: int, stride: int) -> Iterator[np.ndarray]:
     """Yield a frame for every `stride` control steps, until all episodes have ended."""
     for start in progress(range(0, steps, stride), "rendering", leave=False):
-        for take in takes:
+        for footage in footages:
             for _ in range(min(stride, steps - start)):
-                take.step()
-        yield panel(takes)
-        if all(take.ended for take in takes):
+                footage.step()
+        yield panel(footages)
+        if all(footage.ended for footage in footages):
             return
 
 
-def panel(takes: list[films.Take]) -> np.ndarray:
+def panel(footages: list[films.Footage]) -> np.ndarray:
     """Return what all cameras see, two side by side, with names where there are several."""
-    if len(takes) == 1:
-        return takes[0].view()
-    return films.grid([films.captioned(take.view(), take.robot.capitalize()) for take in takes], 2)
+    if len(footages) == 1:
+        return footages[0].view()
+    return films.grid([films.captioned(footage.view(), footage.robot.capitalize()) for footage in footages], 2)

@@ -89,11 +89,11 @@ class Balanced(Commanded):
         self._damping = _DAMPING * self.pose.height
         self.angles = self.legs.at_ease(self.places, np.eye(3), self._damping)
 
-    def initial_plan(self, count: int) -> np.ndarray:
+    def initial_paths(self, count: int) -> np.ndarray:
         """Return the angles (environments, legs, links) at ease, rad."""
         return np.tile(self.angles, (count, 1, 1))
 
-    def planned(self, plan, request: Request, observation: Mapping) -> tuple:
+    def planned(self, paths, request: Request, observation: Mapping) -> tuple:
         """Return the next angles, target angles (environments, joints), rad, and their change; see `Commanded`."""
         numpy, p = request.motion.__array_namespace__(), self.parameters
         motion = request.motion.clip(-p.most, p.most) * self.units
@@ -104,8 +104,8 @@ class Balanced(Commanded):
         cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0  # in the next control step
         feet = self.next_feet(cycle, motion, shift, request.size, vertical)
         aims = weights(flows(motion, self.places), _ACROSS)
-        angles = self.legs.reached(plan, feet, aims, self._damping, _STEPS)
-        targets = self.legs.by_joint(plan)
+        angles = self.legs.reached(paths, feet, aims, self._damping, _STEPS)
+        targets = self.legs.by_joint(paths)
         return angles, targets, self.legs.by_joint(angles) - targets
 
     def next_feet(self, cycle, motion, shift, size, vertical):

@@ -26,7 +26,7 @@ class State(NamedTuple):
         motion: (environments, 3) requested of the feet, in the same units; held while the command rests.
         size: (environments, 1) of the gait, from 0 to 1.
         phase: (environments,) of the gait in the next control step, cycles; held while the command rests.
-        plan: a law's own, an array or a NamedTuple of arrays.
+        paths: a law's own, an array or a NamedTuple of arrays.
     """
 
     command: np.ndarray
@@ -34,7 +34,7 @@ class State(NamedTuple):
     motion: np.ndarray
     size: np.ndarray
     phase: np.ndarray
-    plan: Any
+    paths: Any
 
 
 class Request(NamedTuple):
@@ -93,7 +93,7 @@ class Commanded(ABC):
     def initial(self, count: int) -> State:
         """Return the state at the start of episodes in a number of environments."""
         zeros = np.zeros((count, 3))
-        return State(zeros, zeros, zeros, zeros[:, :1], zeros[:, 0], self.initial_plan(count))
+        return State(zeros, zeros, zeros, zeros[:, :1], zeros[:, 0], self.initial_paths(count))
 
     def __call__(self, state: State, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
@@ -104,8 +104,8 @@ class Commanded(ABC):
     def targets(self, state: State, observation: Mapping) -> tuple:
         """Return the next state, and the joints' target angles, rad, and velocities, rad/s, (environments, joints)."""
         state, request = self._requested(state, observation["command"], observation["gait_clock"])
-        plan, targets, change = self.planned(state.plan, request, observation)
-        return state._replace(plan=plan), targets, change / self.step
+        paths, targets, change = self.planned(state.paths, request, observation)
+        return state._replace(paths=paths), targets, change / self.step
 
     def _requested(self, state: State, command, clock) -> tuple[State, Request]:
         """The next state, and what feet are to do, by proportional and integral feedback on the command."""
@@ -120,13 +120,13 @@ class Commanded(ABC):
         advance = self.cycles * going[:, 0]
         requested = smooth + integral + np.array(self.parameters.gain) * (smooth - motion)
         requested = numpy.where(going, requested, state.motion)
-        state = State(smooth, integral, requested, size, phase + advance, state.plan)
+        state = State(smooth, integral, requested, size, phase + advance, state.paths)
         return state, Request(requested, size, phase, advance)
 
     @abstractmethod
-    def initial_plan(self, count: int) -> Any:
+    def initial_paths(self, count: int) -> Any:
         """Return the law's own state at the start of episodes in a number of environments."""
 
     @abstractmethod
-    def planned(self, plan, request: Request, observation: Mapping) -> tuple:
+    def planned(self, paths, request: Request, observation: Mapping) -> tuple:
         """Return the law's own next state, target angles (environments, joints), rad, and their change in a step."""

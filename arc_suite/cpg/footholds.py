@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.tasks.sensors import AHEAD, ASIDE
+from arc_suite.tasks.sensors import FORWARD, LEFT
 
 # By how much feet may land further ahead, in standing heights. Those ahead count half as much again as those behind,
 # since a foot that has far to go comes late.
@@ -40,8 +40,8 @@ class View(NamedTuple):
         environments, found = np.arange(len(x)).reshape(-1, *axes), numpy.full_like(x, -np.inf)
         for heights, moved in zip(self.heights.swapaxes(0, 1), self.moved.swapaxes(0, 1), strict=True):
             ahead, aside = (moved[:, i].reshape(-1, *axes) for i in (0, 1))
-            column, row = _index((x + ahead) / self.reach, AHEAD), numpy.rint(_index((y + aside) / self.reach, ASIDE))
-            points = ((end * len(ASIDE) + row).astype(int) for end in (numpy.floor(column), numpy.ceil(column)))
+            column, row = _index((x + ahead) / self.reach, FORWARD), numpy.rint(_index((y + aside) / self.reach, LEFT))
+            points = ((end * len(LEFT) + row).astype(int) for end in (numpy.floor(column), numpy.ceil(column)))
             found = numpy.maximum(found, numpy.minimum(*(heights[environments, point] for point in points)))
         return found
 

@@ -35,7 +35,7 @@ class PlanningParameters(NamedTuple):
         least: that the torso keeps from pillars, as a share of the extent of the feet.
         nearness: cost of a unit of missing room, in units of path.
         aim: how far along the path the point is that is steered for, R.
-        ahead: largest command forward, in target velocities.
+        forward: largest command forward, in target velocities.
         back: largest command backwards.
         aside: largest command sideways.
     """
@@ -45,7 +45,7 @@ class PlanningParameters(NamedTuple):
     least: float = 0.8
     nearness: float = 6.0
     aim: float = 0.6
-    ahead: float = 1.2
+    forward: float = 1.2
     back: float = 0.6
     aside: float = 0.7
 
@@ -76,7 +76,7 @@ class Planned:
 
 def toward(bearing: float, parameters: PlanningParameters) -> tuple[float, float, float]:
     """Return the command that leads to a bearing, rad: a turn to it, and a walk there meanwhile."""
-    forward = max(parameters.ahead * math.cos(bearing), -parameters.back)
+    forward = max(parameters.forward * math.cos(bearing), -parameters.back)
     return forward, parameters.aside * math.sin(bearing), min(max(bearing, -1.0), 1.0)
 
 

@@ -54,7 +54,7 @@ _DAMPING = 0.02  # of inverse kinematics, in standing heights
 _STEPS = 2  # of it in a control step
 
 
-class Plan(NamedTuple):
+class Paths(NamedTuple):
     """The law's own state.
 
     Attributes:
@@ -91,40 +91,40 @@ class Sighted(Commanded):
         angles = self.legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), _DAMPING * ride)
         self.places = self.legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
-        self._first = Plan(self.places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
+        self._first = Paths(self.places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
 
-    def initial_plan(self, count: int) -> Plan:
+    def initial_paths(self, count: int) -> Paths:
         """Return feet at ease, and nothing seen."""
-        return Plan(*(np.tile(first, (count, *[1] * first.ndim)) for first in self._first))
+        return Paths(*(np.tile(first, (count, *[1] * first.ndim)) for first in self._first))
 
-    def planned(self, plan: Plan, request: Request, observation: Mapping) -> tuple:
-        """Return the next plan, target angles (environments, joints), rad, and their change; see `Commanded`."""
+    def planned(self, paths: Paths, request: Request, observation: Mapping) -> tuple:
+        """Return the next paths of the feet, target angles (environments, joints), rad, and their change."""
         p, height = self.parameters, self.pose.height
-        plan = self._looked(plan, observation["scan"], observation["velocities"][:, :2])
+        paths = self._looked(paths, observation["scan"], observation["velocities"][:, :2])
         motion = request.size * request.motion.clip(-p.most, p.most) * self.units
         cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0  # in the next control step
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
-        feet, shifts = self._next_feet(plan, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
+        feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
         aims = weights(flows(motion, feet), _ACROSS)
-        angles = self.legs.reached(plan.angles, feet, aims, _DAMPING * height, _STEPS)
-        targets = self.legs.by_joint(plan.angles)
+        angles = self.legs.reached(paths.angles, feet, aims, _DAMPING * height, _STEPS)
+        targets = self.legs.by_joint(paths.angles)
         change = self.legs.by_joint(angles) - targets
-        return plan._replace(feet=feet, angles=angles, shifts=shifts), targets, change
+        return paths._replace(feet=feet, angles=angles, shifts=shifts), targets, change
 
-    def _looked(self, plan: Plan, scan, velocity) -> Plan:
-        """The plan with a scan (environments, points) more, the torso moving at a velocity (environments, 2), m/s."""
+    def _looked(self, paths: Paths, scan, velocity) -> Paths:
+        """The paths with one more scan (environments, points), given the torso's velocity (environments, 2), m/s."""
         numpy = scan.__array_namespace__()
-        moved = plan.moved[:, :-1] + velocity[:, None] * self.step
-        return plan._replace(
-            heights=numpy.concatenate([scan[:, None], plan.heights[:, :-1]], axis=1),
+        moved = paths.moved[:, :-1] + velocity[:, None] * self.step
+        return paths._replace(
+            heights=numpy.concatenate([scan[:, None], paths.heights[:, :-1]], axis=1),
             moved=numpy.concatenate([numpy.zeros_like(moved[:, :1]), moved], axis=1),
         )
 
-    def _next_feet(self, plan: Plan, cycle, motion, predicted, size, quaternion) -> tuple:
+    def _next_feet(self, paths: Paths, cycle, motion, predicted, size, quaternion) -> tuple:
         """Places (environments, legs, 3) of the soles in the next control step, m, and shifts of where they land.
 
         Args:
-            plan: with the latest scan.
+            paths: with the latest scan.
             cycle: (environments, legs) phases of the legs then.
             motion: (environments, 3) requested velocity, m/s and rad/s.
             predicted: (environments, 3) velocity until feet land.
@@ -132,12 +132,12 @@ class Sighted(Commanded):
             quaternion: (environments, 4) of the torso.
         """
         numpy, duty = cycle.__array_namespace__(), self.duty_factor
-        feet, stands = plan.feet, cycle < duty
+        feet, stands = paths.feet, cycle < duty
         left = numpy.where(stands, 0.0, (1.0 - cycle) / self.cycles)  # control steps from then to landing
         early = numpy.minimum(left, _EARLY)
         drift = flows(predicted, self.places) * self.step  # of the torso over the ground, a control step
         held = stands | (left + 1.0 < _HELD / self.cycles)
-        goal, shifts = self._landing(plan, motion, drift * (left + 1.0)[..., None], held)
+        goal, shifts = self._landing(paths, motion, drift * (left + 1.0)[..., None], held)
         goal = goal + drift * early[..., None]
         swung = feet[..., :2] + (goal - feet[..., :2]) / (numpy.floor(left - early) + 1.0)[..., None]
         stood = (cycle / self.cycles).clip(max=1.0)[..., None]  # control steps, at most the latest
@@ -149,11 +149,11 @@ class Sighted(Commanded):
         ground = numpy.where(stands[..., None], stood, swung)
         return numpy.concatenate([ground, heights[..., None]], axis=-1), shifts
 
-    def _landing(self, plan: Plan, motion, moved, held) -> tuple:
+    def _landing(self, paths: Paths, motion, moved, held) -> tuple:
         """Where feet land (environments, legs, 2), m from where the torso is then, and shifts (environments, legs).
 
         Args:
-            plan: with the latest scan.
+            paths: with the latest scan.
             motion: (environments, 3) requested velocity, m/s and rad/s.
             moved: (environments, legs, 2) displacement of the torso until then, at the feet, m.
             held: (environments, legs) whether the last choice stays.
@@ -161,7 +161,7 @@ class Sighted(Commanded):
         numpy = motion.__array_namespace__()
         half = 0.5 * self.stance * flows(motion, self.places)
         along = half / numpy.maximum(numpy.hypot(half[..., 0], half[..., 1]), 1e-9)[..., None]
-        landing, view = self.places[:, :2] + half, footholds.View(plan.heights, plan.moved, self._reach)
+        landing, view = self.places[:, :2] + half, footholds.View(paths.heights, paths.moved, self._reach)
         found = footholds.shifts(view, landing + moved, along, self.places[:, :2], self.pose.height)
-        shifts = numpy.where(held, plan.shifts, found)
+        shifts = numpy.where(held, paths.shifts, found)
         return landing + shifts[..., None] * along, shifts

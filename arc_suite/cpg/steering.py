@@ -86,11 +86,11 @@ class Steered(Commanded):
         self.feet = (self.pose.soles - self.pose.centre)[:, :2]
         self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
 
-    def initial_plan(self, count: int) -> tuple:
+    def initial_paths(self, count: int) -> tuple:
         """Return nothing: the law remembers no more than `State` does."""
         return ()
 
-    def planned(self, plan: tuple, request: Request, observation: Mapping) -> tuple:
+    def planned(self, paths: tuple, request: Request, observation: Mapping) -> tuple:
         """Return the target angles (environments, joints), rad, and their change in a step; see `Commanded`."""
         numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
         paths = 0.5 * self.stance * flows(request.motion * self.units, self.feet)
@@ -106,7 +106,7 @@ class Steered(Commanded):
                 cycle = (phase + self.offsets[index]) % 1.0
                 targets.append(raised + _swung(cycle[:, None], self.duty_factor, sweep, leg.lift))
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
-        return plan, self.neutral + now, later - now
+        return paths, self.neutral + now, later - now
 
     def _legs(self):
         low, high = _ranges(self.body) - self.neutral

@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 
 from arc_suite import evaluation, files, policies, style
 from arc_suite.agents import run_folder
+from arc_suite.agents.run_folder import table
 from arc_suite.cpg import suited_preset
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.dm import Environment
@@ -17,7 +18,6 @@ from arc_suite.envs.setup import Setup
 from arc_suite.policies import Policy, checkpoints, network
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.studies import results
-from arc_suite.studies.results import table
 from arc_suite.studies.tables import Run
 from arc_suite.style import strips
 

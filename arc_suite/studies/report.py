@@ -33,14 +33,14 @@ _Of = Callable[[str, str], float | None]  # robot and algorithm -> a figure; Non
 
 
 class Claim(NamedTuple):
-    """A sentence of the paper, and what it says of each robot.
+    """A claim of the paper.
 
     Attributes:
         text: in short.
-        compared: of a robot and the figures of algorithms, what must be above zero for the sentence to hold; None
-            where a figure is missing.
-        figure: of a result; what is compared.
-        in_paper: whether the paper's table of final returns can be asked too.
+        compared: of a robot and the metrics of algorithms, the margin, which is above zero if the claim holds; None
+            if a metric is missing.
+        figure: the metric of a result.
+        in_paper: whether the paper's final returns decide the claim, too.
     """
 
     text: str
@@ -117,11 +117,11 @@ CLAIMS = (
 
 
 def write(name: str, study: Study, published: Path) -> Path:
-    """Write the report of a study beside its tables, and the leaderboard of all studies one folder above.
+    """Write the report of a study into the folder of its tables, and the leaderboard one folder above.
 
     Args:
         name: of the study.
-        study: its rows.
+        study: its title and runs.
         published: folder of its tables.
 
     Returns:
@@ -129,7 +129,7 @@ def write(name: str, study: Study, published: Path) -> Path:
 
     Raises:
         ValueError: nothing is published, or a table is damaged; one line.
-        OSError: something cannot be written; one line.
+        OSError: a file cannot be written; one line.
     """
     found = results.results(study.runs, published)
     if not found:
@@ -143,7 +143,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
         "Style": [_STYLE, _style(groups), *_strips(name, groups, published)],
-        "What the paper says": [_CLAIMS, _claims(found)],
+        "Claims of the paper": [_CLAIMS, _claims(found)],
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
@@ -157,25 +157,25 @@ def write(name: str, study: Study, published: Path) -> Path:
 
 _FINALS = (
     "Mean of the latest evaluation, ten seeded episodes, and standard deviation over seeds, or of a single seed over "
-    "its episodes; interquartile mean with 95 % bootstrap interval over the same. Beside it the paper's, after "
-    "1,000,000 steps, read off its curves within about 30, and its demonstrator; then our demonstrators."
+    "its episodes; interquartile mean with 95 % bootstrap interval over the same. The last column is the paper's, "
+    "after 1,000,000 steps, read off its curves within about 30. Then come the demonstrators."
 )
 _EFFICIENCY = (
-    "Environment steps and minutes of one core until an evaluation earns what the paper's demonstrator "
-    "earns, and 3,500; a dash where it has not. Area is the mean return over all evaluations so far."
+    "Environment steps and minutes of one core until an evaluation has the return of the paper's demonstrator, and "
+    "3,500; a dash if it has not. Area is the mean return over all evaluations so far."
 )
 _IMPROVEMENT = (
-    "That a run of the row earns more than one of the column, with 95 % bootstrap interval, over all robots and tasks, "
-    "at the latest step that both have reached. With one seed, episodes stand for runs: the interval then tells "
-    "nothing of other seeds."
+    "Probability that an algorithm has a higher return than that of the column, with 95 % bootstrap interval, over "
+    "all robots and tasks, at the latest step that both have reached. With one seed, episodes stand for runs: the "
+    "interval then says nothing about other seeds."
 )
 _PHASES = (
-    "Updates of critics alone in a stabilisation phase, of runs whose phases have been published: those of `speq` and "
-    "`speq_o2o` are as long as they may be, the others stop early."
+    "Updates of the critics alone in a stabilisation phase, for runs with published phases: those of `speq` and "
+    "`speq_o2o` have the full length, the others may end early."
 )
 _STYLE = (
-    "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` tells each. "
-    "Heading and drift are told from the x axis, which is not the way where a command turns."
+    "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` explains each. "
+    "Heading and drift are relative to the x axis, which is not the direction of a command that turns."
 )
 _STRIPS = (
     "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle, to the nearest control "
@@ -183,13 +183,13 @@ _STRIPS = (
     "tasks with a command it looks straight ahead. The command line makes a page that plays the policy."
 )
 _CLAIMS = (
-    "How far each sentence is from being false, in its own unit: above zero it holds. The paper's figure is from its "
-    "final returns after 1,000,000 steps, where those tell. Ours are of finished runs alone, at the steps they have."
+    "Margin of each claim, in its own unit: it holds above zero. The paper's margin is from its final returns after "
+    "1,000,000 steps, if they decide the claim. Ours are from finished runs alone, at their steps."
 )
 _LEADERBOARD = (
-    "Of all studies whose tables lie here, written by `arc-suite study NAME --report`. Return: mean of the latest "
-    "evaluation, and interquartile mean with 95 % bootstrap interval over seeds, or of a single seed over episodes. "
-    "Then the task's own figure, speed in m/s; headings are told from the x axis, which is not the way of a command."
+    "All committed studies, written by `arc-suite study NAME --report`. Return: mean of the latest evaluation, and "
+    "interquartile mean with 95 % bootstrap interval over seeds, or of a single seed over episodes. Then the task's "
+    "own metric, speed in m/s; headings are relative to the x axis, which is not the direction of a command."
 )
 
 
@@ -337,7 +337,7 @@ def _claims(found: Sequence[Result]) -> str:
         paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
         ours = {robot: claim.compared(robot, measured) for robot in PAPER}
         lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
-    return _table(("sentence", "paper's figure", "holds there", "ours", "holds here"), lines)
+    return _table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
 
 
 def _robot_and_algorithm(result: Result) -> tuple[str, str]:
@@ -396,6 +396,6 @@ def _leaderboard(folder: Path) -> str:
         result = f"{np.mean([each.final for each in seeds]):.1f}"
         link = f"[{name}]({name}/{REPORT})"
         cells.append((run.place, run.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
-    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "figure", "gait compliance")
+    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "metric", "gait compliance")
     heads += ("heading error, rad", "torso pitch, rad")
     return _table((*heads, "steps", "CPU min", "study", "command of seed 0"), cells)

@@ -51,15 +51,6 @@ def results(runs: Sequence[Run], published: Path) -> list[Result]:
     return [_result(run, published / run.name) for run in runs if (published / run.name / "style.csv").exists()]
 
 
-def table(folder: Path, name: str) -> dict[str, np.ndarray]:
-    """Return a table of a run, as `run_folder.table` does; empty before its first line.
-
-    Raises:
-        ValueError: a damaged table; one line.
-    """
-    return run_folder.table(folder, name) if (folder / f"{name}.csv").exists() else {}
-
-
 def evaluated(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return the steps (evaluations,) of the complete evaluations in a table."""
     marks, counts = np.unique(evaluations.get("step", ()), return_counts=True)
@@ -76,7 +67,7 @@ def _result(run: Run, folder: Path) -> Result:
     }
     cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
     metrics = {name: style[name] for name in style if name not in ("step", "seed")}
-    phases = table(folder, "phases").get("updates", np.empty(0))
+    phases = run_folder.table(folder, "phases").get("updates", np.empty(0))
     return Result(run, whole.astype(int), returns, progress, cpu, metrics, phases)
 
 

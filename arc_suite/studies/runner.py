@@ -1,6 +1,5 @@
 """Makes the runs of a study on this machine, a process for each, and shows a table of them meanwhile."""
 
-import math
 import shutil
 import subprocess
 import sys
@@ -16,7 +15,6 @@ from arc_suite import data, files
 from arc_suite.agents import run_folder
 from arc_suite.agents.configuration import PRIOR_SHA256
 from arc_suite.studies import publication
-from arc_suite.studies.results import table
 from arc_suite.studies.tables import Run
 
 _PAUSE = 0.2  # s between two looks at the processes
@@ -32,8 +30,7 @@ class State(NamedTuple):
         word: one of `_WORDS`; `elsewhere` is in another process.
         step: environment steps so far.
         result: mean return of the latest evaluation; None before the first.
-        wall: s of wall clock so far.
-        cpu: s of the processor so far.
+        wall, cpu: s so far, of wall clock and of the processor.
     """
 
     run: Run
@@ -62,7 +59,7 @@ def make(
     """
     words = prepare(runs, folder, jobs, progress)
     running: dict[str, tuple[Run, subprocess.Popen, IO]] = {}
-    known, latest = {}, -math.inf
+    known, latest = {}, 0.0
     try:
         while not {"waiting", "elsewhere", "running"}.isdisjoint(words.values()):
             for run in runs:
@@ -82,10 +79,9 @@ def make(
                 show(list(known.values()))
             time.sleep(_PAUSE)
     finally:
-        for _, process, _ in running.values():
-            process.terminate()
-        for _, process, _ in running.values():
-            process.wait()
+        for end in (subprocess.Popen.terminate, subprocess.Popen.wait):
+            for _, process, _ in running.values():
+                end(process)
     publication.publish_all(runs, folder, published)  # also runs that were finished before, or elsewhere
     return list(states(runs, folder, words).values())
 
@@ -94,8 +90,7 @@ def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable 
     """Collect the prior data of the runs that are not finished, and return words of all runs by name.
 
     Raises:
-        ValueError: the folder of another run, or prior data that do not fit; one line.
-        OSError: a file cannot be written; one line.
+        ValueError, OSError: the folder of another run, prior data that do not fit, a full disk; one line.
     """
     files.folder(folder)
     words = {run.name: "finished" if is_finished(run, folder / run.name) else "waiting" for run in runs}
@@ -144,7 +139,7 @@ def states(
     for run in runs:
         state, word = known.get(run.name), words[run.name]
         if state is None or state.word != word or word in ("running", "elsewhere"):
-            times, evaluations = (table(folder / run.name, name) for name in ("times", "evaluations"))
+            times, evaluations = (run_folder.table(folder / run.name, name) for name in ("times", "evaluations"))
             step, wall, cpu = (times[name][-1] if times else 0.0 for name in ("step", "wall_seconds", "cpu_seconds"))
             result = float(run_folder.latest_returns(evaluations).mean()) if evaluations else None
             state = State(run, word, int(step), result, float(wall), float(cpu))

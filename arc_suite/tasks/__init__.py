@@ -1,7 +1,7 @@
 """What bodies are to do: name -> task."""
 
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.following import Course, Gaps, Limp, Navigate, Roam, Rough, Shoved, Slopes, Stairs, Steer
+from arc_suite.tasks.suite import Course, Gaps, Limp, Navigate, Roam, Rough, Shoved, Slopes, Stairs, Steer
 from arc_suite.tasks.walk import Walk
 
 TASKS = {task.name: task for task in (Walk, Steer, Rough, Slopes, Stairs, Gaps, Course, Shoved, Limp, Roam, Navigate)}

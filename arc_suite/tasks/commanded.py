@@ -73,8 +73,8 @@ class Core(NamedTuple):
         tick: (...) of the gait's clock, which rests while the command says stop.
         action: (..., joints) of the latest step, clipped to [-1, 1].
         previous_action: (..., joints) of the step before; 0 before the first.
-        wrong_feet: (...) number of contact schedule errors in the latest step.
-        wrong_in_all: (...) sum of `wrong_feet` over the steps.
+        schedule_errors: (...) number of contact schedule errors in the latest step.
+        all_schedule_errors: (...) sum of `schedule_errors` over the steps.
         place: (..., 3) of the torso's frame at the latest reading: x and y, m, and yaw, rad.
         motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
         desired: (..., 3) velocity that the command asks for.
@@ -86,8 +86,8 @@ class Core(NamedTuple):
     tick: int | np.ndarray
     action: np.ndarray
     previous_action: np.ndarray
-    wrong_feet: np.ndarray
-    wrong_in_all: np.ndarray
+    schedule_errors: np.ndarray
+    all_schedule_errors: np.ndarray
     place: np.ndarray
     motion: np.ndarray
     desired: np.ndarray
@@ -230,7 +230,7 @@ class CommandTask(Task):
         going = core.desired.any(axis=-1)
         tick = core.tick + going
         stance = self.clock.at(self.clock.stance, tick) | ~going[..., None]  # all feet, while the command says stop
-        wrong_feet = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
+        schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
         health = self.health.after(context, readings)
         motion = self._motion(core, place)
         followed = self.command.follow(context, memory.command, steps, core.place, place, motion)
@@ -240,8 +240,8 @@ class CommandTask(Task):
             tick=tick,
             action=core.action,
             previous_action=core.previous_action,
-            wrong_feet=wrong_feet,
-            wrong_in_all=core.wrong_in_all + wrong_feet,
+            schedule_errors=schedule_errors,
+            all_schedule_errors=core.all_schedule_errors + schedule_errors,
             place=place,
             motion=motion,
             desired=followed.desired,
@@ -269,14 +269,14 @@ class CommandTask(Task):
         """Return the paper's costs without scale, and bonuses for following the command in the prescribed gait."""
         core, height, feet = memory.core, self.context.height, len(self.parameters.phase_offsets)
         costs = terms.costs(
-            readings, core.action, core.previous_action, core.wrong_feet, self.parameters.default_angles
+            readings, core.action, core.previous_action, core.schedule_errors, self.parameters.default_angles
         )
         found = {
             **costs,
             "angular_velocity": costs["angular_velocity"] * (height / GRAVITY),
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
             "tracking": core.followed,
-            "obedient_gait": core.followed * (1.0 - core.wrong_feet / feet),
+            "obedient_gait": core.followed * (1.0 - core.schedule_errors / feet),
             **self.health.terms(memory.health),
             **self.command.terms(memory.command, memory.health.upright),
         }
@@ -312,7 +312,7 @@ class CommandTask(Task):
             **self.command.progress(self.context, memory.command, self.judged(memory)),
             "tracking": core.tracking / steps,
             **self.health.progress(memory.health),
-            "gait_compliance": clock.compliance(core.wrong_in_all, steps, len(self.parameters.phase_offsets)),
+            "gait_compliance": clock.compliance(core.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
             **self.settings.ground.progress(memory.ground),
         }
 

@@ -21,7 +21,7 @@ from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Readings
-from arc_suite.tasks.sensors import AHEAD, ASIDE, RAYS, SCAN, SIGHT
+from arc_suite.tasks.sensors import FORWARD, LEFT, RAYS, SCAN, SIGHT
 
 LEVELS = 10  # of a curriculum, with difficulties from 0 to 1
 STAYS = 0.75  # probability of the highest level after itself; else any
@@ -210,7 +210,7 @@ class Lanes(Ground):
     @property
     def mirrors(self) -> Mapping[str, Mirror]:
         """The left-right map of the scan, as on mirrored ground."""
-        places = np.arange(SCAN.shape[1]).reshape(len(AHEAD), len(ASIDE))[:, ::-1].ravel()
+        places = np.arange(SCAN.shape[1]).reshape(len(FORWARD), len(LEFT))[:, ::-1].ravel()
         return {"scan": Mirror(places, np.ones(len(places), np.int8))}
 
     def first(self) -> Stream:

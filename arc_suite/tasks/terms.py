@@ -8,20 +8,20 @@ from collections.abc import Mapping
 from arc_suite.tasks.readings import Readings, component
 
 
-def costs(readings: Readings, action, previous_action, wrong_feet, default_angles) -> dict:
+def costs(readings: Readings, action, previous_action, schedule_errors, default_angles) -> dict:
     """Return the paper's seven costs by name (Section 4), each (...) and at least 0.
 
     Args:
         readings: after the control step.
         action: (..., joints) of the step.
         previous_action: (..., joints) of the step before.
-        wrong_feet: (...) number of contact schedule errors.
+        schedule_errors: (...) number of contact schedule errors.
         default_angles: (joints,) rad, from which the posture is measured.
     """
     # Products, since numpy's `x**2` rounds otherwise for scalars.
     vertical, roll, pitch = (component(readings.velocities, i) for i in (2, 3, 4))
     return {
-        "gait_cost": wrong_feet,
+        "gait_cost": schedule_errors,
         "control": (action**2).sum(axis=-1),
         "smoothness": ((action - previous_action) ** 2).sum(axis=-1),
         "contact": (readings.contact_forces**2).sum(axis=-1),

@@ -48,9 +48,9 @@ class Memory(NamedTuple):
         previous_action: (..., joints) of the step before; 0 before the first.
         x: (...) of the torso's frame in the world at the latest reading, m.
         forward_velocity: (...) mean of the torso's world x velocity over the latest step, m/s.
-        wrong_feet: (...) number of contact schedule errors in the latest step.
+        schedule_errors: (...) number of contact schedule errors in the latest step.
         distance: (...) along world x since the start, m.
-        wrong_in_all: (...) sum of `wrong_feet` over the steps.
+        all_schedule_errors: (...) sum of `schedule_errors` over the steps.
         healthy: (...) whether the torso is in its healthy range of heights.
     """
 
@@ -59,9 +59,9 @@ class Memory(NamedTuple):
     previous_action: np.ndarray
     x: np.ndarray
     forward_velocity: np.ndarray
-    wrong_feet: np.ndarray
+    schedule_errors: np.ndarray
     distance: np.ndarray
-    wrong_in_all: np.ndarray
+    all_schedule_errors: np.ndarray
     healthy: np.ndarray
 
 
@@ -131,7 +131,7 @@ class Walk(Task):
     def after(self, memory: Memory, readings: Readings) -> Memory:
         """Advance the clock, and measure the step's displacement and contact schedule errors."""
         tick, x = memory.tick + 1, component(readings.frame_position, 0) + 0.0
-        wrong_feet = clock.schedule_errors(
+        schedule_errors = clock.schedule_errors(
             readings.foot_heights, self.parameters.stance_threshold, self.clock.at(self.clock.stance, tick)
         )
         displacement = x - memory.x
@@ -140,9 +140,9 @@ class Walk(Task):
             tick=tick,
             x=x,
             forward_velocity=displacement / self.scene.control_timestep,
-            wrong_feet=wrong_feet,
+            schedule_errors=schedule_errors,
             distance=memory.distance + displacement,
-            wrong_in_all=memory.wrong_in_all + wrong_feet,
+            all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
         )
 
@@ -152,8 +152,8 @@ class Walk(Task):
         return {
             "forward": terms.triangle(memory.forward_velocity - p.target_velocity, band),
             "healthy": memory.healthy.astype(float),
-            "gait_bonus": 1.0 - memory.wrong_feet / len(p.phase_offsets),
-            **terms.costs(readings, memory.action, memory.previous_action, memory.wrong_feet, p.default_angles),
+            "gait_bonus": 1.0 - memory.schedule_errors / len(p.phase_offsets),
+            **terms.costs(readings, memory.action, memory.previous_action, memory.schedule_errors, p.default_angles),
         }
 
     def observe(self, memory: Memory, readings: Readings) -> dict:
@@ -174,7 +174,7 @@ class Walk(Task):
         steps = memory.tick + (memory.tick == 0)
         return {
             "speed": memory.distance / (steps * self.scene.control_timestep),
-            "gait_compliance": clock.compliance(memory.wrong_in_all, steps, len(self.parameters.phase_offsets)),
+            "gait_compliance": clock.compliance(memory.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
         }
 
 

@@ -1,11 +1,6 @@
 """Training: a tiny run of every algorithm, interrupted anywhere and resumed bit-exactly, and errors of one line."""
 
 import json
-import os
-import pathlib
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -104,54 +99,6 @@ def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     resumed = contents(tmp_path / "broken")
     assert resumed.keys() == whole.keys()
     assert [key for key in whole if whole[key] != resumed[key]] == []
-
-
-PROGRAM = """
-import sys
-sys.path[:0] = sys.argv[2:]
-from conftest import SHORT, small
-from test_training import EVERY, STEPS, silent
-from arc_suite.agents.configuration import Configuration
-from arc_suite.agents.training import train
-from arc_suite.envs.setup import Setup
-setup = Setup.of("tick", "walk", SHORT)
-run = Configuration.of(setup, "sope_eo", small("sope_eo"), steps=3 * STEPS, evaluate_every=EVERY)
-train(run, sys.argv[1], progress=silent)
-"""
-
-
-def in_a_process(folder, cache):
-    here = pathlib.Path(__file__).parent
-    command = [sys.executable, "-c", PROGRAM, str(folder), str(here), str(here.parent / "fixtures")]
-    cached = {"JAX_COMPILATION_CACHE_DIR": str(cache), "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0"}
-    return subprocess.Popen(command, env=os.environ | cached)
-
-
-@pytest.mark.slow
-def test_killed(tmp_path, kills=4):
-    """By SIGKILL, at random moments of training."""
-    assert in_a_process(tmp_path / "whole", tmp_path / "cache").wait() == 0
-    random = np.random.default_rng(0)
-    killed = 0
-    folder = tmp_path / "killed"
-    checkpoint = folder / "checkpoint.npz"
-
-    def saved():
-        return checkpoint.stat().st_mtime_ns if checkpoint.exists() else 0
-
-    while killed < kills:
-        before, process = saved(), in_a_process(folder, tmp_path / "cache")
-        while process.poll() is None and saved() == before:
-            time.sleep(0.005)
-        time.sleep(random.uniform(0.0, 0.3))
-        process.kill()
-        if process.wait() == 0:
-            break  # a machine so fast that the run is finished
-        killed += 1
-    assert killed
-    assert in_a_process(folder, tmp_path / "cache").wait() == 0
-    whole, resumed = contents(tmp_path / "whole"), contents(folder)
-    assert [key for key in whole if whole[key] != resumed.get(key)] == []
 
 
 def test_the_policy_of_a_run_earns_what_its_table_says(tiny, tmp_path):

@@ -142,16 +142,16 @@ def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
 
 def test_a_take_stays_at_its_end():
     environment = arc_suite.load("leaper", "walk", {"random": 0})
-    take = films.Take("leaper", environment, alone(policy("random", "leaper"), 0), "profile", (64, 48))
+    footage = films.Footage("leaper", environment, alone(policy("random", "leaper"), 0), "profile", (64, 48))
     for _ in range(200):
-        if take.ended:
+        if footage.ended:
             break
-        take.step()
-    before = take.steps, take.earned
-    take.step()
-    assert take.ended
-    assert (take.steps, take.earned) == before
-    take.close()
+        footage.step()
+    before = footage.steps, footage.earned
+    footage.step()
+    assert footage.ended
+    assert (footage.steps, footage.earned) == before
+    footage.close()
 
 
 @pytest.mark.parametrize(

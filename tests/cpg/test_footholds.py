@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.cpg import footholds
 from arc_suite.cpg.footholds import View
-from arc_suite.tasks.sensors import AHEAD, ASIDE
+from arc_suite.tasks.sensors import FORWARD, LEFT
 
 REACH, HEIGHT = 1.3, 1.0  # m
 PLACES = np.array([(1.0, 1.0), (0.0, 1.3), (-1.0, 1.0), (1.0, -1.0), (0.0, -1.3), (-1.0, -1.0)])
@@ -14,7 +14,7 @@ PLACES = np.array([(1.0, 1.0), (0.0, 1.3), (-1.0, 1.0), (1.0, -1.0), (0.0, -1.3)
 
 def scan(*trenches, moved=0.0):
     """Heights (points,) over trenches (from, to), m ahead of the torso, seen when it was `moved` m further back."""
-    x = np.repeat(AHEAD * REACH, len(ASIDE)) - moved
+    x = np.repeat(FORWARD * REACH, len(LEFT)) - moved
     return -0.6 * sum(((x >= first) & (x < last)) for first, last in trenches) if trenches else np.zeros(len(x))
 
 
@@ -55,10 +55,10 @@ def test_where_there_is_no_foothold_a_foot_lands_as_it_would():
 
 def test_ground_is_the_lower_of_two_points_and_the_higher_of_two_scans():
     x, y = np.array([1.1]), np.array([1.0])
-    spacing = (AHEAD[1] - AHEAD[0]) * REACH
+    spacing = (FORWARD[1] - FORWARD[0]) * REACH
     first = 1.1 + 0.25 * spacing
     one = scan((first, first + 0.5))
-    edges = AHEAD * REACH
+    edges = FORWARD * REACH
     for way in np.linspace(0.0, spacing, 7):
         other = scan((first, first + 0.5), moved=way)
         both = view((one, 0.0), (other, way)).ground(x, y)
@@ -68,5 +68,5 @@ def test_ground_is_the_lower_of_two_points_and_the_higher_of_two_scans():
 
 
 def test_what_was_not_seen_yet_says_nothing():
-    seen = view((scan((1.2, 1.6)), 0.0), (np.full(len(AHEAD) * len(ASIDE), -np.inf), 0.0))
+    seen = view((scan((1.2, 1.6)), 0.0), (np.full(len(FORWARD) * len(LEFT), -np.inf), 0.0))
     assert_allclose(shifted(seen, 1.4), shifted(view((scan((1.2, 1.6)), 0.0)), 1.4))

@@ -15,7 +15,7 @@ from arc_suite.cpg.law import checked
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks.following import Rough
+from arc_suite.tasks.suite import Rough
 
 PRESETS = [
     ("queen", "walk", "refined"),

@@ -211,7 +211,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
     contract |= {"tasks.parameters", "tasks.sensors"}
     particular = texts - contract
-    assert {"tasks.walk", "tasks.commanded", "tasks.following"} <= particular
+    assert {"tasks.walk", "tasks.commanded", "tasks.suite"} <= particular
     for name in modules():
         know = ("registration", "cpg.sighted", "cpg.footholds", "cpg.planner")
         if room(name) != "tasks" and name not in know:

@@ -36,7 +36,6 @@ FORBIDDEN = {
     "beside": "symmetric_sampling",
     "stage": "run context",
     "felt": "proprioception",
-    "ahead": "feedforward",
     "following": "feedback",
     "manner": "parameters",
     "tread": "parameters",
@@ -79,22 +78,15 @@ ALLOWED = {
     "following": r"agents\.",  # the next observations of a transition
     "build": r"models\.builder build$|build_model",  # a model from a spec
     "plan": r"\(\) plan$",  # a path around obstacles
-    "ahead": r"tasks\.ground AHEAD$",  # points of the height scan
     "motions": r" ROOT_MOTIONS$",  # whether clips move the root
     "events": r"cli\.train events$",  # files of TensorBoard
     "lift": r"cpg\.|LIFT_OFF$",  # height of a foot in swing; the end of a stance
     "limp": r" Limp$|^README|^studies",  # the task
     "fitted": r"arenas\.|tasks\.fitting",  # sizes and parameters that are fitted to a body
+    "warm_up": r"value_warm_up$",  # the field's word
+    "cloning": r" BehaviourCloning$",  # what bc abbreviates
     "scene": r"tasks\.|models\.",  # arena and body of a task; lights and floor of a picture
 }
-
-# Programs, rooms and studies that still have such words.
-LATE_PROGRAMS = ("build_model", "collect", "tune_cpg", "train")
-LATE_ROOMS = (
-    *("agents", "cli", "cpg", "data", "envs", "evaluation", "export", "marks", "models", "policies"),
-    *("registration", "robots", "simulation", "style", "tasks", "tuning"),
-)
-LATE_STUDIES = ("beyond", "exact-tick", "first-steps", "refined-prior", "short", "tasks")
 
 
 def assert_plain(names):
@@ -144,18 +136,12 @@ def rooms():
     return found
 
 
-def pending(names, late):
-    """Return `names` as parameters; those in `late` are expected to fail."""
-    mark = pytest.mark.xfail(strict=False, reason="renames that are not merged yet")
-    return [pytest.param(name, marks=mark if name in late else ()) for name in names]
-
-
 def test_readme():
     code = re.findall(r"```.*?```|`[^`\n]+`", (ROOT / "README.md").read_text(), re.DOTALL)
     assert_plain(("README", name) for text in code for name in re.findall(r"\w+", text))
 
 
-@pytest.mark.parametrize("program", pending(main.PROGRAMS, LATE_PROGRAMS))
+@pytest.mark.parametrize("program", main.PROGRAMS)
 def test_help(program):
     """Flags, and the values that they list."""
     text = programs.run("-m", "arc_suite", program, "--help", cwd=ROOT).stdout
@@ -165,7 +151,7 @@ def test_help(program):
     assert_plain((program, name) for name in [program, *flags, *values])
 
 
-@pytest.mark.parametrize("room", pending(rooms(), LATE_ROOMS))
+@pytest.mark.parametrize("room", rooms())
 def test_public_names(room):
     assert_plain(name for path in rooms()[room] for name in public(path))
 
@@ -173,7 +159,7 @@ def test_public_names(room):
 STUDIES = sorted(path.name for path in (ROOT / "studies").iterdir() if path.is_dir())
 
 
-@pytest.mark.parametrize("study", pending(STUDIES, LATE_STUDIES))
+@pytest.mark.parametrize("study", STUDIES)
 def test_columns_and_keys(study):
     """Headers of tables and keys of configurations that are committed."""
     names = set()

@@ -227,8 +227,8 @@ def test_tables_that_cannot_have_grown_are_not_read_again(tmp_path, monkeypatch)
     runs = [run("tick", "sac", 1000, seed) for seed in range(3)]
     names = [each.name for each in runs]
     words = dict(zip(names, ("finished", "running", "waiting"), strict=True))
-    read, table = [], runner.table
-    monkeypatch.setattr(runner, "table", lambda *place: read.append(place[0].name) or table(*place))
+    read, table = [], run_folder.table
+    monkeypatch.setattr(run_folder, "table", lambda *place: read.append(place[0].name) or table(*place))
     known = runner.states(runs, tmp_path, words)
     assert [(each.word, each.step) for each in known.values()] == [("finished", 0), ("running", 0), ("waiting", 0)]
     read.clear()

@@ -20,7 +20,7 @@ from arc_suite.simulation.model import compiled
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.command import draw_schedule
 from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level
-from arc_suite.tasks.sensors import AHEAD, ASIDE, SCAN
+from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
 
 KINDS = ("rough", "slopes", "stairs", "gaps")
 every_kind = pytest.mark.parametrize("kind", tiers(KINDS, lambda kind: kind == "gaps"))
@@ -176,7 +176,7 @@ def test_the_scan_is_the_ground_about_the_torso():
         timestep = environment.step(demonstrator(timestep))
     memory, data, arena = environment.task.memory, environment.physics.data.ptr, task.scene.arena
     scan = timestep.observation["scan"]
-    assert scan.shape == (len(AHEAD) * len(ASIDE),) == (175,)
+    assert scan.shape == (len(FORWARD) * len(LEFT),) == (175,)
     heading = memory.core.place[2]
     for (forward, left), value in zip(SCAN.T * task.context.reach, scan, strict=True):
         x = data.qpos[0] + np.cos(heading) * forward - np.sin(heading) * left

@@ -48,7 +48,7 @@ class Published:
         mujoco.mj_setState(self.model, self.data, state, STATE)
         mujoco.mj_kinematics(self.model, self.data)
         self.phase, self.last_action = 0.0, np.zeros(self.model.nu)
-        self.speeds, self.wrong_feet = [], []
+        self.speeds, self.schedule_errors = [], []
 
     def step(self, action):
         """Returns the observation and the reward."""
@@ -62,7 +62,7 @@ class Published:
         self.phase = (self.phase + 2 * math.pi * p.gait_frequency * 0.05) % (2 * math.pi)
         wanted = (self.phase + p.phase_offsets) % (2 * math.pi) < 2 * math.pi * p.duty_factor
         wrong = int(((data.xpos[self.feet, 2] < p.stance_threshold) != wanted).sum())
-        self.speeds.append(speed), self.wrong_feet.append(wrong)
+        self.speeds.append(speed), self.schedule_errors.append(wrong)
         forces = np.clip(data.cfrc_ext[1:], -1.0, 1.0).ravel()
         terms = {
             "forward": max(0.0, 1.0 - abs(speed - p.target_velocity) / self.settings.velocity_band),
@@ -101,7 +101,7 @@ def test_observation_reward_and_progress_are_the_published_ones(robot, fallen):
             speeds.append(environment.task.terms["forward"])
         progress = environment.task.progress
         assert_allclose(progress["speed"], np.mean(published.speeds), rtol=0.0, atol=1e-12)
-        assert 0 < np.sum(published.wrong_feet) < STEPS * len(published.feet)
-        compliance = 1.0 - np.mean(published.wrong_feet) / len(published.feet)
+        assert 0 < np.sum(published.schedule_errors) < STEPS * len(published.feet)
+        compliance = 1.0 - np.mean(published.schedule_errors) / len(published.feet)
         assert_allclose(progress["gait_compliance"], compliance, rtol=0.0, atol=1e-12)
         assert np.count_nonzero(speeds) > 0  # the term that looks at the frame's position has been looked at

@@ -46,7 +46,7 @@ class OrdinaryEnv(MujocoEnv):
         """Loads the model.
 
         Args:
-            robot: whose numbers to take.
+            robot: whose numbers to footage.
             xml_file: the model.
             terminate_when_unhealthy: whether a fall ends the episode.
             **kwargs: of `MujocoEnv`.
