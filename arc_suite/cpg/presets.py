@@ -1,7 +1,5 @@
 """The demonstrators' parameters, by robot and preset."""
 
-import functools
-
 from arc_suite.cpg.balancing import BalancingParameters
 from arc_suite.cpg.planner import PlanningParameters
 from arc_suite.cpg.prescribed import Bend, Preset
@@ -20,49 +18,23 @@ def _commanded(sighted: SightedParameters, **build) -> dict:
 # Of bodies and robots without presets of their own of these names; a number is a speed as a share of sqrt(g h).
 DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_commanded(SightedParameters())}
 
-_hexapod = functools.partial(Preset, stiffness=0.8, settle=15, ramp=20, ramp_start=0.3, phase_offsets=TRIPOD)
-_queen = functools.partial(
-    _hexapod, damping=0.18, frequency=1.5, centre={"knee": (-25, -25, 25), "ankle": (15, 30, -15)}
-)
-_bastion = functools.partial(_hexapod, damping=0.15, centre={"ankle": 30})
-_tick = functools.partial(_hexapod, damping=0.18, frequency=1.5, centre={"knee": 0, "ankle": 0})
-_leaper = functools.partial(
-    Preset,
-    stiffness=0.8,
-    damping=0.15,
-    settle=0,
-    ramp=15,
-    ramp_start=0.2,
-    phase_offsets=TROT,
-    sweep=30,
-    centre={"knee": 0, "ankle": 0},
-)
+
+def _published(common: dict, *rows: tuple) -> dict:
+    """The paper's slow, medium and fast: frequency, Hz, duty factor, sweep and bends, degrees, of each."""
+    numbers = (dict(zip(("frequency", "duty_factor", "sweep", "bends"), row, strict=True)) for row in rows)
+    return {name: Preset(**common, **row) for name, row in zip(("slow", "medium", "fast"), numbers, strict=True)}
+
+
+_HEXAPOD = {"stiffness": 0.8, "settle": 15, "ramp": 20, "ramp_start": 0.3, "phase_offsets": TRIPOD}
+_LEAPER = {"stiffness": 0.8, "damping": 0.15, "settle": 0, "ramp": 15, "ramp_start": 0.2, "phase_offsets": TROT}
 
 PRESETS = {
     "queen": {
-        "slow": _queen(
-            duty_factor=0.65,
-            sweep=22,
-            bends={
-                "knee": Bend(stance=(10, 10, -10), swing=(-40, -40, 40)),
-                "ankle": Bend(stance=(25, 0, -25), swing=(30, 45, -30)),
-            },
-        ),
-        "medium": _queen(
-            duty_factor=0.60,
-            sweep=26,
-            bends={
-                "knee": Bend(stance=(15, 15, -15), swing=(-45, -45, 45)),
-                "ankle": Bend(stance=(35, 0, -35), swing=(35, 55, -35)),
-            },
-        ),
-        "fast": _queen(
-            duty_factor=0.55,
-            sweep=30,
-            bends={
-                "knee": Bend(stance=(20, 20, -20), swing=(-50, -50, 50)),
-                "ankle": Bend(stance=(45, 0, -45), swing=(40, 65, -40)),
-            },
+        **_published(
+            {**_HEXAPOD, "damping": 0.18, "centre": {"knee": (-25, -25, 25), "ankle": (15, 30, -15)}},
+            (1.5, 0.65, 22, {"knee": Bend((10, 10, -10), (-40, -40, 40)), "ankle": Bend((25, 0, -25), (30, 45, -30))}),
+            (1.5, 0.60, 26, {"knee": Bend((15, 15, -15), (-45, -45, 45)), "ankle": Bend((35, 0, -35), (35, 55, -35))}),
+            (1.5, 0.55, 30, {"knee": Bend((20, 20, -20), (-50, -50, 50)), "ankle": Bend((45, 0, -45), (40, 65, -40))}),
         ),
         "tuned": Preset(
             stiffness=0.982,
@@ -82,9 +54,12 @@ PRESETS = {
         ),
     },
     "bastion": {
-        "slow": _bastion(frequency=1.2, duty_factor=0.65, sweep=22, bends={"ankle": Bend(stance=-15, swing=35)}),
-        "medium": _bastion(frequency=1.5, duty_factor=0.60, sweep=26, bends={"ankle": Bend(stance=-20, swing=45)}),
-        "fast": _bastion(frequency=1.8, duty_factor=0.55, sweep=30, bends={"ankle": Bend(stance=-25, swing=55)}),
+        **_published(
+            {**_HEXAPOD, "damping": 0.15, "centre": {"ankle": 30}},
+            (1.2, 0.65, 22, {"ankle": Bend(-15, 35)}),
+            (1.5, 0.60, 26, {"ankle": Bend(-20, 45)}),
+            (1.8, 0.55, 30, {"ankle": Bend(-25, 55)}),
+        ),
         "tuned": Preset(
             stiffness=0.65,
             damping=0.115,
@@ -101,20 +76,11 @@ PRESETS = {
         ),
     },
     "tick": {
-        "slow": _tick(
-            duty_factor=0.65,
-            sweep=32,
-            bends={"knee": Bend(stance=8, swing=-35), "ankle": Bend(stance=0, swing=35)},
-        ),
-        "medium": _tick(
-            duty_factor=0.60,
-            sweep=40,
-            bends={"knee": Bend(stance=12, swing=-40), "ankle": Bend(stance=0, swing=45)},
-        ),
-        "fast": _tick(
-            duty_factor=0.55,
-            sweep=40,
-            bends={"knee": Bend(stance=18, swing=-45), "ankle": Bend(stance=0, swing=55)},
+        **_published(
+            {**_HEXAPOD, "damping": 0.18, "centre": {"knee": 0, "ankle": 0}},
+            (1.5, 0.65, 32, {"knee": Bend(8, -35), "ankle": Bend(0, 35)}),
+            (1.5, 0.60, 40, {"knee": Bend(12, -40), "ankle": Bend(0, 45)}),
+            (1.5, 0.55, 40, {"knee": Bend(18, -45), "ankle": Bend(0, 55)}),
         ),
         "tuned": Preset(
             stiffness=0.648,
@@ -134,20 +100,11 @@ PRESETS = {
         ),
     },
     "leaper": {
-        "slow": _leaper(
-            frequency=1.0,
-            duty_factor=0.65,
-            bends={"knee": Bend(stance=0, swing=-50), "ankle": Bend(stance=(20, 0), swing=(70, -70))},
-        ),
-        "medium": _leaper(
-            frequency=1.2,
-            duty_factor=0.60,
-            bends={"knee": Bend(stance=0, swing=-55), "ankle": Bend(stance=(25, 0), swing=(75, -75))},
-        ),
-        "fast": _leaper(
-            frequency=1.5,
-            duty_factor=0.60,
-            bends={"knee": Bend(stance=0, swing=-60), "ankle": Bend(stance=(30, 0), swing=(80, -80))},
+        **_published(
+            {**_LEAPER, "centre": {"knee": 0, "ankle": 0}},
+            (1.0, 0.65, 30, {"knee": Bend(0, -50), "ankle": Bend((20, 0), (70, -70))}),
+            (1.2, 0.60, 30, {"knee": Bend(0, -55), "ankle": Bend((25, 0), (75, -75))}),
+            (1.5, 0.60, 30, {"knee": Bend(0, -60), "ankle": Bend((30, 0), (80, -80))}),
         ),
         "tuned": Preset(
             stiffness=0.644,
