@@ -50,7 +50,7 @@ def episodes(task: str, body, settings: dict, policy: str, preset: str, command=
     """Figures of episodes, (episodes,) each: return, the task's own at the end, and the distance ahead."""
     count = FLAGS.episodes
     rows = VectorEnv(body, task, count, autoreset_mode="Disabled", max_episode_steps=FLAGS.steps, task_kwargs=settings)
-    acting = policies.policy(policy, body, preset, count, task=rows.task)
+    acting = policies.policy(policy, body, preset, count, task=rows.task.definition)
     seeds = range(FLAGS.seed, FLAGS.seed + count)
     with contextlib.closing(rows):
         observations, _ = rows.reset(seed=FLAGS.seed)

@@ -35,7 +35,7 @@ def played(task: str, robot: str, preset: str, difficulty: float) -> list[evalua
     rows = VectorEnv(robot, task, FLAGS.episodes, FLAGS.threads, "Disabled", task_kwargs=settings)
     name, preset = ("zero", "medium") if preset == "zero" else ("cpg", preset)
     with contextlib.closing(rows):
-        policy = policies.policy(name, robot, preset, FLAGS.episodes, task=rows.task)
+        policy = policies.policy(name, robot, preset, FLAGS.episodes, task=rows.task.definition)
         return evaluation.episodes_in_batch(rows, policy, range(FLAGS.episodes))
 
 

@@ -29,7 +29,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
     if context.prior is None:
         raise ValueError("prior: the algorithm takes prior data, the id of a dataset, got None")
     with contextlib.closing(context.environment()) as environment:
-        task = environment.task
+        task = environment.task.definition
     data = priors.mapped(context, task)
     moments = Moments.none(task.size)
     for first in range(0, len(data), _CHUNK):

@@ -46,7 +46,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         ValueError: the body has no such preset, or the run is too short to learn; one line.
     """
     environment = context.environment(hp.num_envs)
-    task, joints = environment.task, environment.single_action_space.shape[0]
+    task, joints = environment.task.definition, environment.single_action_space.shape[0]
     preset = hp.preset or suited_preset(task)
     teacher = policies.policy("cpg", context.setup.body, preset, hp.num_envs, task=task)
     layers = networks.mlp(

@@ -65,8 +65,8 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         expected = "no prior data" if hp.prior == "none" else "prior data, the id of a dataset"
         raise ValueError(f"prior: the algorithm takes {expected}, got {context.prior!r}")
     seed, core, environment = context.seed, sac.core(hp), context.environment()
-    size, joints = environment.task.size, environment.single_action_space.shape[0]
-    prior = None if context.prior is None else priors.mapped(context, environment.task)
+    size, joints = environment.task.definition.size, environment.single_action_space.shape[0]
+    prior = None if context.prior is None else priors.mapped(context, environment.task.definition)
     buffer = Replay(context.folder / "replay", min(hp.buffer_size, context.steps), size, joints, slack=SLICE)
     sources = _SOURCES[hp.prior](buffer, prior)
     state = sac.begin(hp, generator(seed, "networks", 0), size, joints)

@@ -34,7 +34,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     seed, environment = context.seed, context.environment(hp.num_envs)
-    task, joints = environment.task, environment.single_action_space.shape[0]
+    task, joints = environment.task.definition, environment.single_action_space.shape[0]
     symmetry = _symmetry(task) if hp.symmetry_augmentation else None
     moments, policy = Moments.none(task.size), None
     normalise = moments.layer()

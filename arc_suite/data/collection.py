@@ -137,7 +137,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], num_envs: in
         unit_scale=True,
     ) as bar:
         try:
-            policy = _policy(settings, num_envs, environment.task)
+            policy = _policy(settings, num_envs, environment.task.definition)
             for step in rollouts.play(environment, policy, seeds, settings.steps):
                 bar.update(step.playing)
                 for episode in step.finished:
@@ -173,7 +173,7 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) ->
             f"{presets}{noise}; episode k has seed {settings.seed} + k.",
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
             "ref_min_score": _mean_return(environment, settings._replace(policy="zero", presets=(), noise=0.0)),
-            "ref_max_score": terms.greatest(environment.task.settings.weights) * settings.steps,
+            "ref_max_score": terms.greatest(environment.task.definition.settings.weights) * settings.steps,
             "num_episodes_average_score": evaluation.EPISODES,
             "arc_suite": provenance,
         }
@@ -181,5 +181,5 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) ->
 
 def _mean_return(environment: VectorEnv, settings: Settings) -> float:
     """Return the mean return by the evaluation protocol."""
-    policy = _policy(settings, environment.num_envs, environment.task)
+    policy = _policy(settings, environment.num_envs, environment.task.definition)
     return float(np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, policy)]))

@@ -14,6 +14,7 @@ from dm_env import specs
 from arc_suite import checks
 from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
+from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
@@ -126,7 +127,7 @@ class Environment(control.Environment):
         return self.task.observation_spec(self.physics)
 
 
-class TaskRun(control.Task):
+class TaskRun(TaskView, control.Task):
     """A task in one simulation, episode after episode, as dm_control's `Task`: it keeps the memory.
 
     Attributes:
@@ -170,16 +171,6 @@ class TaskRun(control.Task):
     @random.setter
     def random(self, value: np.random.RandomState):
         self._random, self._stream, self._stream_begins = value, self.definition.first(), True
-
-    @property
-    def body(self):
-        """What moves."""
-        return self.definition.scene.body
-
-    @property
-    def settings(self):
-        """The numbers of the task."""
-        return self.definition.settings
 
     @property
     def progress(self) -> dict[str, float]:
@@ -248,7 +239,7 @@ class TaskRun(control.Task):
 
     def get_reward(self, physics):
         """Return the weighted sum of the terms, which stay in `terms`."""
-        weights = self.settings.weights
+        weights = self.definition.settings.weights
         self.terms = self.definition.terms(self.memory, self._latest(physics))
         if physics.divergence is not None:
             self.terms = dict.fromkeys(self.terms, np.float64(0.0))

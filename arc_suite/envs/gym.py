@@ -13,9 +13,9 @@ from shimmy.utils.dm_env import dm_env_step2gym_step
 from arc_suite import checks
 from arc_suite.envs.calls import one_thread_at_a_time
 from arc_suite.envs.dm import load
+from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.window import Window
 from arc_suite.simulation import opengl, pictures
-from arc_suite.tasks import Task
 
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
@@ -94,9 +94,9 @@ class Env(DmControlCompatibilityV0):
             self._np_random_seed = checks.seed(random)
 
     @property
-    def task(self) -> Task:
-        """What is asked, a value of `arc_suite.tasks`; its `split` gives an observation's blocks by name."""
-        return self._env.task.definition
+    def task(self) -> TaskView:
+        """The task; its `split` gives an observation's blocks by name."""
+        return self._env.task
 
     @property
     def np_random(self) -> np.random.Generator:

@@ -52,7 +52,7 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
             parts = (arrays[f"random/{part}"][index] for part in ("keys", "positions", "halves", "normals"))
             key, position, half, normal = parts
             random.set_state(("MT19937", key, int(position), int(half), float(normal)))
-            first = environment.task.first()
+            first = environment._task.first()
             stream = (arrays[f"stream/{index}/{place}"] for place, _ in enumerate(trees.leaves(first)))
             environment._streams[index] = _refilled(first, stream)
     except (KeyError, ValueError, TypeError, IndexError) as error:

@@ -14,14 +14,44 @@ from arc_suite import checks
 from arc_suite.envs import snapshots, trees
 from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
+from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
-from arc_suite.tasks import terms
+from arc_suite.tasks import Task, terms
 
 _RENDER_MODES = ("rgb_array", "depth_array")
 _OF_EACH = ("np_random", "np_random_seed", "render")  # attributes that have a value for each environment
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
+
+
+class VectorTask(TaskView):
+    """The task of a vector environment; terms and metrics are (num_envs,)."""
+
+    def __init__(self, environment: "VectorEnv"):
+        """View a vector environment that has prepared its task."""
+        self._environment = environment
+
+    @property
+    def definition(self) -> Task:
+        """The task, a value of the contract."""
+        return self._environment._task
+
+    @property
+    def terms(self) -> Mapping[str, np.ndarray]:
+        """Unweighted terms of the latest step by name."""
+        return self._environment._terms
+
+    @property
+    def progress(self) -> Mapping[str, np.ndarray]:
+        """Metrics of the episodes so far by name.
+
+        Raises:
+            ResetNeeded: before the first reset.
+        """
+        if self._environment._memory is None:
+            raise ResetNeeded("no episode has begun; call reset first")
+        return self.definition.progress(self._environment._memory)
 
 
 class VectorEnv(gymnasium.vector.VectorEnv):
@@ -95,16 +125,18 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         pictures.check_size(height, width)
         threads = usable_cores() if num_threads is None else checks.integer("num_threads", num_threads, 1)
 
-        self.task, model = prepared(domain_name, task_name, task_kwargs)
+        self._task, model = prepared(domain_name, task_name, task_kwargs)
         pictures.check_camera(model, camera_id)
         self._step_limit = (
             np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
         )
 
-        self.batch = Batch(model, self.num_envs, threads, self.task.reads)
+        self.batch = Batch(model, self.num_envs, threads, self._task.reads)
+        self.task = VectorTask(self)
+        self._terms = {}  # of the latest step
         self._memory = None  # of all environments, with a leading axis
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
-        self._streams = [self.task.first() for _ in range(self.num_envs)]
+        self._streams = [self._task.first() for _ in range(self.num_envs)]
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # environments whose next episode is the first of its stream
         if seed is not None:
@@ -115,7 +147,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
-            "render_fps": round(1.0 / self.task.scene.control_timestep),
+            "render_fps": round(1.0 / self._task.scene.control_timestep),
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
@@ -125,8 +157,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             "camera_id": camera_id,
             "depth": render_mode == "depth_array",
         }
-        self._observation = np.zeros((self.num_envs, self.task.size), np.float32)  # the latest
-        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self.task.size,), np.float32)
+        self._observation = np.zeros((self.num_envs, self._task.size), np.float32)  # the latest
+        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self._task.size,), np.float32)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (model.nu,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -178,7 +210,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("step")
         if self._memory is None:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
-        task, before, data = self.task, self._memory, self.batch.data
+        task, before, data = self._task, self._memory, self.batch.data
         waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
         stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
         memory, inputs = task.before(before, checked_action(actions, self.action_space.shape))
@@ -229,10 +261,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("command")
-        mask, value = self._mask(mask, "mask"), checked_command(self.task, name, value, (self.num_envs,))
+        mask, value = self._mask(mask, "mask"), checked_command(self._task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
-        self._memory = _chosen(mask, self.task.commanded(self._memory, name, value), self._memory)
+        self._memory = _chosen(mask, self._task.commanded(self._memory, name, value), self._memory)
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:
@@ -369,7 +401,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
 
     def _picture_of(self, index: int) -> np.ndarray:
-        task, scene, marks = self.task, self.task.scene, ()
+        task, scene, marks = self._task, self._task.scene, ()
         if self._memory is not None:
             marks = task.markers(trees.at(self._memory, index), task.read(self.batch.part(index)))
         qpos, mocap_pos = self.batch.data.qpos[index], self.batch.mocap_pos[index]
@@ -377,7 +409,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _begin(self, mask: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""
-        task, starts = self.task, []
+        task, starts = self._task, []
         for index in np.flatnonzero(mask):
             if not self._streams_begin[index]:
                 self._streams[index] = task.stream_state(trees.at(self._memory, index))
@@ -403,7 +435,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         info = {}
         if mask.any():
             metrics = {f"reward_{name}": term for name, term in self._terms.items()}
-            metrics |= {f"progress_{name}": metric for name, metric in self.task.progress(self._memory).items()}
+            metrics |= {f"progress_{name}": metric for name, metric in self._task.progress(self._memory).items()}
             info |= _marked({name: np.where(mask, metric, 0.0) for name, metric in metrics.items()}, mask)
         diverged = diverged & mask
         if diverged.any():
@@ -423,7 +455,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Start new streams of random numbers in some environments, except those whose seed is None."""
         for index in np.flatnonzero(mask):
             if seeds[index] is not None:
-                self._randoms[index], self._streams[index] = np.random.RandomState(seeds[index]), self.task.first()
+                self._randoms[index], self._streams[index] = np.random.RandomState(seeds[index]), self._task.first()
                 self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
 
     def _mask(self, mask, name: str = "reset_mask") -> np.ndarray:

@@ -22,7 +22,7 @@ def difference(setup: Setup, steps: int = STEPS) -> str | None:
         differ. None where there is none.
     """
     environments = setup.make_vec(_ENVIRONMENTS, seed=0)
-    task, random = environments.task, np.random.RandomState(0)
+    task, random = environments.task.definition, np.random.RandomState(0)
     environments.reset()
     try:
         for step in range(1, steps + 1):

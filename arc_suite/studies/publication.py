@@ -109,7 +109,7 @@ def _demonstrated(setup: Setup) -> dict[str, list[evaluation.Episode]]:
     found = {}
     environment = setup.make_vec(evaluation.EPISODES, num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
     with contextlib.closing(environment):
-        task = environment.task
+        task = environment.task.definition
         usual = COMMANDED if "command" in task.blocks else PRESETS
         for preset in dict.fromkeys((*usual, suited_preset(task))):
             if preset in presets_of(setup.body):

@@ -31,7 +31,7 @@ PRESETS = [
 def test_feet_do_not_jump_at_a_stop(robot, preset):
     """At each of 20 phases of the cycle the phase is held, and feet come to rest; zeros of the clock are negative."""
     environments, count, going = VectorEnv(robot, "steer", 20, 1), 20, (1.0, 0.0, 0.3)
-    task, actions = environments.task, np.zeros(environments.action_space.shape)
+    task, actions = environments.task.definition, np.zeros(environments.action_space.shape)
     act, joints = law(task, presets_of(task.scene.body)[preset]), len(task.scene.body.joint_names)
     environments.reset(seed=0)
     state, before, walking = act.initial(count), None, 0.0
@@ -61,8 +61,8 @@ def test_jit_computes_what_numpy_computes(robot, task, preset):
     jax = pytest.importorskip("jax", reason="of the extra `jax`: make check-jax")
     jax.config.update("jax_enable_x64", True)
     environments = VectorEnv(robot, task, 3, 1)
-    body = environments.task.scene.body
-    fitted = law(environments.task, presets_of(body)[preset])
+    body = environments.task.definition.scene.body
+    fitted = law(environments.task.definition, presets_of(body)[preset])
     state, observation = fitted.initial(3), environments.reset(seed=0)[0]
     compiled, theirs = jax.jit(fitted.__call__), fitted.initial(3)
     for _ in range(40):
@@ -84,7 +84,7 @@ def test_tasks_and_environments_are_accepted():
     settings.pop("random")
     single = gymnasium.make("arc_suite/queen-steer-v0", task_kwargs=settings)
     batch = gymnasium.make_vec("arc_suite/queen-steer-v0", num_envs=2, task_kwargs=settings)
-    for given in (environment, environment.task, single, single.unwrapped, batch):
+    for given in (environment, environment.task.definition, single, single.unwrapped, batch):
         assert_array_equal(Demonstrator(given, "steered").act(blocks), expected)
     assert abs(Demonstrator("queen", "steered").act(blocks) - expected).max() > 0.01
     noisy = arc_suite.load("queen", "steer", {"gait": "ripple", "kicks": 1.0})

@@ -83,7 +83,7 @@ def test_the_point_that_is_steered_for_lies_along_the_way():
 
 
 def test_commands_turn_to_where_they_lead():
-    assert toward(0.0, PLAN) == (PLAN.ahead, 0.0, 0.0)
+    assert toward(0.0, PLAN) == (PLAN.forward, 0.0, 0.0)
     forward, left, turn = toward(2.0, PLAN)
     assert forward < 0.0 < left and turn == 1.0
     assert toward(-2.0, PLAN) == (forward, -left, -turn)

@@ -33,7 +33,7 @@ def test_three_kinds_of_environment_play_the_same_episode():
     assert env.spec.max_episode_steps == 1000
     np.testing.assert_array_equal(env.reset(seed=3)[0], first.astype(np.float32))
     np.testing.assert_array_equal(batch.reset()[0][1], first.astype(np.float32))
-    assert batch.task.step_limit == setup.definition.step_limit
+    assert batch.task.definition.step_limit == setup.definition.step_limit
     for each in (env, batch):
         each.close()
 

@@ -33,7 +33,7 @@ def recorded(body, task_name, settings):
     """Yields memory, action and fields of the simulation, before and after steps of rows that walk about."""
     rows = VectorEnv(body, task_name, ROWS, 1, task_kwargs=settings)
     rows.reset(seed=0)
-    task, random = rows.task, np.random.RandomState(0)
+    task, random = rows.task.definition, np.random.RandomState(0)
     for _ in range(STEPS):
         memory = rows._memory
         action = random.uniform(-0.4, 0.4, rows.action_space.shape)

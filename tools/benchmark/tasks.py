@@ -17,7 +17,9 @@ def _walking(task: str, robot: str, threads: int):
     """Rows that are under way, and the actions of their next steps, which every turn repeats."""
     rows = VectorEnv(robot, task, NUM_ENVS, threads)
     has_command = "command" in rows.task.blocks
-    policy = policies.policy("cpg", robot, "surefooted" if has_command else "tuned", NUM_ENVS, task=rows.task)
+    policy = policies.policy(
+        "cpg", robot, "surefooted" if has_command else "tuned", NUM_ENVS, task=rows.task.definition
+    )
     observations, rewards, actions = rows.reset(seed=0)[0], np.zeros(NUM_ENVS), []
     policy.reset(range(NUM_ENVS), range(NUM_ENVS))
     for _ in range(_ONSET + _STEPS):
@@ -53,9 +55,10 @@ def measure(robot: str, threads: int, rounds: int) -> str:
 
 def _scan(rows: VectorEnv, rounds: int) -> float:
     """Seconds that the height scan takes, a row."""
-    readings, times = rows.task.read(rows.batch.data), []
+    task = rows.task.definition
+    readings, times = rows.task.definition.read(rows.batch.data), []
     for _ in range(10 * rounds):
         begin = time.perf_counter()
-        rows.task.scan(rows._memory, readings)
+        task.settings.ground.observe(task.context, rows._memory.ground, rows._memory.core.place, readings)
         times.append(time.perf_counter() - begin)
     return float(np.median(times)) / NUM_ENVS

@@ -1,0 +1,53 @@
+"""What an environment tells of its task: alike in dm_env, in Gymnasium and in vector environments."""
+
+import collections
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import Task
+from arc_suite.tasks.contract import Scene
+
+
+class TaskView:
+    """The task of an environment, `environment.task`.
+
+    Attributes:
+        definition: the task, a value of the contract.
+        terms: unweighted terms of the latest step by name, each (...); empty before the first step.
+        progress: metrics of the episodes so far by name, each (...).
+    """
+
+    definition: Task
+    terms: Mapping[str, np.ndarray]
+    progress: Mapping[str, np.ndarray]
+
+    @property
+    def body(self) -> Body:
+        """The body that moves."""
+        return self.definition.scene.body
+
+    @property
+    def scene(self) -> Scene:
+        """The body, the arena and their model."""
+        return self.definition.scene
+
+    @property
+    def settings(self) -> Any:
+        """The settings of the task."""
+        return self.definition.settings
+
+    @property
+    def blocks(self) -> Mapping[str, int]:
+        """Sizes of the observation's blocks by name, in the order of the vector."""
+        return self.definition.blocks
+
+    def split(self, observation: np.ndarray) -> collections.OrderedDict:
+        """Return an observation vector (..., size) as named blocks, views of it.
+
+        Raises:
+            ValueError: a vector of another size.
+        """
+        return self.definition.split(observation)
