@@ -90,7 +90,7 @@ class Steered(Commanded):
         """Return nothing: the law remembers no more than `State` does."""
         return ()
 
-    def planned(self, paths: tuple, request: Request, observation: Mapping) -> tuple:
+    def planned(self, none: tuple, request: Request, observation: Mapping) -> tuple:
         """Return the target angles (environments, joints), rad, and their change in a step; see `Commanded`."""
         numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
         paths = 0.5 * self.stance * flows(request.motion * self.units, self.feet)
@@ -106,7 +106,7 @@ class Steered(Commanded):
                 cycle = (phase + self.offsets[index]) % 1.0
                 targets.append(raised + _swung(cycle[:, None], self.duty_factor, sweep, leg.lift))
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
-        return paths, self.neutral + now, later - now
+        return none, self.neutral + now, later - now
 
     def _legs(self):
         low, high = _ranges(self.body) - self.neutral
