@@ -64,16 +64,16 @@ MUTANTS = (
         "np.random.RandomState((self.seed, KINDS.index(kind), before))",
         "np.random.RandomState(self.seed)",
     ),
-    Mutant("feet may sink", "return memory.sinking >= SINKING", "return memory.sinking < 0"),
-    Mutant("levels never fall", "max(carry.level - 1, 0) if carry.outcome < down else carry.level", "carry.level"),
-    Mutant("the highest level for ever", "return carry.level if stays < STAYS else other", "return carry.level"),
+    Mutant("feet may sink", "sinking, sinking >= SINKING, left", "sinking, sinking < 0, left"),
+    Mutant("levels never fall", "numpy.where(stream.outcome < down, (level - 1).clip(0), level)", "level"),
+    Mutant("the highest level for ever", "numpy.where(stays < STAYS, level, other)", "level"),
     Mutant(
         "a scan that does not turn",
         "x = position[..., 0:1] + cosine * forward - sine * left",
         "x = position[..., 0:1] + forward",
     ),
     Mutant("a command along the torso", "-numpy.sin(heading), turn", "numpy.sin(heading), turn"),
-    Mutant("who lies is healthy", "return high & ~lies & ", "return high & "),
+    Mutant("who lies is healthy", "~(high & ~lies & ", "~(high & "),
     # Simulations.
     Mutant("no sensors, so no contact forces", "option.disableflags = flags\n", "pass\n"),
     Mutant("one substep too few", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
@@ -108,13 +108,17 @@ MUTANTS = (
     Mutant("reset noise to one side", "random.uniform(-widths, widths)", "random.uniform(0.0 * widths, widths)"),
     Mutant(
         "speed of the state in place of the frame's",
-        "        x = component(readings.frame_position, 0)",
-        "        x = component(readings.torso_position, 0)",
+        "tick, x = memory.tick + 1, component(readings.frame_position, 0)",
+        "tick, x = memory.tick + 1, component(readings.torso_position, 0)",
     ),
     Mutant(
         "the first step starts from nowhere", "_replace(x=component(readings.frame_position, 0) + 0.0)", "_replace()"
     ),
-    Mutant("wrong feet counted twice", "memory.wrong_in_all + wrong_feet", "memory.wrong_in_all + 2.0 * wrong_feet"),
+    Mutant(
+        "schedule errors counted twice",
+        "memory.all_schedule_errors + schedule_errors",
+        "memory.all_schedule_errors + 2.0 * schedule_errors",
+    ),
     Mutant(
         "blocks declared in another order",
         '{"posture": 5 + joints, "velocities": 6 + joints,',
@@ -125,30 +129,28 @@ MUTANTS = (
     Mutant(
         "feet stay in the ground", "(clear - readings.foot_heights).max", "0.0 * (clear - readings.foot_heights).max"
     ),
-    Mutant("a memory written in place", "(1.0 - leak) * memory.motion", "memory.motion.__imul__(1.0 - leak)"),
-    Mutant(
-        "a command that is ignored", "numpy.where(numpy.isnan(memory.command), scheduled, memory.command)", "scheduled"
-    ),
-    Mutant("a schedule that does not end", "memory.steps % memory.ends[..., -1]", "memory.steps"),
+    Mutant("a memory written in place", "(1.0 - leak) * core.motion", "core.motion.__imul__(1.0 - leak)"),
+    Mutant("a command that is ignored", "numpy.where(numpy.isnan(memory.live), scheduled, memory.live)", "scheduled"),
+    Mutant("a schedule that does not end", "steps % memory.ends[..., -1]", "steps"),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
     # Modifiers.
-    Mutant("a leg limp from the start", "memory.elapsed >= FAILS_FROM", "memory.elapsed >= 0"),
-    Mutant("kicks a step late", "% last + 1 == memory.kick_steps", "% last == memory.kick_steps"),
-    Mutant("weak motors give all", "ctrl = memory.strength * inputs.ctrl", "ctrl = inputs.ctrl"),
-    Mutant("actions not delayed", "memory, asked = _delayed(memory, action)", "memory, _ = _delayed(memory, action)"),
+    Mutant("a leg limp from the start", "own.elapsed >= FAILS_FROM", "own.elapsed >= 0"),
+    Mutant("kicks a step late", "% last + 1 == changes.kick_steps", "% last == changes.kick_steps"),
+    Mutant("weak motors give all", "ctrl = own.strength * inputs.ctrl", "ctrl = inputs.ctrl"),
+    Mutant("actions not delayed", "own, action = _delayed(own, action)", "own, _ = _delayed(own, action)"),
     Mutant("the same noise in every step", "key ^ (step * _GOLDEN)", "key"),
-    Mutant("positions held without damping", "- damping * memory.speeds", "- 0.0 * memory.speeds"),
+    Mutant("positions held without damping", "- damping * changes.speeds", "- 0.0 * changes.speeds"),
     Mutant(
         "the reward sees what weak motors give",
-        "self.task.before(memory, asked)",
-        "self.task.before(memory, memory.strength * asked)",
+        "self.task.before(memory.task, action)",
+        "self.task.before(memory.task, own.strength * action)",
     ),
     Mutant("a changed model stays so", "if self._unchanged:", "if False:"),
     Mutant(
         "the last substep of rows on the compiled model",
-        "set_models(self._own)\n            simulations.step(rows)",
-        "set_models(None)\n            simulations.step(rows)",
+        "set_models(self._own)\n            simulations.step(mask)",
+        "set_models(None)\n            simulations.step(mask)",
     ),
     # Environments.
     Mutant("dropped clip of the action", "return array.clip(-1.0, 1.0)", "return array"),
@@ -162,16 +164,20 @@ MUTANTS = (
     ),
     Mutant(
         "a new stream of a row carries on the old one",
-        "self._streams_begin[row] = seeds[row], True",
-        "self._streams_begin[row] = seeds[row], False",
+        "self._streams_begin[index] = seeds[index], True",
+        "self._streams_begin[index] = seeds[index], False",
     ),
-    Mutant("rows share a seed", "checks.seed(first + row) for", "checks.seed(first) for"),
+    Mutant("environments share a seed", "checks.seed(first + index) for", "checks.seed(first) for"),
     Mutant(
         "observations of a batch handed out live",
         "self._observation = observation.copy()",
         "self._observation = observation",
     ),
-    Mutant("a command for all rows", "np.where(mask[:, None], value, present)", "value"),
+    Mutant(
+        "a command for all rows",
+        "_chosen(mask, self.task.commanded(self._memory, name, value), self._memory)",
+        "self.task.commanded(self._memory, name, value)",
+    ),
     Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
     Mutant("two threads in one environment", "not lock.acquire(False)", "False"),
     # Demonstrators and policies.
@@ -198,7 +204,7 @@ MUTANTS = (
     Mutant("all legs lead alike", "offset + leads[rank]", "offset + leads[0]"),
     Mutant("the fallen go on earning", "totals += rewards * counted", "totals += rewards"),
     Mutant("a search is told its worst", "[-value for value in fitness]", "fitness"),
-    Mutant("a damaged episode is read", "!= value:", "is value:"),
+    Mutant("a damaged episode is read", "if found[key] != value:", "if found[key] is value:"),
     # Clips and pages.
     Mutant("axes of glTF are a mirror", "_AXES = (1, 2, 0)", "_AXES = (0, 2, 1)"),
     Mutant(
@@ -215,7 +221,7 @@ MUTANTS = (
     ),
     Mutant("the mouse pulls at nothing", "data.xfrc_applied[:] = forces", "data.xfrc_applied[:] = 0.0"),
     # Studies and datasets of agents.
-    Mutant("medium agents are the best", "enough = MEDIUM * max(", "enough = max("),
+    Mutant("medium agents are the best", ">= MEDIUM * best", ">= best"),
     Mutant("evaluations under way count", "marks[counts == evaluation.EPISODES]", "marks"),
     Mutant(
         "runs compared wherever they are", "int(np.flatnonzero(each.steps == max(common))[0]) + 1", "len(each.steps)"
