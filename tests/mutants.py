@@ -175,7 +175,7 @@ MUTANTS = (
     ),
     Mutant(
         "a command for all rows",
-        "_chosen(mask, self.task.commanded(self._memory, name, value), self._memory)",
+        "_chosen(mask, self._task.commanded(self._memory, name, value), self._memory)",
         "self.task.commanded(self._memory, name, value)",
     ),
     Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
