@@ -67,7 +67,7 @@ def episodes(task: str, body, settings: dict, policy: str, preset: str, command=
                 figures[name] = np.where(info[f"_{name}"], info[name], figures.get(name, 0.0))
             over |= terminated | truncated
         way = rotations.headed(rows.batch.data.qpos[:, :2] - first[:, :2], rotations.yaw(first[:, 3:]))
-        asked = rows.task.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
+        asked = rows.task.definition.parameters.target_velocity * rows.task.scene.control_timestep * FLAGS.steps
     return {"return": totals, "distance": way[:, 0] / asked} | figures
 
 

@@ -149,17 +149,17 @@ def last_line(text):
     ("accident", "status", "line"),
     [
         slowly("kill", -signal.SIGKILL, None),
-        ("interrupt", 130, f"collect.py: interrupted; 5 of 8 episodes of {ID!r} are kept"),
+        ("interrupt", 130, f"arc-suite collect: interrupted; 5 of 8 episodes of {ID!r} are kept"),
         (
             "nan",
             1,
-            "collect.py: policy 'own:nan': episode of seed 5, step 2: action[0]: "
+            "arc-suite collect: policy 'own:nan': episode of seed 5, step 2: action[0]: "
             f"expected a number from -1 to 1, got nan; 5 of 8 episodes of {ID!r} are kept",
         ),
         (
             "short",
             1,
-            "collect.py: policy 'own:short': episode of seed 5, step 2: action: expected shape (18,), got (3,); "
+            "arc-suite collect: policy 'own:short': episode of seed 5, step 2: action: expected shape (18,), got (3,); "
             f"5 of 8 episodes of {ID!r} are kept",
         ),
     ],
@@ -191,7 +191,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
     done = run(*few, preexec_fn=full)
     assert done.returncode == 1
     line = last_line(done.stderr)
-    assert line.startswith("collect.py: cannot write ")
+    assert line.startswith("arc-suite collect: cannot write ")
     assert "file too large" in line
     kept = len(digests())
     assert line.endswith(f"; {kept} of 8 episodes of {ID!r} are kept")

@@ -217,9 +217,13 @@ def test_calls_and_attributes_of_rows_are_those_of_single_environments():
     batch.set_attr("note", "all")
     assert batch.note == "all"
     for values in ([1, 2, 3], [1, 1]):
-        with pytest.raises(ValueError, match="^set_attr 'note': rows share it; expected one value for all, got"):
+        with pytest.raises(
+            ValueError, match="^set_attr 'note': environments share it; expected one value for all, got"
+        ):
             batch.set_attr("note", values)
-    with pytest.raises(ValueError, match="^call 'step': rows do it together; call step of the environment itself$"):
+    with pytest.raises(
+        ValueError, match="^call 'step': environments do it together; call step of the environment itself$"
+    ):
         batch.call("step", np.zeros((3, 18)))
     with pytest.raises(AttributeError, match="nothing"):
         batch.get_attr("nothing")

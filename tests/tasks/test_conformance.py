@@ -173,7 +173,8 @@ CALM = [pair for pair in arc_suite.ALL_TASKS if "kicks" not in TASKS[pair[1]].mo
     tiers(CALM, never, lambda domain, task: domain == "tick" and task in ("walk", "stairs", "navigate")),
 )
 def test_episode_is_1000_steps_of_50_ms(domain, task):
-    environment = load(domain, task, healthy_range=(-10.0, 10.0))
+    unhurt = {"healthy_range": (-10.0, 10.0)} if task == "walk" else {}
+    environment = load(domain, task, **unhurt)
     timestep, length = environment.reset(), 0
     action = np.zeros(JOINTS[domain])
     while not timestep.last():
