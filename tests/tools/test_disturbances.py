@@ -26,10 +26,10 @@ def test_a_table_of_every_modifier():
         "motor_strength 0.25",
         "friction 0.2",
         "mass 2.5",
-        "limp 0",
-        "limp 2",
+        "actuator_failure 0",
+        "actuator_failure 2",
     } <= figures.keys()
-    assert "limp 3" not in figures, "the right side is mirrored"
+    assert "actuator_failure 3" not in figures, "the right side is mirrored"
     assert figures["none"][0] > figures["motor_strength 0.25"][0]
     assert not any(fell for _, fell in figures.values())
 
