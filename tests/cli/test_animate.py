@@ -35,6 +35,7 @@ def test_both_files_and_a_row_for_each_clip(tmp_path):
     assert (tmp_path / "tick.glb").read_bytes() == data
 
 
+@pytest.mark.slow
 def test_any_body_as_rigid_parts(tmp_path):
     flags = ("--legs=4", "--links=2", "--rig=nodes", "--root_motion=moving", "--clips=walk", "-o", "walker.glb")
     done = animate(*flags, cwd=tmp_path)
@@ -52,12 +53,13 @@ def test_any_body_as_rigid_parts(tmp_path):
         (("-o", "a.glb", "--root_motion=none"), "unknown root_motion 'none'"),
         (("-o", "a.glb", "--clips=walk,run"), "unknown clip 'run'"),
         (("-o", "a.glb", "--robot=all"), "--robot=all: expected one robot"),
-        (("-o", "a.glb", "--robot=tick", "--clips=walk", "--policy=zero"), "tick, clip walk: the pose does not return"),
+        pytest.param(
+            ("-o", "a.glb", "--robot=tick", "--clips=walk", "--policy=zero"),
+            "tick, clip walk: the pose does not return",
+            marks=pytest.mark.slow,
+        ),
         (
-            (
-                "-o",
-                "nowhere/a.glb",
-            ),
+            ("-o", "nowhere/a.glb"),
             "cannot write nowhere/a.glb: no such file or directory",
         ),
     ],

@@ -6,6 +6,7 @@ import pathlib
 import subprocess
 import sys
 
+import programs
 import pytest
 
 from arc_suite import versions
@@ -52,8 +53,7 @@ def test_it_goes_on_where_nobody_reads_on():
 
 
 def test_a_wrong_flag_is_one_line():
-    command = [sys.executable, "-m", "arc_suite", "doctor", "--verbose=1"]
-    done = subprocess.run(command, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    done = programs.arc_suite("doctor", "--verbose=1")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert done.stderr.startswith("arc-suite doctor: Unknown command line flag 'verbose'")
 

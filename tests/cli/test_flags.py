@@ -1,13 +1,12 @@
 """Every program takes any body, any task and its settings; every face of the suite takes any body."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 from programs import arc_suite as arc_suite_program
+from programs import run
 
 import arc_suite
 from arc_suite.cpg.selection import preset_names
@@ -85,7 +84,7 @@ def test_bad_tasks_and_settings_are_one_line(program, arguments, message, tmp_pa
     assert not (tmp_path / "a.png").exists()
 
 
-def test_settings_are_json_where_they_parse():
+def test_settings_are_json_where_they_parse(tmp_path):
     code = """
 import sys
 from absl import flags
@@ -95,8 +94,9 @@ flags.FLAGS(["program", *sys.argv[1:]])
 print(task())
 """
     settings = ["a=1", "b=2.5", "c=ripple", 'd="ripple"', 'e={"x": [1, null]}', "f=x=y", "g=", "a=true", "h=Infinity"]
-    command = [sys.executable, "-c", code, *(f"--set={setting}" for setting in settings)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    program = tmp_path / "program.py"
+    program.write_text(code)
+    done = run(program, *(f"--set={setting}" for setting in settings))
     expected = {"a": True, "b": 2.5, "c": "ripple", "d": "ripple", "e": {"x": [1, None]}, "f": "x=y", "g": ""}
     assert done.stdout == f"{('walk', expected | {'h': float('inf')})}\n"
 

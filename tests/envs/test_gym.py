@@ -62,6 +62,7 @@ def test_ids_are_those_of_the_suite():
     assert set(IDS) <= set(registered)
 
 
+@pytest.mark.slow
 def test_import_registers_lazily_and_in_silence_however_often():
     code = (
         "import sys, importlib, arc_suite; importlib.reload(arc_suite); importlib.reload(arc_suite.registration);"

@@ -21,8 +21,8 @@ from arc_suite.robots.generator import random_body
 from arc_suite.simulation.model import compiled
 
 PRESETS = [(robot, preset) for robot in ROBOTS for preset in ("slow", "medium", "fast", "tuned")]
-# Clips of one robot are recorded in the fast tests, which share them.
-EACH = tiers(ROBOTS, lambda robot: robot == "tick", lambda robot: robot == "bastion")
+# Tests share the clips of a robot. `make check` has one walk alone.
+EACH = tiers(ROBOTS, never, lambda robot: robot in ("tick", "bastion"))
 NAMES = ("walk", "turn_left", "stop", "idle")
 
 
@@ -74,7 +74,12 @@ def assert_kinematics(body, file, clips):
                 assert abs(matrices[:, :3, :3] - turns).max() < 1e-5
 
 
-@pytest.mark.parametrize("rig", tiers(export.RIGS, lambda rig: rig == "skin"))
+def test_the_bytes_of_a_walk_hold_its_kinematics():
+    clips = export.clips(Setup.of("tick"), ["walk"], fps=20)
+    assert_kinematics(ROBOTS["tick"], gltf_reader.read(export.glb(ROBOTS["tick"], clips)), clips)
+
+
+@pytest.mark.parametrize("rig", export.RIGS)
 @pytest.mark.parametrize("robot", EACH)
 def test_the_bytes_hold_the_kinematics(robot, rig):
     assert_kinematics(ROBOTS[robot], read(robot, rig), made(robot).values())
@@ -160,6 +165,7 @@ def test_colours_are_linear_and_what_glows_is_emissive():
     assert materials["glow"]["emissiveFactor"][0] == pytest.approx(0.7)
 
 
+@pytest.mark.slow
 def test_root_motion_is_chosen():
     clips = list(made("tick").values())
     for root_motion, names in (("moving", ["walk_loop"]), ("in_place", ["walk_in_place_loop"])):
@@ -192,6 +198,7 @@ def test_the_root_goes_as_fast_as_is_told(robot):
         assert root[:, 1, 3].tolist() == [0.0] * len(root)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "sign"), [("turn_left", 1.0), pytest.param("turn_right", -1.0, marks=pytest.mark.slow)]
 )
@@ -329,8 +336,12 @@ SHORT = Setup.of("tick", "walk", {"time_limit": 1.0})
         ({"names": ["wlak"]}, "unknown clip 'wlak'; did you mean 'walk'?"),
         ({"names": ["walk", "walk"]}, "clips: expected each once"),
         ({"names": ["walk"], "fps": 0.0}, "fps: expected a number from 1 to 1000"),
-        ({"names": ["walk"], "policy": "zero"}, "tick, clip walk: the pose does not return within"),
-        ({"names": ["walk"], "policy": "random"}, "tick, clip walk: "),
+        pytest.param(
+            {"names": ["walk"], "policy": "zero"},
+            "tick, clip walk: the pose does not return within",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param({"names": ["walk"], "policy": "random"}, "tick, clip walk: ", marks=pytest.mark.slow),
         (
             {"names": ["walk"], "setup": Setup.of("tick", "walk", {"time_limit": 1.0})},
             "tick, clip walk: the episode ends after 20",

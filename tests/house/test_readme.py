@@ -7,6 +7,7 @@ import shlex
 import programs
 import pytest
 import test_layers
+from tiers import tiers
 
 import arc_suite
 from arc_suite import data
@@ -21,7 +22,7 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROO
 # Pages whose code needs files or packages of its own; tests of their own run it.
 ELSEWHERE = ("adding_a_robot", "adding_a_task", "adding_an_algorithm", "clients", "modifiers", "study")
 BLOCKS = [
-    pytest.param(block, id=f"{page.stem}{place}")
+    pytest.param(block, id=f"{page.stem}{place}", marks=() if page.stem == "README" else pytest.mark.slow)
     for page in PAGES
     if page.stem not in ELSEWHERE
     for place, block in enumerate(re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL))
@@ -63,7 +64,7 @@ def test_code(block, dataset, monkeypatch):
     exec(compile(block, "page.md", "exec"), {})
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("command", tiers(COMMANDS, lambda command: command in " ".join(README.split())))
 def test_a_command_is_understood(command):
     """Programs accept the flags and their values; tests of the programs run them."""
     program, *arguments = shlex.split(command)

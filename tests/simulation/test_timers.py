@@ -146,9 +146,8 @@ print(before is not None, physics.data.ptr.timer[int(mujoco.mjtTimer.mjTIMER_STE
 """
 
 
-@pytest.mark.parametrize(
-    ("reachable", "told"), [(True, "True False"), pytest.param(False, "False True", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("reachable", "told"), [(True, "True False"), (False, "False True")])
 def test_import_changes_nothing_and_without_the_symbol_all_works(reachable, told):
     environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "disable"}
     command = [sys.executable, "-c", SCRIPT.format(reachable=reachable)]

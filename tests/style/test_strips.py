@@ -34,6 +34,7 @@ def test_frames_are_at_equal_phases(robot, length):
     assert round(turn * found[0]) == strips.SETTLED or found[-1] + round(1.0 / turn) > length
 
 
+@pytest.mark.slow
 def test_a_strip_shows_the_walk_at_its_ticks(tmp_path):
     environment, walker = load("tick", "walk"), Demonstrator("tick")
     picture = strips.strip(environment, walker, seed=3)

@@ -94,7 +94,7 @@ def test_a_modified_task_conforms(case, task_name, body):
 
 
 @pytest.mark.parametrize("task_name", ["walk", "steer", "stairs", "shoved"])
-@every_body
+@pytest.mark.parametrize("body", tiers(BODIES, lambda body: body == "spider"))
 def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
     """And what they draw, they draw after all that the task draws."""
     neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0, "kicks": 0}

@@ -53,7 +53,9 @@ def told(task, settings):
     return np.concatenate(found)
 
 
-@pytest.mark.parametrize(("task", "name"), tiers(PAIRS, lambda task, name: task == "rough"))
+@pytest.mark.parametrize(
+    ("task", "name"), tiers(PAIRS, lambda task, name: task == "rough" and name in ("gait", "level", "weights"))
+)
 def test_every_setting_changes_something(task, name):
     given = WITH.get(name, {})
     plain, changed = told(task, given), told(task, given | {name: OTHER[name]})
