@@ -49,9 +49,7 @@ def test_labels_are_positions_where_actions_are(begun):
     one, other = torques.until(80).checkpoint, positions.until(80).checkpoint
     first = other["observations"][0]
     assert_array_equal(first, one["observations"][0])
-    expected = positions.task.definition.positions(
-        one["labels"][0].astype(float), first[:, 5:17], first[:, 17 + 6 : 17 + 18]
-    )
+    expected = positions.task.positions(one["labels"][0].astype(float), first[:, 5:17], first[:, 17 + 6 : 17 + 18])
     assert_allclose(other["labels"][0], expected, atol=1e-4)
     assert abs(other["labels"][0] - one["labels"][0]).max() > 0.1
 
