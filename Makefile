@@ -10,7 +10,7 @@
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
-# make check-agents  learners, ONNX and statistics beside their oracles, in the environment of check-jax
+# make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
@@ -34,7 +34,7 @@ demo: $(INSTALLED)
 	$(VENV)/bin/arc-suite render --robot queen --policy cpg --output out/queen.png
 	$(VENV)/bin/arc-suite render --robot queen --policy cpg --output out/queen.mp4
 
-# Tests run in as many processes as there are cores; whoever has none left takes some from the others.
+# Tests run in as many processes as there are cores. An idle process takes tests from the others.
 PARALLEL := -n auto --dist worksteal
 
 test: $(INSTALLED)

@@ -29,7 +29,7 @@ def folder(path: str | os.PathLike) -> Path:
 def writing(path: str | os.PathLike) -> Iterator[Path]:
     """Write a file atomically: `with writing("a.png") as temporary: save(temporary)`.
 
-    The temporary file lies beside the target and has its extension; it takes the target's place
+    The temporary file lies in the target's folder and has its extension; it takes the target's place
     when the block ends, unless the block has deleted it, and is deleted if the block raises. Open
     the block before any long work: what cannot be written is found out at once.
 
@@ -65,7 +65,7 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
 
 
 def delete_unfinished(path: str | os.PathLike) -> None:
-    """Delete what killed processes have left beside a file in `writing` it; none may be writing it now."""
+    """Delete temporary files that killed processes left in `writing` a file; no process may be writing it."""
     target = Path(path)
     for temporary in target.parent.glob(f".{target.stem[:32]}.*{target.suffix}"):
         temporary.unlink()

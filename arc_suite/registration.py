@@ -49,8 +49,8 @@ def register(
         arenas: functions by name, from a body to the `Arena` that suits it.
 
     Raises:
-        ValueError: a name that is taken, or parameters or a preset that do not fit the body; one line,
-            and nothing has been registered.
+        ValueError: a name that is taken, or parameters or a preset that do not fit the body;
+            nothing has been registered.
     """
     module = None if module == "__main__" else module
     tasks, arenas = {_task_name(task): task for task in tasks}, dict(arenas or {})

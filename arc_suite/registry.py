@@ -16,7 +16,7 @@ MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose im
 
 
 class NotImported(ValueError):
-    """A file names a module that has not been imported; one line."""
+    """A file names a module that has not been imported."""
 
 
 def tasks_by_domain() -> dict[str, tuple[str, ...]]:
@@ -37,8 +37,8 @@ def body_of(domain) -> Body:
             in .json), the text of such a file, or the body itself.
 
     Raises:
-        ValueError: an unknown name, or a file that holds no body; one line.
-        OSError: the file cannot be read; one line.
+        ValueError: an unknown name, or a file that holds no body.
+        OSError: the file cannot be read.
     """
     if isinstance(domain, Body):
         return domain
@@ -53,7 +53,7 @@ def task_of(name: str) -> type[Task]:
     """Return the task of a name; see `arc_suite.load`.
 
     Raises:
-        ValueError: an unknown name; one line.
+        ValueError: an unknown name.
     """
     return _find(name, TASKS, "task")
 
@@ -62,7 +62,7 @@ def arena_of(arena: str | Arena, body: Body) -> Arena:
     """Return the arena of a name, made to suit a body, or the arena itself.
 
     Raises:
-        ValueError: an unknown name; one line.
+        ValueError: an unknown name.
     """
     return arena if isinstance(arena, Arena) else arena_maker(arena)(body)
 
@@ -71,7 +71,7 @@ def arena_maker(name: str) -> Callable[[Body], Arena]:
     """Return the function that makes the arena of a name suit a body.
 
     Raises:
-        ValueError: an unknown name; one line.
+        ValueError: an unknown name.
     """
     return _find(name, ARENAS, "arena")
 
@@ -82,7 +82,7 @@ def imported(kind: str, name: str) -> str:
     Files are data: their names are looked up among the registered ones, and only callers choose what to import.
 
     Raises:
-        NotImported: the name's module has not been imported yet; one line that names it.
+        NotImported: the name's module has not been imported yet.
     """
     module, colon, _ = name.rpartition(":")
     if colon and module not in sys.modules:

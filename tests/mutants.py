@@ -235,7 +235,7 @@ def place(mutant: Mutant) -> pathlib.Path:
     """Return the one file of the package that holds a mutant's text once, as a path in the project.
 
     Raises:
-        ValueError: there is none, or the text is there more often; one line.
+        ValueError: there is none, or the text is there more often.
     """
     counts = {path: path.read_text().count(mutant.old) for path in sorted((ROOT / "arc_suite").rglob("*.py"))}
     found = [str(path.relative_to(ROOT)) for path, count in counts.items() for _ in range(count)]

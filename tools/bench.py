@@ -1,4 +1,4 @@
-"""Measures how fast control steps are, beside plain MuJoCo and beside Gymnasium's ordinary environments.
+"""Measures how fast control steps are, against plain MuJoCo and Gymnasium's ordinary environments.
 
 Prints tables and writes all measurements and a plot. Takes minutes; on a busy machine the figures
 are worth nothing.
@@ -29,7 +29,7 @@ flags.DEFINE_integer("steps", 60, "Control steps of one turn; a third of it wher
 flags.DEFINE_string("json", "out/bench.json", "Where to write all measurements.")
 flags.DEFINE_string("plot", "out/bench.png", "Where to write the plot.")
 flags.DEFINE_string("document", None, "A Markdown file between whose <!-- benchmark --> marks to put the tables.")
-flags.DEFINE_bool("tasks", False, "Measure a row's step of every task beside one of walk instead.")
+flags.DEFINE_bool("tasks", False, "Measure a step of every task against one of walk instead.")
 flags.DEFINE_integer("collect", None, "Measure the collecting of so many episodes instead.", lower_bound=1)
 
 

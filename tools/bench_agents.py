@@ -1,4 +1,4 @@
-"""Measures how fast soft actor-critic learns on one core, beside what the processor could do at most.
+"""Measures how fast soft actor-critic learns on one core, against what the processor could do at most.
 
   python tools/bench_agents.py
   python tools/bench_agents.py --updates 300
@@ -6,7 +6,7 @@
 Updates are counted per second of processor time of one thread, with the sizes of Queen. The limit is the rate of
 products of matrices 256 x 256 in float32, measured before and after in the same run, over the products that an
 update needs: those of the plain algorithm, without what is saved by computing some of them once. A plain loop in
-PyTorch, of the same full update, stands beside it where torch is installed.
+It times the same full update in PyTorch, where torch is installed.
 """
 
 from absl import flags

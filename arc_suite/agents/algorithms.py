@@ -32,7 +32,7 @@ class Algorithm(NamedTuple):
         """The module that learns.
 
         Raises:
-            ValueError: a package is not installed; one line.
+            ValueError: a package is not installed.
         """
         try:
             return importlib.import_module(self.learner)
@@ -45,7 +45,7 @@ class Algorithm(NamedTuple):
         """Return the algorithm with some hyperparameters changed.
 
         Raises:
-            ValueError: no such hyperparameter, or a value of another type; one line.
+            ValueError: no such hyperparameter, or a value of another type.
         """
         fields = dataclasses.asdict(self.hyperparameters)
         for name, value in changes.items():
@@ -122,7 +122,7 @@ def algorithm(name: str) -> Algorithm:
     """Return the algorithm of a name, or of `module:attribute`, an `Algorithm` on Python's path.
 
     Raises:
-        ValueError: there is none; one line.
+        ValueError: there is none.
     """
     if isinstance(name, str) and ":" in name:
         found = checks.imported(name, "algorithm")

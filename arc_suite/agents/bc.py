@@ -24,7 +24,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
     """Learn; see `arc_suite.agents`.
 
     Raises:
-        ValueError: no dataset, or one that does not fit; one line.
+        ValueError: no dataset, or one that does not fit.
     """
     if context.prior is None:
         raise ValueError("prior: the algorithm takes prior data, the id of a dataset, got None")

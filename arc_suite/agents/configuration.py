@@ -52,7 +52,7 @@ class Configuration:
         """Return a configuration with the algorithm's defaults for all that is not given.
 
         Raises:
-            ValueError: an unknown algorithm or hyperparameter, or a value out of its range; one line.
+            ValueError: an unknown algorithm or hyperparameter, or a value out of its range.
         """
         definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters or {})
         steps = definition.steps if steps is None else steps
@@ -88,7 +88,7 @@ class Configuration:
             fields: those of `to_dict` or `record`; all but `robot` have defaults.
 
         Raises:
-            ValueError: an unknown field, or a value that does not fit; one line.
+            ValueError: an unknown field, or a value that does not fit.
             OSError: the file of a body cannot be read.
         """
         own = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior")
@@ -104,7 +104,7 @@ class Configuration:
         """Return, JSON-able, `to_dict` with hashes and versions of all that computes.
 
         Raises:
-            ValueError: a setting of the task that does not fit; one line.
+            ValueError: a setting of the task that does not fit.
         """
         provenance = self.setup.provenance()
         packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
@@ -116,7 +116,7 @@ def read(path: Path) -> Configuration:
     """Return the configuration in a JSON file, such as `config.json` of a run's folder.
 
     Raises:
-        ValueError: no configuration; one line.
+        ValueError: no configuration.
         OSError: the file cannot be read.
     """
     try:

@@ -43,7 +43,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
     """Learn; see `arc_suite.agents`.
 
     Raises:
-        ValueError: the body has no such preset, or the run is too short to learn; one line.
+        ValueError: the body has no such preset, or the run is too short to learn.
     """
     environment = context.environment(hp.num_envs)
     task, joints = environment.task.definition, environment.single_action_space.shape[0]

@@ -54,7 +54,7 @@ class SoftActorCritic:
     improvement: float = 0.001
 
     def __post_init__(self):
-        """Raise ValueError, one line, for a value out of its range."""
+        """Raise ValueError for a value out of its range."""
         least = {"hidden": 1, "batch": 1, "buffer_size": 1, "utd_ratio": 1, "start_steps": 0, "phase_every": 1}
         _check(self, least | {"phase_updates": 0, "scored_batches": 1, "check_every": 1, "patience": 1})
         _check_shares(self, "learning_rate", "discount", "tau", "held_out", "improvement")
@@ -98,7 +98,7 @@ class DAgger:
     learning_rate: float = 1e-3
 
     def __post_init__(self):
-        """Raise ValueError, one line, for a value out of its range."""
+        """Raise ValueError for a value out of its range."""
         least = {"num_envs": 2, "left_out": 0, "round": 1, "updates": 1, "last_updates": 1, "batch": 1, "hidden": 1}
         _check(self, least)
         checks.number("noise", self.noise, 0.0, 10.0)
@@ -120,7 +120,7 @@ class BehaviourCloning:
     learning_rate: float = 1e-3
 
     def __post_init__(self):
-        """Raise ValueError, one line, for a value out of its range."""
+        """Raise ValueError for a value out of its range."""
         _check(self, {"batch": 1, "hidden": 1})
         _check_shares(self, "learning_rate")
 
@@ -174,7 +174,7 @@ class ProximalPolicy:
     hidden: int = 256
 
     def __post_init__(self):
-        """Raise ValueError, one line, for a value out of its range."""
+        """Raise ValueError for a value out of its range."""
         _check(self, {"num_envs": 1, "horizon": 1, "epochs": 1, "minibatch": 1, "hidden": 1, "value_warm_up": 0})
         _check_shares(self, "discount", "gae_lambda", "clip", "normalize_until", "policy_rate", "value_rate")
         for name in ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm"):

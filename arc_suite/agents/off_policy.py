@@ -1,6 +1,6 @@
 """Soft actor-critic from a replay buffer: the algorithms of the ARC-RL paper, which differ in hyperparameters alone.
 
-An environment step acts, stores the transition and makes `utd_ratio` updates, the last of which moves the policy
+An environment step acts, stores the transition and makes `utd_ratio` updates; the last one moves the policy
 too. Stabilisation phases follow every `phase_every`-th step: updates of the critics alone, on the buffer as it
 stands. With early stopping a phase holds out a share of the buffer and ends by the loss on it.
 """
@@ -57,9 +57,9 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
     """Learn; see `arc_suite.agents`.
 
     Raises:
-        ValueError: prior data are missing, not taken by the algorithm, or do not fit; one line.
-        OSError: the disk is too small for the buffer; one line.
-        Diverged: an action is not finite; one line.
+        ValueError: prior data are missing, not taken by the algorithm, or do not fit.
+        OSError: the disk is too small for the buffer.
+        Diverged: an action is not finite.
     """
     if (context.prior is None) != (hp.prior == "none"):
         expected = "no prior data" if hp.prior == "none" else "prior data, the id of a dataset"

@@ -27,9 +27,9 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
     Raises:
         ValueError: no policy to start from, where the hyperparameters need one, or a policy of another robot or
-            task, or with other layers; one line.
-        OSError: no such file; one line.
-        Diverged: an action is not finite; one line.
+            task, or with other layers.
+        OSError: no such file.
+        Diverged: an action is not finite.
     """
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
@@ -112,7 +112,7 @@ def roll_out(
         The transitions, arrays (horizon, num_envs, ...) by name, and the observations after them.
 
     Raises:
-        Diverged: an action is not finite; one line.
+        Diverged: an action is not finite.
     """
     names = "observations", "actions", "means", "rewards", "terminated", "ended", "next_observations"
     rollout = {name: [] for name in names}

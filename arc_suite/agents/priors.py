@@ -20,7 +20,7 @@ def digest(prior: str) -> str:
     """Return the sha256 of the content of a dataset.
 
     Raises:
-        ValueError: no such dataset, or one that is damaged; one line.
+        ValueError: no such dataset, or one that is damaged.
     """
     return _digest(_opened(prior).summaries())
 
@@ -29,8 +29,8 @@ def mapped(context: RunContext, task: Task) -> Replay:
     """Return the prior data of a run; its files are written from the dataset first, where they are missing.
 
     Raises:
-        ValueError: no such dataset, one that is damaged, or of another body or task; one line.
-        OSError: the disk is full, or the like; one line.
+        ValueError: no such dataset, one that is damaged, or of another body or task.
+        OSError: the disk is full, or the like.
     """
     dataset = _opened(context.prior)
     found, setup = dataset.settings.setup, context.setup

@@ -57,7 +57,7 @@ class Replay:
             mode: "r+", or "r" to only read existing files.
 
         Raises:
-            OSError: the disk is full, or the like; one line.
+            OSError: the disk is full, or the like.
         """
         self._folder, self._capacity, self._size, self._mode = files.folder(folder), capacity, size, mode
         self._slots = capacity + slack + 1  # one more for the observation that comes next

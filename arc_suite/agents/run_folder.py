@@ -100,8 +100,8 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
         config: record of the configuration, plain values.
 
     Raises:
-        ValueError: the folder is of another run or of none, or damaged, or another process writes to it; one line.
-        OSError: it cannot be read or written; one line.
+        ValueError: the folder is of another run or of none, or damaged, or another process writes to it.
+        OSError: it cannot be read or written.
     """
     path = files.folder(path)
     with contextlib.ExitStack() as stack:
@@ -117,7 +117,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
     """Return the record of the configuration in a run's folder.
 
     Raises:
-        ValueError: no folder of a run; one line.
+        ValueError: no folder of a run.
     """
     try:
         config = json.loads((Path(path) / CONFIG).read_text())
@@ -132,7 +132,7 @@ def progress_of(path: str | os.PathLike) -> dict[str, Any]:
     """Return the progress of the latest checkpoint; empty without a checkpoint.
 
     Raises:
-        ValueError: the checkpoint is damaged; one line.
+        ValueError: the checkpoint is damaged.
     """
     return _checkpoint(Path(path) / CHECKPOINT, with_arrays=False)[1]
 
@@ -151,7 +151,7 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
         left_out: names in it that may differ.
 
     Raises:
-        ValueError: the folder is of another run, or of none; one line.
+        ValueError: the folder is of another run, or of none.
     """
     for name, there, here in _differences(config_of(path), json.loads(json.dumps(config))):
         if name.partition(".")[0] not in left_out:
@@ -166,7 +166,7 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     A line that is still being written is left out.
 
     Raises:
-        ValueError: a damaged table; one line.
+        ValueError: a damaged table.
     """
     path = Path(path) / f"{name}.csv"
     try:

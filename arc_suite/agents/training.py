@@ -44,7 +44,7 @@ def train(
         Whether the run is finished.
 
     Raises:
-        ValueError: a part of the run that does not fit, the folder of another run, or a damaged one; one line.
+        ValueError: a part of the run that does not fit, the folder of another run, or a damaged one.
         Diverged: a value of the learner is not finite; the checkpoint before stays.
         OSError: the disk is full, or the like; the checkpoint before stays.
     """

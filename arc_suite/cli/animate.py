@@ -46,10 +46,10 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
     checks.extension(FLAGS.output, [".glb"])
-    beside = Path(FLAGS.output).with_suffix(".json")
-    if FLAGS.spec is not None and beside.resolve() == Path(FLAGS.spec).resolve():
-        raise ValueError(f"--output={FLAGS.output}: {beside}, which is written too, is the spec; take another name")
-    with files.writing(FLAGS.output) as temporary, files.writing_json(beside) as metrics:
+    sidecar = Path(FLAGS.output).with_suffix(".json")
+    if FLAGS.spec is not None and sidecar.resolve() == Path(FLAGS.spec).resolve():
+        raise ValueError(f"--output={FLAGS.output}: {sidecar}, which is written too, is the spec; take another name")
+    with files.writing(FLAGS.output) as temporary, files.writing_json(sidecar) as metrics:
         clips = export.clips(
             setup,
             FLAGS.clips,
@@ -61,7 +61,7 @@ def main() -> None:
         temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
         metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)
-    print(f"wrote {FLAGS.output} and {beside}")
+    print(f"wrote {FLAGS.output} and {sidecar}")
 
 
 def print_table(clips: list[export.Clip]) -> None:

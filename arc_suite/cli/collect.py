@@ -103,7 +103,7 @@ def chosen() -> tuple[str, str]:
     """Return the policy and its label in the dataset's id, "" for the policy's name.
 
     Raises:
-        ValueError: --checkpoint and --quality together, or a run without such a checkpoint; one line.
+        ValueError: --checkpoint and --quality together, or a run without such a checkpoint.
     """
     if FLAGS.checkpoint is None and FLAGS.quality is None:
         return FLAGS.policy, ""

@@ -39,7 +39,7 @@ def findings() -> Iterator[Finding]:
     """Examine everything, one thing after the other."""
     yield Finding("system", f"{platform.platform()}, Python {platform.python_version()}")
     yield from _packages()
-    yield Finding("cores", f"{os.cpu_count()}, of which vector environments use {usable_cores()}")
+    yield Finding("cores", f"{os.cpu_count()}; vector environments use {usable_cores()}")
     display = "a display" if opengl.has_display() else "no display"
     yield Finding("MUJOCO_GL", f"{os.environ.get('MUJOCO_GL', 'not set')}, {display}")
     yield _picture()

@@ -127,7 +127,7 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
         seconds: that a frame lasts.
 
     Raises:
-        ValueError: imageio-ffmpeg is not installed; one line.
+        ValueError: imageio-ffmpeg is not installed.
     """
     try:
         import imageio_ffmpeg  # noqa: F401

@@ -41,8 +41,8 @@ def made_body() -> Body | None:
     """Return the body that --spec or --legs ask for, or None.
 
     Raises:
-        ValueError: both are given, or --links without --legs, or no body in the file; one line.
-        OSError: the file cannot be read; one line.
+        ValueError: both are given, or --links without --legs, or no body in the file.
+        OSError: the file cannot be read.
     """
     if FLAGS.spec is not None and FLAGS.legs is not None:
         raise ValueError("expected one of --spec and --legs, got both")
@@ -59,7 +59,7 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     A robot of another package is named `module:name`, and its module imported.
 
     Raises:
-        ValueError: as `made_body`, or an unknown robot, or a robot and a body; one line.
+        ValueError: as `made_body`, or an unknown robot, or a robot and a body.
         OSError: as `made_body`.
     """
     body = made_body()
@@ -78,7 +78,7 @@ def only_body(robot: flags.FlagHolder) -> Body:
     """Return the body of a program that takes one alone; see `bodies`.
 
     Raises:
-        ValueError: as `bodies`, or "all"; one line.
+        ValueError: as `bodies`, or "all".
         OSError: as `bodies`.
     """
     body, *others = bodies(robot).values()
@@ -91,7 +91,7 @@ def setups(robot: flags.FlagHolder) -> dict[str, Setup]:
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
     Raises:
-        ValueError: as `bodies` and `task`; one line.
+        ValueError: as `bodies` and `task`.
         OSError: as `bodies`.
     """
     return {name: Setup.of(body, *task()) for name, body in bodies(robot).items()}
@@ -108,7 +108,7 @@ def task() -> tuple[str, dict[str, Any]]:
     The modules that the flags name are imported. What settings a task has is checked where an environment is opened.
 
     Raises:
-        ValueError: an unknown task, a setting without a value, or `random`; one line.
+        ValueError: an unknown task, a setting without a value, or `random`.
     """
     registry.task_of(FLAGS.task)
     settings = named_values("set", FLAGS["set"].value)
@@ -125,7 +125,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
     """Return what texts name=value of a flag say; values are JSON where they parse, else text.
 
     Raises:
-        ValueError: a text without a name or a value; one line.
+        ValueError: a text without a name or a value.
     """
     found = {}
     for text in texts:

@@ -68,7 +68,7 @@ def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
     """Submit the study to a cluster in so many jobs, and print them.
 
     Raises:
-        ValueError: submitit is not installed; one line.
+        ValueError: submitit is not installed.
     """
     try:
         from arc_suite.studies import cluster
@@ -85,7 +85,7 @@ def shard(text: str) -> tuple[int, int]:
     """Return i and n of the text i/n.
 
     Raises:
-        ValueError: it is no such text, or i is not below n; one line.
+        ValueError: it is no such text, or i is not below n.
     """
     part, _, parts = text.partition("/")
     if not (part.isdecimal() and parts.isdecimal() and int(part) < int(parts)):

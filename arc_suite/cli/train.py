@@ -79,8 +79,8 @@ def configured() -> Configuration:
     """Return the configuration that the flags give.
 
     Raises:
-        ValueError: a flag that does not fit; one line.
-        OSError: a file that cannot be read; one line.
+        ValueError: a flag that does not fit.
+        OSError: a file that cannot be read.
     """
     if FLAGS.config is not None:
         for name in (*_OF_THE_RUN, "evaluate_every"):
@@ -121,7 +121,7 @@ def events(folder: Path) -> Iterator[Callable]:
     """Yield a listener that writes metrics for TensorBoard.
 
     Raises:
-        ValueError: tensorboardX is not installed; one line.
+        ValueError: tensorboardX is not installed.
     """
     try:
         from tensorboardX import SummaryWriter

@@ -35,7 +35,7 @@ for name, least, most, what in (
     ("generations", 1, None, "Generations of the search, more make a finished one go on"),
     ("episodes", 1, None, "Episodes by which a candidate is evaluated"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
-    ("starts", 0, None, f"Starts, of which candidates are tried in the {HARD} hardest; 0 for none"),
+    ("starts", 0, None, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
 ):
     usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
     flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)

@@ -73,7 +73,7 @@ class Balanced(Commanded):
         """Fit the law to a task; see `Commanded`.
 
         Raises:
-            ValueError: `feet` is for another number of ranks of legs; one line.
+            ValueError: `feet` is for another number of ranks of legs.
         """
         body = task.scene.body
         if len(parameters.feet) != (ranks := max(body.ranks) + 1):

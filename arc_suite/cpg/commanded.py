@@ -81,7 +81,7 @@ class Commanded(ABC):
             angles: (joints,) of the pose about which joints are controlled, rad; None for the standing pose.
 
         Raises:
-            ValueError: a gait without a cycle, or without stance or swing; one line.
+            ValueError: a gait without a cycle, or without stance or swing.
         """
         gait, self.parameters, self.body = gait_of(task), parameters, sized(task.scene.body)
         self.pose, self.step = standing(self.body, angles), task.scene.control_timestep

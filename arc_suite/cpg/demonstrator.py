@@ -49,8 +49,7 @@ class Demonstrator:
 
         Raises:
             ValueError: an unknown name, a value out of range, a preset that does not fit, or a body that
-                cannot walk by any preset, as its feet hang far above the floor; one line that names it and
-                the nearest valid one.
+                cannot walk by any preset, as its feet hang far above the floor.
         """
         body, task = _resolved(task)
         presets = presets_of(body)
@@ -82,7 +81,7 @@ class Demonstrator:
             (environments, joints) in [-1, 1], or (joints,).
 
         Raises:
-            ValueError: not named blocks, those of another body, or a block is missing; one line.
+            ValueError: not named blocks, those of another body, or a block is missing.
         """
         blocks = checked(observation, self._law.reads, len(self._body.joint_names), len(self._body.part_names))
         alone = blocks["posture"].ndim == 1

@@ -33,7 +33,7 @@ def gait_of(task: Task) -> Gait:
     """Return the gait that a task prescribes, or that of walk with default settings where it prescribes none.
 
     Raises:
-        ValueError: a gait without a cycle, or without stance or swing; one line.
+        ValueError: a gait without a cycle, or without stance or swing.
     """
     usual = _usual(task.scene.body)
     found = task.parameters or usual

@@ -142,7 +142,7 @@ def checked(observation, names: Iterable[str], joints: int, parts: int | None = 
 
     Raises:
         ValueError: not named blocks, one is missing, or those of a body with another number of joints or
-            parts; one line.
+            parts.
     """
     if not (isinstance(observation, Mapping) and {"posture", "velocities"} <= observation.keys()):
         raise ValueError(

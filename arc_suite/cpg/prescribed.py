@@ -91,7 +91,7 @@ class Prescribed(NamedTuple):
         """Return a preset, laid out over a body's joints.
 
         Raises:
-            ValueError: it does not fit the body; one line.
+            ValueError: it does not fit the body.
         """
         legs, offsets = len(body.legs), len(preset.phase_offsets)
         if legs != offsets:
@@ -140,7 +140,7 @@ class PrescribedLaw(Clocked):
         """Fit a preset to a task.
 
         Raises:
-            ValueError: the preset does not fit the body; one line.
+            ValueError: the preset does not fit the body.
         """
         gait, control = gait_of(task), Prescribed.fit(task.scene.body, preset)
         laid = control.pattern

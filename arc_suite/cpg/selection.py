@@ -32,7 +32,7 @@ def law(task: Task, preset: Any):
     """Return the law of a preset, fitted to a task; see `cpg.law`.
 
     Raises:
-        ValueError: the preset is of no kind of `LAWS`, or does not fit; one line.
+        ValueError: the preset is of no kind of `LAWS`, or does not fit.
     """
     return _kind(preset)(task, preset)
 
@@ -49,7 +49,7 @@ def presets_of(body: Body) -> Mapping[str, Any]:
     """Return a body's presets by name: its own, and the defaults of others.
 
     Raises:
-        ValueError: a body of a robot's name that has other joints; one line.
+        ValueError: a body of a robot's name that has other joints.
     """
     own = robots.parameters(PRESETS, body, "presets") or {}
     return own | {name: preset for name, preset in DEFAULTS.items() if name not in own}
@@ -67,7 +67,7 @@ def suited_preset(task: Task) -> str:
     `steered`; then, where the task prescribes a walk, one that walks straight ahead.
 
     Raises:
-        ValueError: no preset suits the task, or as `presets_of`; one line.
+        ValueError: no preset suits the task, or as `presets_of`.
     """
     presets = presets_of(task.scene.body)
     for name in (*task.demonstrators, "steered", *(() if task.parameters is None else _AHEAD)):

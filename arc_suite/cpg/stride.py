@@ -69,7 +69,7 @@ class Stride(NamedTuple):
                 one walks backwards.
 
         Raises:
-            ValueError: the speed or the gait does not fit; one line.
+            ValueError: the speed or the gait does not fit.
         """
         if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
             raise ValueError(f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {froude!r}")

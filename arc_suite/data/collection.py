@@ -56,8 +56,8 @@ def collect(
 
     Raises:
         ValueError: settings that do not fit, a dataset that is damaged or has other settings, or a
-            policy with an invalid action; one line. Episodes finished before are kept.
-        OSError: the disk is full, or another error of writing; one line. Finished episodes are kept.
+            policy with an invalid action. Episodes finished before are kept.
+        OSError: the disk is full, or another error of writing. Finished episodes are kept.
         KeyboardInterrupt: the same.
     """
     _check(settings, episodes)

@@ -41,7 +41,7 @@ def open(dataset_id: str) -> "Dataset":
 
     Raises:
         ValueError: no such dataset, one that is damaged or not of this suite, or one that needs a module
-            which has not been imported; one line.
+            which has not been imported.
     """
     return Dataset(dataset_id, ids.find(dataset_id))
 
@@ -86,7 +86,7 @@ class Dataset:
 
         Raises:
             IndexError: there is none.
-            ValueError: it is damaged; one line.
+            ValueError: it is damaged.
         """
         index = range(len(self))[index]
         joints = len(self.settings.setup.body.joint_names)
@@ -104,7 +104,7 @@ class Dataset:
         """Return the metadata of every episode: `seed`, `length`, `return`, `sha256`, and `preset` if there is one.
 
         Raises:
-            ValueError: the file is damaged; one line.
+            ValueError: the file is damaged.
         """
         with self.reading() as file:
             return [episodes.summary(file, index) for index in range(len(self))]
@@ -122,7 +122,7 @@ def damages(dataset_id: str, file: Path):
     """Turn what h5py raises at a damaged file into one line that names dataset and file.
 
     Raises:
-        ValueError: the file is damaged; one line.
+        ValueError: the file is damaged.
     """
     try:
         yield
@@ -151,7 +151,7 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
     """Return the metadata of a dataset in a folder.
 
     Raises:
-        ValueError: it is damaged, or the dataset is not of this suite; one line.
+        ValueError: it is damaged, or the dataset is not of this suite.
     """
     path = path / "data" / METADATA
     with damages(dataset_id, path):

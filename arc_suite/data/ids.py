@@ -15,7 +15,7 @@ def check(dataset_id: str) -> str:
     """Return the id if Minari admits it, and it does not lie within another dataset.
 
     Raises:
-        ValueError: it is no such id, or the version is missing; one line with an example.
+        ValueError: it is no such id, or the version is missing.
     """
     if not _valid(dataset_id):
         example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0")))
@@ -51,7 +51,7 @@ def find(dataset_id: str) -> Path:
     """Return the folder in which a dataset lies.
 
     Raises:
-        ValueError: a malformed id, or no such dataset; one line that names the nearest there is.
+        ValueError: a malformed id, or no such dataset.
     """
     if not folder(dataset_id).joinpath("data").is_dir():
         there = existing()

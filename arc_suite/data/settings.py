@@ -63,7 +63,7 @@ class Settings(NamedTuple):
         For checkpoints of a run it holds their algorithm, environment steps, seed and mean return, too.
 
         Raises:
-            ValueError: a setting of the task that does not fit; one line.
+            ValueError: a setting of the task that does not fit.
         """
         presets = presets_of(self.setup.body) if self.presets else {}
         known = self.setup.provenance() | self._asdict() | {"presets": list(self.presets)}

@@ -72,8 +72,8 @@ class Storage:
             wait: until no other process collects it.
 
         Raises:
-            ValueError: the dataset is damaged, or, unless we wait, being collected by another process; one line.
-            OSError: its files cannot be made; one line.
+            ValueError: the dataset is damaged, or, unless we wait, being collected by another process.
+            OSError: its files cannot be made.
         """
         place = ids.folder(dataset_id)
         new, old = (place.with_name(f".{place.name}.{suffix}") for suffix in ("new", "old"))
@@ -114,8 +114,7 @@ class Storage:
         """Put finished episodes on disk, by index, and let Minari see them up to the first that is missing.
 
         Raises:
-            OSError: a file cannot be written; one line that names it. What was there before is still,
-                and so is every one of these that fits.
+            OSError: a file cannot be written. Earlier episodes stay, and so does every one of these that fits.
         """
         try:
             self._add(finished)

@@ -37,7 +37,7 @@ def verify(
 
     Raises:
         ValueError: the dataset is missing, damaged, of another body, task, model or version, or needs
-            a module that has not been imported, or its replay differs; one line.
+            a module that has not been imported, or its replay differs.
     """
     dataset = open(dataset_id)
     settings, was = dataset.settings, dataset.metadata["arc_suite"]

@@ -25,7 +25,7 @@ def one_thread_at_a_time(method):
     """Make a method of an environment, whose `_lock` is a `Lock`, refuse calls while another thread is in one.
 
     Raises:
-        RuntimeError: another thread's call is at work; one line, and nothing has changed.
+        RuntimeError: another thread's call is at work; nothing has changed.
     """
 
     @functools.wraps(method)
@@ -51,7 +51,7 @@ def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
         shape: (..., motors)
 
     Raises:
-        ValueError: another shape, not numbers, or NaN; one line that names the index.
+        ValueError: another shape, not numbers, or NaN.
     """
     array = _real(action)
     if array is None:
@@ -71,7 +71,7 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
     """Return the value of a live command as floats, (*leading, size); None stands for what the task itself would do.
 
     Raises:
-        ValueError: the task has no such command, or the value has another size; one line.
+        ValueError: the task has no such command, or the value has another size.
     """
     if not task.commands:
         raise ValueError(f"command {name!r}: task {task.name} has no commands")

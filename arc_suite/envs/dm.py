@@ -36,7 +36,7 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
     Args:
         domain_name: a robot: queen, bastion, tick or leaper; one of another package, as `module:name`
             where that has not been imported yet; or any body; see `registry.body_of`.
-        task_name: walk, steer, or a task of another package likewise.
+        task_name: walk, steer, or a task of another package as `module:name`.
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers.Modifiers`;
@@ -50,8 +50,7 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
         An `Environment`, which is a `dm_control.rl.control.Environment`.
 
     Raises:
-        ValueError: an unknown name, or a value that does not fit; one line that names it and the
-            nearest valid name.
+        ValueError: an unknown name, or a value that does not fit.
         OSError: a file that cannot be read.
     """
     settings = dict(checks.mapping("task_kwargs", task_kwargs))
@@ -118,7 +117,7 @@ class Environment(control.Environment):
             value: (size,) numbers; None, or NaN in some, for what the task itself would do.
 
         Raises:
-            ValueError: no such command, or a value of another size; one line.
+            ValueError: no such command, or a value of another size.
         """
         self.task.set_command(name, value)
 
@@ -181,7 +180,7 @@ class TaskRun(TaskView, control.Task):
         """Set a live command; see `Environment.command`.
 
         Raises:
-            ValueError: no such command, a value that does not fit, or no episode has begun; one line.
+            ValueError: no such command, a value that does not fit, or no episode has begun.
         """
         value = checked_command(self.definition, name, value)
         if self.memory is None:
@@ -229,8 +228,7 @@ class TaskRun(TaskView, control.Task):
         """Take the readings, and what is to be remembered of the step.
 
         Raises:
-            PhysicsError: the physics diverged and is not to terminate the episode; one line that
-                names robot, time and cause.
+            PhysicsError: the physics diverged and is not to terminate the episode.
         """
         if physics.divergence is not None and self._on_divergence == "raise":
             raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
@@ -259,7 +257,7 @@ class TaskRun(TaskView, control.Task):
         if physics.divergence is not None:
             return 0.0
         terminated, truncated = self.definition.ended(self.memory, self._latest(physics))
-        self._readings = None  # nobody asks once more before the simulation moves, but for users who have moved it
+        self._readings = None  # stale as soon as the simulation moves
         return 0.0 if terminated else 1.0 if truncated else None
 
     def markers(self, physics):
@@ -271,7 +269,7 @@ class TaskRun(TaskView, control.Task):
         return self._readings or self.definition.read(physics.data.ptr)
 
     def _begin(self, physics):
-        """The readings of the start, of which the memory takes down what the first step needs."""
+        """Return the readings of the start, from which the memory keeps what the first step needs."""
         self._starting, data = False, physics.data.ptr
         readings = self.definition.read(data)
         lifted = self.definition.clear_spawn(self.memory, readings)

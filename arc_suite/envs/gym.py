@@ -33,7 +33,7 @@ class Env(DmControlCompatibilityV0):
     limit. Longer episodes need both `task_kwargs={"time_limit": seconds}` and `max_episode_steps`.
 
     `reset(seed=s)` starts the episode of `load(..., task_kwargs={"random": s})`; further resets
-    continue its stream of random numbers, of which `np_random` is a view.
+    continue its stream of random numbers; `np_random` is a view of it.
 
     Pickles and copies carry on bit for bit, without whatever was opened for rendering.
     """
@@ -59,16 +59,15 @@ class Env(DmControlCompatibilityV0):
         Args:
             domain_name: a robot; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
-            task_kwargs: likewise.
-            visualize_reward: likewise.
+            task_kwargs: see `arc_suite.load`.
+            visualize_reward: see `arc_suite.load`.
             render_mode: None, rgb_array, depth_array (m) or, where there is a display, human.
             width: of a picture, pixels; a window has its own size.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
 
         Raises:
-            ValueError: an unknown name, or a value that does not fit; one line that names it and the
-                nearest valid name.
+            ValueError: an unknown name, or a value that does not fit.
         """
         modes = [*_HEADLESS_MODES, *(["human"] if opengl.has_display() else [])]
         if render_mode == "human" and render_mode not in modes:
@@ -161,7 +160,7 @@ class Env(DmControlCompatibilityV0):
         """Set a command of the task from now on, until the next episode; see `arc_suite.envs.dm.Environment.command`.
 
         Raises:
-            ValueError: no such command, or a value of another size; one line.
+            ValueError: no such command, or a value of another size.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("command")

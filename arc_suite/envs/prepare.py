@@ -25,7 +25,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
             control steps by default), `arena` (a name, or an `Arena`) and those of `tasks.modifiers`.
 
     Raises:
-        ValueError: an unknown name, or a value that does not fit; one line that names it.
+        ValueError: an unknown name, or a value that does not fit.
         OSError: a file that cannot be read.
     """
     body, kind = registry.body_of(domain_name), registry.task_of(task_name)
@@ -62,7 +62,7 @@ def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         task_kwargs: as in `load`.
 
     Raises:
-        ValueError: the body, the gait or the task is not symmetric, or see `load`; one line.
+        ValueError: the body, the gait or the task is not symmetric, or see `load`.
         OSError: a file that cannot be read.
     """
     return prepared(domain_name, task_name, task_kwargs)[0].symmetry

@@ -24,7 +24,7 @@ class VecEnv(vec_env.VecEnv):
             environments: with `autoreset_mode` SameStep, as stable-baselines3 resets at once.
 
         Raises:
-            ValueError: another autoreset mode, or no vector environment of this suite; one line.
+            ValueError: another autoreset mode, or no vector environment of this suite.
         """
         mode = getattr(environments, "autoreset_mode", None)
         if not isinstance(environments, VectorEnv) or mode is not AutoresetMode.SAME_STEP:
@@ -84,7 +84,7 @@ class VecEnv(vec_env.VecEnv):
         """Set an attribute that the environments share.
 
         Raises:
-            ValueError: of some environments alone; one line.
+            ValueError: of some environments alone.
         """
         self._check_all(attr_name, indices)
         self.environments.set_attr(attr_name, value)
@@ -93,7 +93,7 @@ class VecEnv(vec_env.VecEnv):
         """Call a method of all environments; see `VectorEnv.call`.
 
         Raises:
-            ValueError: of some environments alone; one line.
+            ValueError: of some environments alone.
         """
         self._check_all(method_name, indices)
         return list(self.environments.call(method_name, *method_args, **method_kwargs))

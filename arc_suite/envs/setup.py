@@ -49,8 +49,8 @@ class Setup:
             task_kwargs: settings of the task that JSON can hold, without `random`.
 
         Raises:
-            ValueError: an unknown name, or a setting that JSON cannot hold; one line.
-            OSError: a file that cannot be read; one line.
+            ValueError: an unknown name, or a setting that JSON cannot hold.
+            OSError: a file that cannot be read.
         """
         body, task = registry.body_of(domain_name), registry.task_of(task_name)
         settings = checks.mapping("task_kwargs", task_kwargs)
@@ -88,7 +88,7 @@ class Setup:
         """The task, ready to run.
 
         Raises:
-            ValueError: a setting that does not fit; one line.
+            ValueError: a setting that does not fit.
         """
         return self.prepared()[0]
 
@@ -96,7 +96,7 @@ class Setup:
         """Return the task, ready to run, and the compiled model.
 
         Raises:
-            ValueError: a setting that does not fit; one line.
+            ValueError: a setting that does not fit.
         """
         return prepared(self.body, self.task, self.task_kwargs)
 
@@ -138,7 +138,7 @@ class Setup:
         """Return, JSON-able, `to_dict` with the task's version, and hashes and versions of all that computes.
 
         Raises:
-            ValueError: a setting that does not fit; one line.
+            ValueError: a setting that does not fit.
         """
         model = self.prepared()[1]
         buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
@@ -163,7 +163,7 @@ class Setup:
 
         Raises:
             ValueError: a field is missing, of another type, an unknown name, or a name whose module has not been
-                imported; one line.
+                imported.
         """
         for name, kind in (("robot", str), ("task", str), ("task_kwargs", dict)):
             if not isinstance(fields.get(name), kind):

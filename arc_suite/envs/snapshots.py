@@ -1,4 +1,4 @@
-"""Snapshots of a vector environment: arrays by name, from which another one goes on to the bit.
+"""Snapshots of a vector environment: arrays by name, from which another one continues bit-exactly.
 
 Unlike a pickle, arrays of others are data.
 """
@@ -37,7 +37,7 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
     """Let a `VectorEnv` whose episodes have begun go on from a snapshot.
 
     Raises:
-        ValueError: an array is missing or does not fit; one line.
+        ValueError: an array is missing or does not fit.
     """
     try:
         simulations = {

@@ -100,7 +100,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             autoreset_mode: NextStep or SameStep: an environment whose episode has ended starts the next one in
                 the step after or at once; Disabled: it rests, with reward 0, until a reset whose
                 `reset_mask` has it.
-            max_episode_steps: truncates episodes, as `gymnasium.make` does, beside the task's time limit.
+            max_episode_steps: truncates episodes, as `gymnasium.make` does, in addition to the task's time limit.
             task_kwargs: as in `arc_suite.load`; `random=s` seeds environment i with s + i, and
                 `on_divergence` can only be "terminate".
             render_mode: None, rgb_array or depth_array (m).
@@ -109,8 +109,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             camera_id: a camera's name or index, -1 for a free one.
 
         Raises:
-            ValueError: an unknown name, or a value that does not fit; one line that names it and the
-                nearest valid name.
+            ValueError: an unknown name, or a value that does not fit.
         """
         self._lock, self.batch = Lock(), None  # first, as Gymnasium closes also what could not be made
         task_kwargs = dict(task_kwargs or {})
@@ -251,12 +250,12 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         Args:
             name: one of the task's `commands`.
-            value: (size,) numbers for all environments of the mask, or (num_envs, size), of which those of
-                the mask count; None, or NaN in some, for what the task itself would do.
+            value: (size,) numbers for all environments of the mask, or (num_envs, size), where only rows of
+                the mask count; None, or NaN in some, for the task's own command.
             mask: (num_envs,) booleans, the environments that it goes to; None for all.
 
         Raises:
-            ValueError: no such command, or a value or mask that does not fit; one line.
+            ValueError: no such command, or a value or mask that does not fit.
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
@@ -298,7 +297,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Go on, bit-exact, from the snapshot of an environment of the same size and task.
 
         Raises:
-            ValueError: an array is missing or does not fit; one line. The environment is to be thrown away then.
+            ValueError: an array is missing or does not fit. The environment is to be thrown away then.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
@@ -367,7 +366,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             A value for each environment.
 
         Raises:
-            ValueError: `reset`, `step` or `close`, which are of all environments at once; one line.
+            ValueError: `reset`, `step` or `close`, which are of all environments at once.
             AttributeError: no such attribute.
         """
         if name in ("reset", "step", "close"):
@@ -389,7 +388,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             values: one for all, or a list or tuple of as many equal ones as there are environments.
 
         Raises:
-            ValueError: another number of values, or different ones; one line.
+            ValueError: another number of values, or different ones.
         """
         values = list(values) if isinstance(values, list | tuple) else [values]
         if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):

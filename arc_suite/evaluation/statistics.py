@@ -106,7 +106,7 @@ def probability_of_improvement(strata_x, strata_y, seed: int = 0) -> tuple[float
         The probability, and the ends of the interval.
 
     Raises:
-        ValueError: the strata are not as many; one line.
+        ValueError: the strata are not as many.
     """
     if len(strata_x) != len(strata_y):
         raise ValueError(f"strata: expected as many of X as of Y, got {len(strata_x)} and {len(strata_y)}")

@@ -115,7 +115,7 @@ def clips(
 
     Raises:
         ValueError: an unknown name, a value out of range, a policy that falls or whose pose does not return
-            within two degrees; one line.
+            within two degrees.
         OSError: a file cannot be read.
     """
     checks.number("fps", fps, 1.0, 1000.0)
@@ -150,7 +150,7 @@ class _Recorded(NamedTuple):
 
 
 class _Draft(NamedTuple):
-    """A motion with a sample for every substep, of which a clip is made.
+    """A motion with a sample for every substep: the source of a clip.
 
     Attributes:
         motion: of the body.

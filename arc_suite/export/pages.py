@@ -27,7 +27,7 @@ def viewer() -> str:
     """Return the script of the viewer, three.js included.
 
     Raises:
-        ValueError: it has not been built; one line.
+        ValueError: it has not been built.
     """
     script = resources.files("arc_suite.export").joinpath("web", "viewer.js")
     if not script.is_file():
@@ -39,7 +39,7 @@ def page(tracks: Mapping[str, Track]) -> str:
     """Return a page that plays tracks side by side, by their labels.
 
     Raises:
-        ValueError: the viewer has not been built; one line.
+        ValueError: the viewer has not been built.
     """
     walks = json.dumps([_walk(label, track) for label, track in tracks.items()], separators=(",", ":"), allow_nan=False)
     data = base64.b64encode(zlib.compress(walks.encode(), 9)).decode()

@@ -46,7 +46,7 @@ def record(
         `steps * SUBSTEPS + 1` poses.
 
     Raises:
-        ValueError: the episode ends before; one line.
+        ValueError: the episode ends before.
     """
     act, commands = alone(policy), dict(commands)
     model, data = environment.physics.model.ptr, environment.physics.data.ptr

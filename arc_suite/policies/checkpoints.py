@@ -37,7 +37,7 @@ def save(folder: Path, agent: Agent) -> None:
     """Write the metadata of a checkpoint into its folder.
 
     Raises:
-        OSError: it cannot be written; one line.
+        OSError: it cannot be written.
     """
     with files.writing_json(folder / AGENT) as file:
         file.update(agent._asdict())
@@ -47,7 +47,7 @@ def agents(path: Path) -> list[Agent]:
     """Return the metadata of one checkpoint, or of all in a folder, sorted by step; none of another folder.
 
     Raises:
-        ValueError: a damaged file; one line.
+        ValueError: a damaged file.
     """
     try:
         found = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
@@ -60,7 +60,7 @@ def at(run: Path, step: int) -> Path:
     """Return the checkpoint of a run at a step.
 
     Raises:
-        ValueError: there is none; one line.
+        ValueError: there is none.
     """
     there = [agent.steps for agent in agents(run / FOLDER)]
     if step not in there:

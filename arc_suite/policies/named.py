@@ -77,9 +77,8 @@ def policy(
             where the task takes them, as `protocol.Positioned`. None for walk with default settings.
 
     Raises:
-        ValueError: an unknown name, or a value out of range; one line that names it and the nearest
-            valid one.
-        OSError: a file that cannot be read; one line.
+        ValueError: an unknown name, or a value out of range.
+        OSError: a file that cannot be read.
     """
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:

@@ -117,7 +117,7 @@ class Network(NamedTuple):
         """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
         Raises:
-            ValueError: other blocks than those it was trained with; one line.
+            ValueError: other blocks than those it was trained with.
         """
         sizes = {name: block.shape[-1] for name, block in observation.items()}
         if sizes != dict(self.blocks):
@@ -132,7 +132,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
     """Write a policy file, atomically.
 
     Raises:
-        OSError: it cannot be written; one line.
+        OSError: it cannot be written.
     """
     kinds = [layer.kind for layer in network.layers]
     known = network.setup.to_dict() | {"blocks": dict(network.blocks), "layers": kinds}
@@ -149,8 +149,8 @@ def load(path: str | os.PathLike) -> Network:
     """Read a policy file, or that of a run's folder; nothing that it names is imported.
 
     Raises:
-        ValueError: a damaged file, or a robot, task or arena whose module has not been imported; one line.
-        OSError: it cannot be read; one line.
+        ValueError: a damaged file, or a robot, task or arena whose module has not been imported.
+        OSError: it cannot be read.
     """
     path = Path(path)
     path = path / FILE if path.is_dir() else path

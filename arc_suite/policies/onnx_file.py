@@ -51,8 +51,8 @@ def save(path: str | os.PathLike, network: Network) -> None:
     """Write a policy as ONNX, atomically.
 
     Raises:
-        ValueError: the package onnx is not installed; one line.
-        OSError: the file cannot be written; one line.
+        ValueError: the package onnx is not installed.
+        OSError: the file cannot be written.
     """
     try:
         import onnx

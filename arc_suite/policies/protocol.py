@@ -87,7 +87,7 @@ class Positioned:
         """Return the positions (num_envs, joints), as actions in [-1, 1].
 
         Raises:
-            ValueError: an observation without the blocks of joint angles and velocities; one line.
+            ValueError: an observation without the blocks of joint angles and velocities.
         """
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
         _, angles, speeds = proprioception(checked(observation, Clocked.reads, torques.shape[-1]))
@@ -141,8 +141,7 @@ class Individuals:
         """Return the actions (num_envs, joints).
 
         Raises:
-            ValueError: an action of another shape, not of numbers, or with NaN; one line that names the episode
-                and the step.
+            ValueError: an action of another shape, not of numbers, or with NaN.
         """
         actions = np.zeros((len(self._functions), self._joints))
         for index, function in enumerate(self._functions):

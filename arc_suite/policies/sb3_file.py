@@ -23,8 +23,8 @@ class Saved:
         """Read a zip.
 
         Raises:
-            ValueError: it is none of stable-baselines3, or of another body; one line.
-            OSError: it cannot be read; one line.
+            ValueError: it is none of stable-baselines3, or of another body.
+            OSError: it cannot be read.
         """
         self._path = path
         if not path.is_file():
@@ -49,7 +49,7 @@ class Saved:
         """Return the actions of a control step; one prediction for each environment, bit-exact.
 
         Raises:
-            ValueError: observations of another size; one line.
+            ValueError: observations of another size.
         """
         flat = np.concatenate(list(observation.values()), axis=-1, dtype=np.float32)
         if flat.shape[1:] != self._size:

@@ -367,7 +367,7 @@ class TrackingCamera(_Spec):
 class Simulation(_Spec):
     """The constants of the simulation that have a dimension.
 
-    The defaults, MuJoCo's but for the margin, are those of the published robots and suit bodies of
+    The defaults are MuJoCo's, except the margin. They are those of the published robots and suit bodies of
     about half a metre. Since MuJoCo 3.5 the margin of a contact is the sum of its geoms' margins:
     floor and robot each carry half of the published one.
 

@@ -41,7 +41,7 @@ def publish(run: Run, folder: Path, published: Path) -> None:
         published: folder of the copies, with a folder for each run.
 
     Raises:
-        OSError: a file cannot be written; one line.
+        OSError: a file cannot be written.
     """
     source, target = folder / run.name, published / run.name
     steps = results.evaluated(table(source, "evaluations"))
@@ -84,7 +84,7 @@ def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
     """Publish all evaluated runs of a study, and the returns of demonstrators in the same tasks.
 
     Raises:
-        OSError: a file cannot be written; one line.
+        OSError: a file cannot be written.
     """
     for run in runs:
         publish(run, folder, published)

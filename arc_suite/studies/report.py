@@ -128,8 +128,8 @@ def write(name: str, study: Study, published: Path) -> Path:
         The file of the report.
 
     Raises:
-        ValueError: nothing is published, or a table is damaged; one line.
-        OSError: a file cannot be written; one line.
+        ValueError: nothing is published, or a table is damaged.
+        OSError: a file cannot be written.
     """
     found = results.results(study.runs, published)
     if not found:

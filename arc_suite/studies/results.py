@@ -46,7 +46,7 @@ def results(runs: Sequence[Run], published: Path) -> list[Result]:
     """Return the results of those runs of a study that are published.
 
     Raises:
-        ValueError: a damaged table; one line.
+        ValueError: a damaged table.
     """
     return [_result(run, published / run.name) for run in runs if (published / run.name / "style.csv").exists()]
 

@@ -90,7 +90,7 @@ def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable 
     """Collect the prior data of the runs that are not finished, and return words of all runs by name.
 
     Raises:
-        ValueError, OSError: the folder of another run, prior data that do not fit, a full disk; one line.
+        ValueError, OSError: the folder of another run, prior data that do not fit, a full disk.
     """
     files.folder(folder)
     words = {run.name: "finished" if is_finished(run, folder / run.name) else "waiting" for run in runs}
@@ -109,7 +109,7 @@ def is_finished(run: Run, folder: Path) -> bool:
     """Return whether the run in a folder is finished.
 
     Raises:
-        ValueError: it is another run, or damaged; one line.
+        ValueError: it is another run, or damaged.
     """
     if run_folder.is_begun(folder):
         run_folder.check(folder, run.configuration.record(), left_out=("versions", PRIOR_SHA256))

@@ -90,7 +90,7 @@ def run(
         label: name of its kind in the report; empty for the algorithm.
 
     Raises:
-        ValueError: an unknown robot, task, algorithm or hyperparameter; one line.
+        ValueError: an unknown robot, task, algorithm or hyperparameter.
     """
     setup = Setup.of(robot, task, task_kwargs)
     dataset = None if prior is None else prior.dataset_id(setup)
@@ -228,7 +228,7 @@ def study(name: str) -> Study:
     """Return the study of a name, or of `module:attribute`, a `Study` on Python's path.
 
     Raises:
-        ValueError: there is none, or two of its runs have one name; one line.
+        ValueError: there is none, or two of its runs have one name.
     """
     found = checks.imported(name, "study") if ":" in name else STUDIES[checks.name(name, STUDIES, "study")]
     if not isinstance(found, Study):

@@ -43,7 +43,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
     """Write tracks of one setup.
 
     Raises:
-        ValueError: no tracks, or tracks of several setups; one line.
+        ValueError: no tracks, or tracks of several setups.
         OSError: the file cannot be written.
     """
     setups = {track.setup for track in tracks}
@@ -75,8 +75,8 @@ def load(path: str | os.PathLike) -> list[Track]:
 
     Raises:
         ValueError: the file holds no tracks, or those of another format, is damaged, or names a module that has not
-            been imported; one line.
-        OSError: the file cannot be read; one line.
+            been imported.
+        OSError: the file cannot be read.
     """
     try:
         file = open(path, "rb")  # noqa: SIM115

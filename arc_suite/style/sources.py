@@ -24,7 +24,7 @@ class Source(NamedTuple):
     Attributes:
         label: its name in tables.
         setup: of the tracks that it has; None for a policy, which is recorded in any.
-        recorders: takes a setup and seeds; returns functions, each of which returns a track.
+        recorders: takes a setup and seeds; returns functions that return a track each.
     """
 
     label: str
@@ -42,10 +42,10 @@ def source(name: str, preset: str = "medium") -> Source:
         preset: of the demonstrator.
 
     Raises:
-        ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened; one line.
+        ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened.
             `recorders` raises it for a policy that does not fit the body and for tracks of another setup; its
             functions for an invalid action and for a replay with other rewards than those recorded.
-        OSError: a file cannot be read; one line.
+        OSError: a file cannot be read.
     """
     checks.name(preset, policies.preset_names(), "preset")
     if policies.is_file(name):

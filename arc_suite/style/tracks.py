@@ -135,7 +135,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
         The track; without phases and parameters if the task prescribes no gait.
 
     Raises:
-        ValueError: a setting of the environment's task that JSON cannot hold, such as an `Arena`; one line.
+        ValueError: a setting of the environment's task that JSON cannot hold, such as an `Arena`.
     """
     run, model, data = environment.task, environment.physics.model.ptr, environment.physics.data.ptr
     task = run.definition

@@ -1,7 +1,7 @@
 """Tasks in which a body follows a command of velocities, on some ground, in the prescribed gait.
 
-A task is put together of three frozen values: a command, a ground and a health. This module writes down
-once in which order they draw, remember, observe and earn. Nothing in it has a scale: lengths are told in
+A task is composed of three frozen values: a command, a ground and a health. This module defines
+the order in which they draw, remember, observe and earn. Nothing in it has a scale: lengths are in
 standing heights h, speeds in the body's own target velocity or sqrt(g h), rates in sqrt(g / h), contact
 forces in the body's weight. Directions are the body's own, as the torso heads, so that an episode may
 start in any. What standing still would earn is gated by how well the command is followed.

@@ -143,7 +143,7 @@ class Task(ABC):
         """Return the settings for a body, some of them overridden.
 
         Raises:
-            ValueError: an unknown name, or a value that does not fit; one line that names it.
+            ValueError: an unknown name, or a value that does not fit.
         """
 
     @classmethod
@@ -175,7 +175,7 @@ class Task(ABC):
         """How the blocks of the observation are mirrored across the x-z plane, by name.
 
         Raises:
-            ValueError: what is asked for is not the same on both sides, or the task does not tell; one line.
+            ValueError: the gait is not mirror-symmetric, or the task defines no mirror.
         """
         raise ValueError(f"task {self.name}: does not tell how its observation is mirrored")
 
@@ -188,7 +188,7 @@ class Task(ABC):
         the image walks on mirrored ground.
 
         Raises:
-            ValueError: the body is not left-right symmetric, or see `mirrors`; one line.
+            ValueError: the body is not left-right symmetric, or see `mirrors`.
         """
         action = mirrors.joints(mirror.image(self.scene.body))
         blocks = self.mirrors
@@ -267,7 +267,7 @@ class Task(ABC):
         return {}
 
     def markers(self, memory, readings: Readings) -> list[Marker]:
-        """Return what pictures of one environment show of what is asked; no leading axes."""
+        """Return the markers of the command in pictures of one environment; no leading axes."""
         return []
 
     def stream_state(self, memory) -> Any:
@@ -283,7 +283,7 @@ class Task(ABC):
         """Return observed blocks as one vector (..., size), in new memory.
 
         Raises:
-            ValueError: they are not those that the task declares; one line.
+            ValueError: they are not those that the task declares.
         """
         self._check(blocks)
         return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
@@ -292,7 +292,7 @@ class Task(ABC):
         """Return observed blocks by name, in new memory.
 
         Raises:
-            ValueError: they are not those that the task declares; one line.
+            ValueError: they are not those that the task declares.
         """
         self._check(blocks)
         return collections.OrderedDict((name, block.copy()) for name, block in blocks.items())
@@ -306,7 +306,7 @@ class Task(ABC):
         """Return an observation vector (..., size) as named blocks, views of it.
 
         Raises:
-            ValueError: a vector of another size; one line.
+            ValueError: a vector of another size.
         """
         if vector.shape[-1:] != (self.size,):
             raise ValueError(f"observation: expected {self.size} numbers, got shape {vector.shape}")

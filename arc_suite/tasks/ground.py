@@ -162,10 +162,10 @@ def next_level(stream: Stream, stays, other, down: float, up: float):
 
 @dataclasses.dataclass(frozen=True)
 class Lanes(Ground):
-    """Lanes along x, one of which is drawn for an episode: of one difficulty, or of the level of a curriculum.
+    """Lanes along x. An episode draws one lane of the difficulty, or of the level of a curriculum.
 
     Attributes:
-        kinds: of ground, in the order of `terrain.KINDS`, one of which is drawn for an episode.
+        kinds: of ground, in the order of `terrain.KINDS`; an episode draws one.
         copies: lanes of each kind, and of each kind and level of a curriculum; boxes cost time, so there are fewer.
         middle: share of the lane's length at which a body starts.
         thresholds: outcomes below and above which a curriculum's level falls and rises.

@@ -42,7 +42,7 @@ class Changes(NamedTuple):
         delay: (...) of actions, control steps.
         waiting: (..., longest delay, joints) the latest actions, the newest first.
         angles: (..., joints) of the joints at the latest reading, rad.
-        speeds: (..., joints) likewise, rad/s.
+        speeds: (..., joints) of the joints at the latest reading, rad/s.
     """
 
     elapsed: np.ndarray
@@ -78,10 +78,10 @@ class Draws(NamedTuple):
         kick_sizes: (KICKS,) uniform in [0, 1).
         kick_directions: (KICKS,) rad, uniform in [0, 2 pi).
         leg: index of one.
-        strength: uniform in [0, 1), where in its range the motors' strength lies.
-        friction: likewise.
-        mass: likewise.
-        delay: likewise.
+        strength: position of the motors' strength in its range, uniform in [0, 1).
+        friction: position of the friction in its range, uniform in [0, 1).
+        mass: position of the mass in its range, uniform in [0, 1).
+        delay: position of the delay in its range, uniform in [0, 1).
         noise_key: an integer of 32 bits.
     """
 
@@ -116,7 +116,7 @@ def modified(task: Task, settings: Mapping[str, Any]) -> "Modified":
         settings: some of the fields of `modifiers.Modifiers` by name.
 
     Raises:
-        ValueError: an unknown name, or a value that does not fit; one line that names it.
+        ValueError: an unknown name, or a value that does not fit.
     """
     widths = noise.half_widths(task.scene.body, task.blocks)
     changes = checked(settings, task.scene.body, task.blocks, widths)
@@ -154,7 +154,7 @@ class Modified(Task):
         """The other task's; what is drawn is as likely on either side.
 
         Raises:
-            ValueError: a leg of one side fails in every episode, or as the other task; one line.
+            ValueError: a leg of one side fails in every episode, or as the other task.
         """
         leg = self.changes.actuator_failure
         if not isinstance(leg, bool) and mirror.image(self.scene.body).legs[leg] != leg:
@@ -163,7 +163,7 @@ class Modified(Task):
 
     @functools.cached_property
     def blocks(self) -> Mapping[str, int]:
-        """Those of the other task, but for what is left out."""
+        """Return the other task's blocks without the excluded ones."""
         return {name: size for name, size in self.task.blocks.items() if name not in self.changes.exclude_blocks}
 
     @functools.cached_property

@@ -58,7 +58,7 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], 
         noisy: names of those that can be noisy.
 
     Raises:
-        ValueError: an unknown name, or a value that does not fit; one line that names it.
+        ValueError: an unknown name, or a value that does not fit.
     """
     for name in settings:
         checks.name(name, NAMES, "modifier")

@@ -63,7 +63,7 @@ def noise(key, step, count: int):
 
 
 def scrambled(bits):
-    """Return uint32 numbers (...), of which no two are equal where none were, every bit of each of all its bits.
+    """Return scrambled uint32 numbers (...), a bijection in which every bit depends on all bits.
 
     This is the finaliser of MurmurHash3 (Appleby 2011).
     """

@@ -62,7 +62,7 @@ def layout(model, joints, parts, feet) -> Layout:
     Args:
         model: `mujoco.MjModel` whose first joint is the torso's free joint.
         joints: names of the actuated joints, in the order of the model.
-        parts: names of the body's rigid parts, likewise, the torso first.
+        parts: names of the body's rigid parts, in the order of the model, the torso first.
         feet: names of the feet's bodies.
 
     Returns:

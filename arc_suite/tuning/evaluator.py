@@ -45,7 +45,7 @@ class Evaluator:
             skipped: first steps that count for neither rewards nor style.
 
         Raises:
-            ValueError: a task whose reward has other terms; one line.
+            ValueError: a task whose reward has other terms.
         """
         self._body, self._shape, self._steps, self._skipped = setup.body, (presets, episodes), steps, skipped
         self._environment = setup.make_vec(presets * episodes)

@@ -26,8 +26,8 @@ class Journal:
 
         Raises:
             ValueError: the file belongs to another search, or is no journal, or another process
-                writes to it; one line.
-            OSError: the file cannot be read or written; one line.
+                writes to it.
+            OSError: the file cannot be read or written.
         """
         path, header = Path(path), _line(settings)
         try:

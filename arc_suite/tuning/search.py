@@ -76,7 +76,7 @@ class Search:
 
         Raises:
             ImportError: no package `cma`.
-            ValueError: a task without the terms of style; one line.
+            ValueError: a task without the terms of style.
         """
         import cma  # of the extra "tune"
 

@@ -72,7 +72,7 @@ def test_checkpoints_take_turns(run):
     ],
 )
 def test_a_dataset_of_an_agent(flag, label, steps, run, collected):
-    """Its id and metadata say whose it is, and it replays to the bit."""
+    """Its id and metadata name its policy, and it replays bit-exactly."""
     done = collected(flag)
     assert (done.returncode, done.stderr) == (0, "")
     (dataset_id,) = data.ids.existing()

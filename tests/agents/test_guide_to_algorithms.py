@@ -18,7 +18,7 @@ TRAIN_PATIENT, TRAIN_SEARCH, EVALUATE = re.findall(r"^arc-suite .*$", GUIDE, re.
 
 @pytest.fixture
 def run(tmp_path):
-    """Runs the guide's commands beside its files, with other flags at the end."""
+    """Runs the guide's commands in the folder of its files, with other flags at the end."""
     (tmp_path / "my_algorithms.py").write_text(MY_ALGORITHMS)
     (tmp_path / "random_search.py").write_text(RANDOM_SEARCH)
     environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}

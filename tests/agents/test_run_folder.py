@@ -48,7 +48,7 @@ def test_without_a_checkpoint_it_starts_over(path):
 
 
 def test_what_never_began_leaves_the_folder_to_others(tmp_path):
-    """Such as a run of which something does not fit, whose command is then mended."""
+    """A rejected run leaves a folder that the mended command can use."""
     with opened(tmp_path / "run", CONFIG):
         pass
     with opened(tmp_path / "run", CONFIG | {"seed": 1}) as folder:

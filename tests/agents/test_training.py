@@ -102,7 +102,7 @@ def test_tiny_run(name, tiny, tmp_path, monkeypatch):
 
 
 def test_the_policy_of_a_run_earns_what_its_table_says(tiny, tmp_path):
-    """By the protocol, on single environments, to the bit."""
+    """By the protocol, on single environments, bit-exactly."""
     run = tiny("sac")
     train(run, tmp_path / "run", progress=silent)
     table = run_folder.table(tmp_path / "run", "evaluations")

@@ -102,7 +102,7 @@ def test_a_driver_that_crashes_takes_only_the_picture_along(tmp_path):
 def test_cores_that_are_not_ours(tmp_path):
     (tmp_path / "sitecustomize.py").write_text("import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})")
     _, found, _ = doctor(tmp_path)
-    assert found["cores"] == ("ok", f"{os.cpu_count()}, of which vector environments use 1")
+    assert found["cores"] == ("ok", f"{os.cpu_count()}; vector environments use 1")
 
 
 def test_needs_are_those_of_the_package():

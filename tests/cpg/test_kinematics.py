@@ -1,4 +1,4 @@
-"""Kinematics of legs, beside MuJoCo's."""
+"""Kinematics of legs, against MuJoCo's."""
 
 import numpy as np
 import pytest

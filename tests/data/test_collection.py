@@ -1,4 +1,4 @@
-"""Datasets: Minari opens them, they replay to the bit, and they depend on nothing but seeds and settings."""
+"""Datasets: Minari opens them, they replay bit-exactly, and they depend on nothing but seeds and settings."""
 
 import subprocess
 import sys

@@ -19,7 +19,7 @@ FEW = ("walk", "turn_left", "idle")
 
 
 def main(folder: str, few: str = "") -> None:
-    """Write FOLDER/<body>-<rig>.glb, and beside it the places of all bones on every frame as .npz; old ones go."""
+    """Write FOLDER/<body>-<rig>.glb and .npz, the positions of all bones on every frame; delete old ones."""
     out = pathlib.Path(folder)
     out.mkdir(parents=True, exist_ok=True)
     for old in [*out.glob("*.glb"), *out.glob("*.npz")]:

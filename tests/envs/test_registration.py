@@ -23,7 +23,7 @@ REGISTERING, USING = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
 
 @pytest.fixture
 def package(tmp_path):
-    """Writes the package `creatures` and returns a function that runs code beside it."""
+    """Writes the package `creatures` and returns a function that runs code in its folder."""
     (tmp_path / "creatures").mkdir()
     (tmp_path / "creatures" / "__init__.py").write_text("")
     (tmp_path / "creatures" / "hopper.py").write_text(REGISTERING)

@@ -1,4 +1,4 @@
-"""Snapshots of rows: another environment goes on from them to the bit, through a file without pickles."""
+"""Snapshots: another environment continues from them bit-exactly, through a file without pickles."""
 
 import io
 

@@ -112,7 +112,7 @@ def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
 
 
 def test_a_loop_that_is_the_only_one_to_close_need_not_be_usual():
-    """Two cycles, of which the first is slower and the second one's pose returns."""
+    """Two cycles: the first is slower, the pose of the second returns."""
     recording = walk(TWISTS[0], seconds=2 * CYCLE)
     qpos = recording.qpos.copy()
     qpos[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)

@@ -1,4 +1,4 @@
-"""The page of clients, of which `make check-clients` runs every block in an environment of its own."""
+"""The page of clients; `make check-clients` runs every block of it in an environment of its own."""
 
 import re
 

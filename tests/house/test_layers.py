@@ -21,7 +21,7 @@ ROOMS = (
     ("arenas",),  # where
     ("models",),  # spec -> MJCF
     ("simulation",),  # MuJoCo runs
-    ("tasks",),  # what is asked
+    ("tasks",),  # reward, observation, termination
     ("registry",),  # names of all three
     ("envs",),  # the faces
     ("cpg",),  # demonstrators
@@ -39,7 +39,7 @@ ROOMS = (
 )
 HEIGHTS = {room: height for height, rooms in enumerate(ROOMS) for room in rooms}
 
-# What the lower rooms may import beside the standard library and arc_suite; the longest name that fits counts.
+# What the lower rooms may import in addition to the standard library and arc_suite; the longest name that fits counts.
 THIRD_PARTY = {
     "checks": {"numpy"},
     "rotations": set(),
@@ -152,7 +152,7 @@ def inside(tree):
 
 
 def outside(tree):
-    """The packages that a module imports beside the standard library and the suite."""
+    """The packages that a module imports in addition to the standard library and the suite."""
     tops = {target.partition(".")[0] for target in imported(tree)}
     return tops - {"arc_suite"} - sys.stdlib_module_names
 
@@ -202,10 +202,7 @@ def test_tables_name_what_is_there():
 
 
 def test_only_tasks_and_registration_know_one_task_from_another():
-    """Whoever drives tasks gets them from the registry; registration knows walk's tables of parameters.
-
-    Demonstrators that see know where ground is scanned and in which directions ranges are.
-    """
+    """Drivers get tasks from the registry; registration knows walk's tables of parameters."""
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
@@ -213,8 +210,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     particular = texts - contract
     assert {"tasks.walk", "tasks.commanded", "tasks.suite"} <= particular
     for name in modules():
-        know = ("registration", "cpg.sighted", "cpg.footholds", "cpg.planner")
-        if room(name) != "tasks" and name not in know:
+        if room(name) not in ("tasks", "registration"):
             assert not particular & set(inside(trees()[name])), name
 
 

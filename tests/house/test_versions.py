@@ -1,4 +1,4 @@
-"""Versions that are recorded beside results."""
+"""Versions that are recorded with results."""
 
 import mujoco
 import numpy as np

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory):
-    """Builds in a copy: a build leaves files beside the sources, and takes up what another one left."""
+    """Builds in a copy: a build leaves files among the sources, and reuses what another one left."""
     folder = tmp_path_factory.mktemp("wheel")
     shutil.copytree(ROOT, folder / "sources", ignore=NOT_SOURCES)
     viewer = folder / "sources" / "arc_suite" / "export" / "web" / "viewer.js"

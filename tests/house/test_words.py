@@ -101,6 +101,34 @@ def assert_plain(names):
     assert not found, "\n".join(["", *found])
 
 
+# Phrases that no text has, and plainer ones.
+PHRASES = {
+    "whoever": "name who",
+    "likewise": "say it again",
+    "but for": "except, without",
+    "to the bit": "bit-exactly",
+    "what is asked": "the command, the task",
+    "are told": "are given",
+    "beside": "next to, in addition to, against",
+    "; one line": "nothing: docs/contributing.md says it for all errors",
+}
+
+
+@pytest.mark.parametrize("phrase", PHRASES)
+def test_plain_sentences(phrase):
+    """In prose of the package, its tools and documents: docstrings, comments, paragraphs."""
+    pattern = re.compile(rf"(?<!\w){re.escape(phrase)}(?!\w)", re.IGNORECASE)
+    paths = [*ROOT.glob("arc_suite/**/*.py"), *ROOT.glob("tools/**/*.py"), *ROOT.glob("docs/*.md")]
+    paths += [ROOT / name for name in ("README.md", "CHANGELOG.md", "Makefile", "setup.cfg")]
+    found = [
+        f"{path.relative_to(ROOT)}:{number} has {phrase!r}; use: {PHRASES[phrase]}"
+        for path in paths
+        for number, line in enumerate(path.read_text().splitlines(), 1)
+        if pattern.search(line)
+    ]
+    assert not found, "\n".join(["", *found])
+
+
 def public(path):
     """Yield the public names of a module: itself, definitions, parameters, fields."""
     module = ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")

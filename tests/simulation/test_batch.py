@@ -1,4 +1,4 @@
-"""Rows of a batch: what one simulation does, to the bit, and what only rows can."""
+"""A batch does what one simulation does, bit by bit, and what only a batch can."""
 
 import pickle
 

@@ -1,4 +1,4 @@
-"""The simulated model does what the written one does, to the bit, with other contacts and another integrator."""
+"""The simulated model does what the written one does, bit by bit, with other contacts and another integrator."""
 
 import mujoco
 import numpy as np

@@ -1,4 +1,4 @@
-"""Rendering: one context for all, beside others that draw, and one line where OpenGL is missing."""
+"""Rendering: one context for all, next to other users of OpenGL, and one line where OpenGL is missing."""
 
 import concurrent.futures
 import os
@@ -150,7 +150,7 @@ def test_import_opens_nothing():
     assert script(code) == ["1 ['dm_control._render']", "2 egl"]
 
 
-# Draws beside others that use OpenGL in this process, and leaves all of it to the interpreter's exit.
+# Draws next to other users of OpenGL in this process, and leaves all of it to the interpreter's exit.
 NEIGHBOURS = """
 import sys
 if sys.argv[1] == "first":

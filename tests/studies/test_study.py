@@ -199,7 +199,7 @@ def test_phases_are_published(tmp_path):
 
 
 def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
-    """It is not started twice, whoever makes it."""
+    """It is not started twice, whatever process makes it."""
     log = tmp_path / "a.log"
     held = runner.claim(log)
     assert runner.claim(log) is None

@@ -122,7 +122,7 @@ def test_phases_are_told_where_they_are_published(made):
 
 @pytest.mark.slow
 def test_claims_need_what_they_compare(made):
-    """Short phases are told by the study's title; other tasks and missing algorithms are not compared."""
+    """The study's title tells short phases; other tasks and missing algorithms are not compared."""
     study, folder = made
     few = study._replace(runs=tuple(each for each in study.runs if each.kind == "sac"))
     page = report.write("few", few, folder).read_text()

@@ -64,7 +64,7 @@ def test_what_an_episode_has_not_is_white():
 
 
 @pytest.mark.slow
-def test_whoever_follows_commands_is_told_to_go_ahead():
+def test_policies_that_follow_commands_walk_ahead():
     """The schedule of seed 0 begins with a stop, at which the gait clock rests."""
     environment = load("queen", "steer")
     frames = frames_of(strips.strip(environment, policy("cpg", "queen", "steered", task=environment.task.definition)))

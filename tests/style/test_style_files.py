@@ -1,4 +1,4 @@
-"""Tracks on disk, equal to the bit."""
+"""Tracks on disk, bit-equal."""
 
 import io
 import zipfile

@@ -17,7 +17,7 @@ COMMANDS = [line for line in re.search(r"```sh\n(.*?)```", GUIDE, re.DOTALL)[1].
 
 @pytest.fixture
 def package(tmp_path):
-    """Writes the guide's modules and returns a function that runs Python beside them."""
+    """Writes the guide's modules and returns a function that runs Python in their folder."""
     (tmp_path / "crouching.py").write_text(CROUCHING)
     (tmp_path / "ramps.py").write_text(RAMPS)
     environ = os.environ | {

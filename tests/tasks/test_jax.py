@@ -54,7 +54,7 @@ PLACES += [(name, MODIFIERS) for name in ("walk", "steer", "course")]
 @pytest.mark.parametrize("body", BODIES)
 def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
     def step(task, memory, action, fields):
-        """A control step as a driver runs it, but for the simulation: everything that a task computes."""
+        """A control step as a driver runs it, without the simulation: everything that a task computes."""
         readings = task.read(Fields(fields))
         memory, inputs = task.before(memory, action)
         memory = task.after(memory, readings)

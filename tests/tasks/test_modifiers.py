@@ -1,4 +1,4 @@
-"""Modifiers of tasks: what each changes, that nothing else does, and that rows are single environments to the bit."""
+"""Modifiers of tasks: what each changes, and that a vector environment equals single ones bit by bit."""
 
 import copy
 import itertools

@@ -1,4 +1,4 @@
-"""Walk beside a computation by hand, from nothing but plain MuJoCo and the paper's formulas."""
+"""Walk against a computation by hand, from plain MuJoCo and the paper's formulas alone."""
 
 import math
 

@@ -1,1 +1,1 @@
-"""How fast a control step is: this suite beside plain MuJoCo and beside what one would write without it."""
+"""How fast a control step is: this suite against plain MuJoCo and an ordinary environment."""

@@ -1,4 +1,4 @@
-"""Measures what collecting a dataset costs beside bare steps of the vector environment."""
+"""Measures what collecting a dataset costs against bare steps of the vector environment."""
 
 import contextlib
 import functools

@@ -132,7 +132,7 @@ class _Field:
 
 
 def _size(robot: str, rows: int, threads: int) -> dict:
-    """What a vector environment of many rows costs beside its steps."""
+    """What a vector environment of many environments costs in addition to its steps."""
     memory, started = _memory(), time.perf_counter()
     envs = gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", rows, num_threads=threads)
     built = time.perf_counter() - started

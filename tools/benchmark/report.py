@@ -65,7 +65,7 @@ def document(path: str) -> pathlib.Path:
     """Checks that a Markdown file can take the tables.
 
     Raises:
-        ValueError: it is not there or has no marks; one line.
+        ValueError: it is not there or has no marks.
     """
     if not pathlib.Path(path).is_file():
         raise ValueError(f"--document: no file {path}")

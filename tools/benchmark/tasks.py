@@ -1,4 +1,4 @@
-"""What a row's control step costs in every task, beside one of walk."""
+"""What a control step costs in every task, against one of walk."""
 
 import contextlib
 import time

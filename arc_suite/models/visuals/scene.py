@@ -50,7 +50,7 @@ def add_scene(root: mjcf.RootElement, height: float) -> None:
     tops = {geom: geom.pos[2] + geom.size[2] for geom in ground if geom.type == "box"}
     for geom in ground:
         geom.material = "ground"
-        if geom in tops:  # steps are told apart by their shade, the higher the brighter
+        if geom in tops:  # higher steps are brighter
             shade = 1.0 - _SHADE * (max(tops.values()) - tops[geom]) / height
             geom.rgba = (shade, shade, shade, 1.0)
     obstacles = [geom for body in root.worldbody.body if body.mocap for geom in body.geom]
