@@ -1,7 +1,8 @@
 # make demo    Queen walks: installs everything, prints an episode's return, leaves out/queen.png and out/queen.mp4
 # make check   lint and the fast tests: after every edit
 # make test    installs everything, runs the tests, on all cores
-# make check-long  tests that take long, and further cases of those that have many
+# make check-long  tests that take long
+# make check-matrix  further cases of tests that have many: every task with every robot; 15 minutes, before a release
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
 # make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
@@ -25,7 +26,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check check-long lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench survey obedience soak fuzz mutants golden clean
+.PHONY: demo test check check-long check-matrix lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench survey obedience soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -39,15 +40,19 @@ PARALLEL := -n auto --dist worksteal
 
 test: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m "not long"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not long and not matrix"
 
 check-long: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m long
+	$(PYTHON) -m pytest $(PARALLEL) -m "long and not matrix"
+
+check-matrix: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) -m pytest $(PARALLEL) -m matrix
 
 check: lint $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m "not slow and not long"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not slow and not long and not matrix"
 
 lint: $(VENV)/linter
 	$(VENV)/bin/ruff check .
@@ -67,7 +72,7 @@ check-lowest: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	tools/ensure_egl.sh $(VENV)/bin/python
 	$(VENV)/bin/python -m pip install -q -e '.[test]' 'gymnasium==1.2.0'
-	$(VENV)/bin/python -m pytest $(PARALLEL) -m "not slow and not long" tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "not slow and not long and not matrix" tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
 		tests/tasks/test_conformance.py tests/simulation/test_divergence.py tests/house/test_threads.py \
 		tests/house/test_errors.py
 

@@ -32,7 +32,7 @@ def run(tmp_path):
     return command
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_new_learner(run, tmp_path):
     """It needs no JAX, resumes bit-exactly, and every program takes its policy."""
     short = ["--hp=directions=2", "--hp=horizon=20", "--evaluate_every=80", "--set", "time_limit=2"]

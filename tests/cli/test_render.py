@@ -72,7 +72,7 @@ def test_gif_shows_every_control_step_in_real_time(tmp_path):
     assert distinct(frames) == 6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_mp4_ends_with_the_episode_and_plays_anywhere(tmp_path):
     """Under the random policy Leaper falls long before 200 steps; odd sizes become even, as yuv420p needs."""
     done = render(

@@ -24,7 +24,7 @@ def run(*arguments, path=""):
     return programs.arc_suite("style", *arguments, path=path)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_report_of_two_policies(tmp_path):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
     figures, folder = tmp_path / "style.json", tmp_path / "pictures" / "leaper"
@@ -109,7 +109,7 @@ def test_datasets_without_minari_say_what_to_install(tmp_path):
     assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("task", ["steer", "staying:stay"])
 def test_other_tasks(tmp_path, task):
     fixtures = (ROOT / "tests" / "fixtures" / "gaitless.py").read_text()

@@ -51,6 +51,7 @@ def test_robots_obey(robot):
     assert (abs(motion - COMMANDS).mean(axis=0) <= 0.03).all(), abs(motion - COMMANDS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", tiers([1, 4, 5, 6], never, lambda seed: seed == 1))
 def test_random_bodies_obey(seed):
     motion, fell = obeyed(generator.random_body(seed))

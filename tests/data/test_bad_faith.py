@@ -67,7 +67,7 @@ def test_metadata_import_nothing(root, module, change):
     assert not module.exists()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_the_caller_names_is_imported(module):
     def run(*arguments):
         command = [sys.executable, TOOL, f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments]

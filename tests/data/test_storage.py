@@ -91,6 +91,7 @@ def killed_at(count, **arguments):
 SCENARIOS = ("new", "more episodes", "new after another", "overwrite", "overwrite twice")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scenario", tiers(SCENARIOS, never, lambda name: name == "overwrite twice"))
 def test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_completes_it(root, scenario):
     old = SETTINGS._replace(seed=9)

@@ -265,6 +265,7 @@ def test_task_settings_reach_the_task():
     assert settings.weights["posture"] == 0.0 and settings.parameters.target_velocity == 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("env_id", tiers(IDS, never, lambda env_id: robot(env_id) == "tick"))
 def test_both_time_limits_agree(env_id):
     def last_step(env, before_last=lambda env: None):

@@ -50,7 +50,7 @@ def test_guide(package):
     assert package(USING + checks) == ["(107,) 0.15"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_guides_robot_walks_well(package):
     """Straight ahead for a whole episode, the faster the preset; fast as fast as the task asks for."""
     code = (
@@ -108,7 +108,7 @@ for call in (
     ]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_processes_that_share_no_memory_import_it(package):
     code = """
 import gymnasium, numpy as np

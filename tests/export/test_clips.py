@@ -22,7 +22,7 @@ from arc_suite.simulation.model import compiled
 
 PRESETS = [(robot, preset) for robot in ROBOTS for preset in ("slow", "medium", "fast", "tuned")]
 # Tests share the clips of a robot. `make check` has one walk alone.
-EACH = tiers(ROBOTS, never, lambda robot: robot in ("tick", "bastion"))
+EACH = tiers(ROBOTS, never, lambda robot: robot == "tick")
 NAMES = ("walk", "turn_left", "stop", "idle")
 
 
@@ -85,6 +85,7 @@ def test_the_bytes_hold_the_kinematics(robot, rig):
     assert_kinematics(ROBOTS[robot], read(robot, rig), made(robot).values())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", tiers(["crab", "millipede", "starfish"], never, lambda name: name == "crab"))
 def test_of_any_body(name):
     body = spec_files.load_body(f"examples/{name}.json")
@@ -215,6 +216,7 @@ def test_forward_is_z_and_left_is_x():
     assert rest["l1_foot"][0, 2, 3] > rest["l3_foot"][0, 2, 3]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("robot", "preset"), tiers(PRESETS, never, lambda robot, preset: (robot, preset) == ("leaper", "tuned"))
 )
@@ -296,6 +298,7 @@ def test_a_stop_walks_and_then_stands(robot):
     assert abs(np.diff(motion.joints[-10:], axis=0)).max() < np.radians(1.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "tick"))
 def test_between_frames_a_clip_is_near_the_physics(robot):
     """Played at every substep, parts are within 6 mm of where substeps have them."""

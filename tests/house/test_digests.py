@@ -5,6 +5,10 @@ import functools
 import digests
 import numpy as np
 import pytest
+from tiers import turn
+
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
 
 QUICK = ("tick steer", "leaper roam")
 
@@ -20,9 +24,11 @@ def same_arithmetic():
 
 
 def marked(name, case):
+    """`make check` has two cases, `make test` each task on robots in turn, `make check-matrix` the rest."""
     plain = not case.task_kwargs and case.command is None and case.preset is None
-    mark = [] if name in QUICK else [pytest.mark.slow] if plain else [pytest.mark.long]
-    return pytest.param(name, case, marks=mark, id=name)
+    slow = plain and turn(case.robot, ROBOTS, list(TASKS).index(case.task))
+    marks = [] if name in QUICK else pytest.mark.slow if slow else pytest.mark.matrix
+    return pytest.param(name, case, marks=marks, id=name)
 
 
 def test_every_case_is_stored():

@@ -55,7 +55,7 @@ def _parsed(text):
         return None
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_few_damaged_files_of_each_kind():
     command = [sys.executable, ROOT / "tests" / "fuzz.py", "--cases=5", "--seed=1"]
     done = subprocess.run(command, capture_output=True, text=True)

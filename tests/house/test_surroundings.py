@@ -37,7 +37,7 @@ for robot, task, settings in jobs:
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_file_appears_and_nothing_is_downloaded(tmp_path):
     home, work = tmp_path / "home", tmp_path / "work"
     home.mkdir(), work.mkdir()

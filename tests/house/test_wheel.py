@@ -64,6 +64,7 @@ def metadata(wheel):
         return email.message_from_bytes(archive.read(name))
 
 
+@pytest.mark.long
 def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
@@ -84,12 +85,14 @@ def test_its_description_has_no_link_that_only_a_repository_has(wheel):
     assert "<img" not in description
 
 
+@pytest.mark.long
 def test_the_package_comes_from_the_wheel(run):
     code = "import arc_suite; print(arc_suite.__file__)"
     assert pathlib.Path(run("python", "-c", code).strip()).parents[1].name == "site-packages"
     assert str(ROOT) not in run("python", "-c", code)
 
 
+@pytest.mark.long
 def test_programs(run):
     assert run("arc-suite", "--version") == f"arc_suite {arc_suite.__version__}\n"
     model = mujoco.MjModel.from_xml_string(run("arc-suite", "build_model", "--legs", "6", "--links", "3"))

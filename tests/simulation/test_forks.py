@@ -123,7 +123,7 @@ def test_environments_made_in_the_child_work(method):
     assert child.exitcode == 0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
 def test_async_vector_environments_work(method):
     kwargs = {"vectorization_mode": "async", "vector_kwargs": {"context": method}}

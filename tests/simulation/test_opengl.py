@@ -169,14 +169,14 @@ print(dm_control._render.BACKEND)
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("order", ["first", "last"])
 def test_dm_control_draws_in_the_same_process(order, monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "egl")
     assert script(NEIGHBOURS, order) == ["egl"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_pictures_are_those_of_a_context_of_ones_own():
     from dm_control.mujoco import Physics  # after arc_suite, which chooses the backend
 
@@ -194,7 +194,7 @@ def test_pictures_are_those_of_a_context_of_ones_own():
             own.free()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_threads_draw_what_one_thread_draws():
     def pictures(robot):
         environment = arc_suite.load(robot, "walk", {"random": 0})
@@ -259,7 +259,7 @@ for count in map(int, sys.argv[1:]):
 """
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="reads memory from Linux's /proc")
 def test_a_further_rendering_environment_costs_little():
     few, many = (float(line.split()[1]) for line in script(MANY, "2", "12"))

@@ -150,7 +150,7 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
             assert np.array_equal(table[name][seed], measured[name].value, equal_nan=True)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_failed_run_says_why_and_the_others_are_made(tmp_path, surroundings):
     command = ["-m", "arc_suite", "study", "tiny_studies:BROKEN", "--jobs=1"]
     done = subprocess.run([sys.executable, *command], env=surroundings, capture_output=True, text=True, cwd=tmp_path)
@@ -240,7 +240,7 @@ def test_tables_that_cannot_have_grown_are_not_read_again(tmp_path, monkeypatch)
     assert set(read) == set(names[1:])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
     """Which is no higher than the terminal; at its end stand all runs, once."""
     outer, inner = os.openpty()

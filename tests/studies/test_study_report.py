@@ -108,7 +108,7 @@ def test_commands_name_the_folder_of_the_runs(made):
     assert f"--policy=runs/my_studies.MINE/{study.runs[0].name} " in page
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_phases_are_told_where_they_are_published(made):
     study, folder = made
     assert "## Phases" not in report.write("mine", study, folder).read_text()
@@ -183,7 +183,7 @@ def test_committed_configurations_are_those_of_the_studies(path):
     assert configuration.read(path) == each.configuration
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_committed_reports_are_made_of_committed_tables(tmp_path):
     """By the one command, and nobody has changed a number."""
     committed = COMMITTED

@@ -37,7 +37,7 @@ def unavailable(*arguments):
     raise RenderingUnavailable("cannot render: no OpenGL")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_strip_is_published_with_the_style(finished, monkeypatch):
     each, runs, published = finished
     drawn, style = published / each.name / STRIP, published / each.name / "style.csv"

@@ -13,7 +13,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.style import record
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, 2])
 def test_pictures(tmp_path, count):
     from arc_suite.style.plots import PICTURES

@@ -82,7 +82,7 @@ def test_what_cannot_be_saved_is_refused(leaper, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_no_damage_goes_unnoticed(leaper, saved, tmp_path):
     sound, random, path = saved.read_bytes(), np.random.default_rng(0), tmp_path / "damaged.npz"
     for trial in range(300):

@@ -105,7 +105,7 @@ def test_bodies_of_one_shape_walk_alike():
     assert speeds == pytest.approx([speeds[0]] * 4, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("scale", [0.05, 12.5, 50.0])  # 2 cm, 5 m and 20 m high
 def test_bodies_of_one_shape_start_and_walk_alike_with_the_noise_of_the_task(scale):
     expected, found = (census_of(generator.scaled(BODY, factor)) for factor in (1.0, scale))

@@ -19,13 +19,12 @@ from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
 JOINTS = {name: len(body.joint_names) for name, body in ROBOTS.items()}
-# Robots take turns from task to task: one in `make check`, another in `make test`, the others in `make check-long`.
+# Robots take turns from task to task.
 every_task = pytest.mark.parametrize(
     ("domain", "task"),
     tiers(
         arc_suite.ALL_TASKS,
         check=lambda domain, task: turn(domain, JOINTS, list(TASKS).index(task)),
-        test=lambda domain, task: turn(domain, JOINTS, list(TASKS).index(task), at_a_time=2),
     ),
 )
 

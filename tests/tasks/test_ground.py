@@ -283,7 +283,7 @@ def test_rows_of_a_curriculum_are_single_environments(name, threads):
     rows.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_curriculum_rises_for_who_walks():
     settings = {"curriculum": True, "time_limit": 12.0}
     environment, demonstrator, levels = (

@@ -51,7 +51,7 @@ def test_arena(package):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_task_and_a_task_in_the_arena_conform(package):
     done = package("-m", "arc_suite", "check", "--task", "crouching:crouch", "--robot", "tick")
     assert done == "tick, crouch: a batch of environments equals each of them alone over 200 steps\n"

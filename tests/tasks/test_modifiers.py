@@ -116,7 +116,7 @@ ROWS = [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", ta
         [(*case, body) for case in ROWS for body in BODIES],
         never,
         lambda case, task, threads, body: (
-            (case != "all" or task in ("walk", "stairs", "navigate"))
+            (case, task) in [*itertools.product(["all"], ["walk", "stairs", "navigate"]), ("kicks", "steer")]
             and turn(body, BODIES, ROWS.index((case, task, threads)))
         ),
     ),

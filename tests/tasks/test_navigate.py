@@ -219,7 +219,7 @@ def test_pictures_show_the_goal_and_pillars():
     rows.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_same_shape_finds_its_way_at_any_size():
     figures = []
     for scale in (0.1, 1.0, 10.0):

@@ -147,7 +147,7 @@ def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, mess
     rows.close()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
     earned = {}
     for preset in ("steered", "tuned", None):

@@ -36,7 +36,7 @@ def small_run(tmp_path_factory):
     return result, folder
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run):
     result, folder = small_run
     lines = result.stdout.splitlines()
@@ -69,7 +69,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run)
     assert is_a_plot(folder / "plot.png")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_robots_of_any_name_are_plotted_and_in_the_tables(small_run, tmp_path):
     results = json.loads((small_run[1] / "results.json").read_text())
     results["robots"] |= {name: results["robots"]["queen"] for name in ("hopper", "crawler")}
@@ -85,7 +85,7 @@ def is_a_plot(path):
     return min(pixels.shape[:2]) > 500 and len(np.unique(pixels.reshape(-1, 3), axis=0)) > 100
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -130,7 +130,7 @@ def test_grown_bodies_have_their_legs_and_links(legs, links):
     assert len(body.part_names) == 1 + legs * (links + 1)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_every_task_costs(monkeypatch):
     for name, value in {"NUM_ENVS": 2, "_ONSET": 1, "_STEPS": 1}.items():
         monkeypatch.setattr(tasks, name, value)

@@ -10,7 +10,7 @@ TOOL = pathlib.Path(__file__).parents[2] / "tools" / "disturbances.py"
 SHORT = ("--robots=tick", "--presets=steered", "--episodes=2")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_table_of_every_modifier():
     done = programs.run(TOOL, *SHORT, "--steps=42")
     assert done.returncode == 0, done.stderr

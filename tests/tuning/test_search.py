@@ -22,7 +22,7 @@ def test_a_search_goes_on_where_it_was_broken_off():
     assert generations[0] != generations[1]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_tuned():
     settings = SETTINGS | {"setup": Setup.of("leaper"), "space": "torques", "episodes": 1, "steps": 40, "starts": 0}
     straight, resumed = Search(**settings), Search(**settings)
