@@ -12,6 +12,7 @@
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
+# make check-agents-long  their long tests: every algorithm, studies that are killed
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
@@ -26,7 +27,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check check-long check-matrix lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench survey obedience soak fuzz mutants golden clean
+.PHONY: demo test check check-long check-matrix lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-long bench survey obedience soak fuzz mutants golden clean
 
 demo: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -139,11 +140,14 @@ check-jax: setup.cfg
 	$(VENV)/bin/python -m pytest tests/tasks/test_jax.py
 
 # pandas before 3, as what rliable needs does not know it yet.
-check-agents: VENV := .venv-jax
-check-agents: setup.cfg
+check-agents check-agents-long: VENV := .venv-jax
+check-agents: MARKS := not long and not matrix
+check-agents-long: MARKS := long or matrix
+check-agents check-agents-long: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
-	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/studies tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/agents tests/studies/test_study.py tests/cli/test_train.py \
+		tests/policies/test_onnx_file.py tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

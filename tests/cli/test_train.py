@@ -106,6 +106,7 @@ class TestRun:
         assert done.returncode == 0 and FINISHED.fullmatch(done.stdout)
         assert (folder / "evaluations.csv").read_bytes() == before
 
+    @pytest.mark.long
     def test_its_configuration_trains_the_same_run(self, folder, tmp_path):
         done = run("train", f"--config={folder / 'config.json'}", cwd=tmp_path)
         assert done.returncode == 0 and FINISHED.fullmatch(done.stdout), done.stderr
@@ -147,6 +148,7 @@ class TestRun:
         size = (tmp_path / "tick.onnx").stat().st_size
         assert done.stdout == f"wrote tick.onnx: 199 observations, 18 actions, {size} bytes\n"
 
+    @pytest.mark.long
     def test_ctrl_c_is_one_line_and_the_run_resumes(self, tmp_path):
         command = [sys.executable, "-m", "arc_suite", "train", *TINY, "--steps=100000", "-o", "run"]
         process = subprocess.Popen(
