@@ -237,6 +237,7 @@ def test_presets_return(robot, preset):
         assert clip.cycles == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", tiers(range(20), never, lambda seed: seed == 0))
 def test_random_bodies_step_once_a_cycle(seed):
     body = random_body(seed)
@@ -247,6 +248,7 @@ def test_random_bodies_step_once_a_cycle(seed):
             assert falls.count((foot, event)) == clip.cycles
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", EACH)
 def test_clips_are_in_step(robot):
     clips = made(robot)

@@ -106,6 +106,7 @@ def test_difficulty_0_is_level(kind):
     assert not arena.height(x, y).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "bastion"))
 def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
     level = terrain.made(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
