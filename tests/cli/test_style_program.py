@@ -61,7 +61,7 @@ def test_report_of_two_policies(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["gait.png", "path.png", "reward.png", "speed.png"]
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_saved_body_beside_a_policy(tmp_path):
     saved, figures = tmp_path / "spider.npz", tmp_path / "style.json"
     done = run(f"--spec={SPIDER}", "--episodes=2", "--seed=4", f"--save={saved}", f"--json={figures}")
@@ -88,7 +88,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
         assert (other.returncode, other.stdout, other.stderr) == (1, "", f"arc-suite style: {message}\n")
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
@@ -160,7 +160,7 @@ def test_other_tasks(tmp_path, task):
     )
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr

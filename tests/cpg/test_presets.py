@@ -26,7 +26,7 @@ def test_medium_earns_the_published_return(robot):
     assert {episode.length for episode in results} == {1000}
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("robot", RETURNS)
 def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
     presets = [PRESETS[robot][name] for name in ("refined", "tuned", "medium")]

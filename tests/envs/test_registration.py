@@ -134,7 +134,7 @@ print(gymnasium.make("creatures.hopper:arc_suite/hopper-walk-v0").reset()[0].sha
     assert package(code) == ["(2,)", "(107,)"]
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_preset_of_its_own_and_a_row_without_noise_serve_every_program(package, tmp_path):
     module = REGISTERING.replace('"base_noise": 0.02,', "").replace('("fast", 24)', '("fast", 24), ("prowl", 15)')
     (tmp_path / "hopper.py").write_text(module)

@@ -81,7 +81,7 @@ def contents(folder):
     return found
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["WITH_NUMPY", "WITH_JAX"])
 def test_killed_twice(name, tmp_path, begun):
     """First with all its processes, then alone, so that its runs go on; two jobs make what one makes."""
@@ -105,7 +105,7 @@ def test_killed_twice(name, tmp_path, begun):
     assert [path for path in whole if whole[path] != killed[path]] == []
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     (tmp_path / "study").mkdir()
     command = ["-m", "arc_suite", "study", "tiny_studies:WITH_NUMPY", "--jobs=2"]

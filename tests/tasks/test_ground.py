@@ -301,7 +301,7 @@ def test_a_curriculum_rises_for_who_walks():
     assert levels == [levels[0], levels[0] + 1, levels[0] + 2]
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_ground_has_no_scale():
     distances = []
     for scale in (0.075, 1.0, 10.0):
