@@ -44,7 +44,7 @@ def mapped(context: RunContext, task: Task) -> Replay:
     if not count:
         raise ValueError(f"prior {context.prior!r}: holds no episode")
     folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}")
-    with files.locked(folder):
+    with files.locked(folder / ".lock"):
         if not (folder / _COUNT).exists():
             replay = Replay(folder, count, size, joints)
             for episode in dataset:

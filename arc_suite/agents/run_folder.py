@@ -23,7 +23,7 @@ import numpy as np
 
 from arc_suite import checks, files
 
-CONFIG, CHECKPOINT = "config.json", "checkpoint.npz"
+CONFIG, CHECKPOINT, LOCK = "config.json", "checkpoint.npz", ".lock"
 TABLES = ("evaluations", "training", "times")
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
@@ -105,7 +105,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
     """
     path = files.folder(path)
     with contextlib.ExitStack() as stack:
-        stack.enter_context(files.locked(path, f"{path}: another process goes on with this run"))
+        stack.enter_context(files.locked(path / LOCK, f"{path}: another process goes on with this run"))
         _configure(path, config)
         files.delete_unfinished(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
