@@ -29,7 +29,7 @@ INSTALLED := $(VENV)/installed
 
 .PHONY: demo test check check-long check-release lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak fuzz mutants golden clean
 
-demo: $(INSTALLED)
+demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
 	mkdir -p out
 	$(VENV)/bin/arc-suite evaluate --robot queen --policy cpg --episodes 1
@@ -58,6 +58,11 @@ check: lint $(INSTALLED)
 lint: $(VENV)/linter
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
+
+$(VENV)/demo: setup.cfg pyproject.toml tools/ensure_venv.sh
+	tools/ensure_venv.sh $(VENV)
+	$(PYTHON) -m pip install -q -e '.[video]'
+	touch $@
 
 $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)

@@ -2,13 +2,22 @@
 
 import contextlib
 import errno
-import fcntl
 import json
 import math
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None
+    import msvcrt
+
+_FAR = 1 << 30  # the byte that is locked on Windows, where nobody else can read or write a locked one
+_PAUSE = 0.1  # s between two attempts at a lock
 
 
 def folder(path: str | os.PathLike) -> Path:
@@ -88,41 +97,57 @@ def writing_json(path: str | os.PathLike | None) -> Iterator[dict]:
     with contextlib.nullcontext() if path is None else writing(path) as temporary:
         yield report
         if temporary:
-            temporary.write_text(json.dumps(_plain(report), indent=2, allow_nan=False) + "\n")
+            temporary.write_text(json.dumps(_plain(report), indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def lock(file: IO | int) -> bool:
-    """Lock an open file or folder until it is closed; return False where another process has locked it."""
+def lock(file: IO) -> bool:
+    """Lock an open file until it is closed; return False where another process has locked it."""
     try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+        if fcntl:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        else:
+            here = file.tell()
+            file.seek(_FAR)
+            try:
+                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+            finally:
+                file.seek(here)
+    except (BlockingIOError, PermissionError):
         return False
     return True
 
 
 @contextlib.contextmanager
-def locked(folder: str | os.PathLike, refusal: str | None = None) -> Iterator[bool]:
-    """Keep a folder locked against other processes.
+def locked(path: str | os.PathLike, refusal: str | None = None) -> Iterator[None]:
+    """Hold a lock against other processes: a file that is there while the lock is held.
 
     Args:
-        folder: that is there.
-        refusal: the error where another process has locked it; with None, wait until it lets go.
-
-    Yields:
-        Whether the folder is still where it was; the other process may have moved or deleted it.
+        path: of the file, in a folder that is there.
+        refusal: the error where another process holds the lock; with None, wait for it.
 
     Raises:
-        ValueError: another process has locked it; the refusal.
+        ValueError: another process holds the lock; the refusal.
+        OSError: the file cannot be written.
     """
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        if refusal is None:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-        elif not lock(descriptor):
-            raise ValueError(refusal)
-        yield os.path.isdir(folder) and os.path.samestat(os.stat(folder), os.fstat(descriptor))
-    finally:
-        os.close(descriptor)
+    while True:
+        try:
+            file = open(path, "ab")  # noqa: SIM115
+        except OSError as error:
+            raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
+        with file:
+            while not lock(file):
+                if refusal is not None:
+                    raise ValueError(refusal)
+                time.sleep(_PAUSE)
+            # The process that held the lock may have deleted the file since it was opened here.
+            if not (os.path.exists(path) and os.path.samestat(os.stat(path), os.fstat(file.fileno()))):
+                continue
+            try:
+                yield
+            finally:
+                with contextlib.suppress(PermissionError):  # Windows deletes no open file
+                    os.unlink(path)
+            return
 
 
 def _plain(value):

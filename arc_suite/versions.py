@@ -1,9 +1,7 @@
 """The packages on which results depend, and the line that says how to get them."""
 
 import contextlib
-import importlib.metadata
-
-from packaging.specifiers import SpecifierSet
+import sys
 
 # As in setup.cfg. MuJoCo and dm_control move together.
 NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
@@ -11,9 +9,11 @@ NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2
 
 def installed(package: str) -> str | None:
     """Return the version of an installed package; None for one that is not installed."""
+    from importlib import metadata  # slow to import, and seldom needed
+
     try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
         return None
 
 
@@ -24,12 +24,16 @@ def recorded() -> dict[str, str | None]:
 
 def problems() -> list[str]:
     """Return a line with the remedy for every package that is missing or has a version that does not fit."""
+    from packaging.specifiers import SpecifierSet
+
     lines = []
     for package, needed in NEEDS.items():
         version = installed(package)
         if version is None or not SpecifierSet(needed).contains(version, prereleases=True):
             wrong = f"{package} is {version or 'not installed'} and should be {needed}"
-            lines.append(f"{wrong}: pip install '{package}{needed}'")
+            # From Python 3.13 on a package that dm_control asks for cannot be installed; nothing here uses it.
+            alone = "--no-deps " if package == "dm-control" and sys.version_info >= (3, 13) else ""
+            lines.append(f"{wrong}: pip install {alone}'{package}{needed}'")
     return lines
 
 

@@ -32,13 +32,13 @@ def compiled(model) -> dict[str, np.ndarray]:
     return arrays | {f"option/{name}": np.array(getattr(model.opt, name)) for name in options}
 
 
-def walked(robot: str) -> dict[str, np.ndarray]:
+def walked(robot: str, steps: int = STEPS) -> dict[str, np.ndarray]:
     """Observations, rewards and terms of a short walk, partly by rote, partly at random."""
     environment = arc_suite.load(robot, "walk", {"random": 7})
     demonstrator, noise = Demonstrator(robot), np.random.RandomState(8)
     timestep = environment.reset()
     observations, rewards, terms = [], [], []
-    for _ in range(STEPS):
+    for _ in range(steps):
         observations.append(np.concatenate(list(timestep.observation.values())))
         timestep = environment.step(demonstrator(timestep) + noise.normal(0.0, 0.3, environment.action_spec().shape))
         rewards.append(timestep.reward)

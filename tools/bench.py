@@ -69,7 +69,7 @@ def main():
     with files.writing(FLAGS.json) as json_path, files.writing(FLAGS.plot) as plot_path:
         progress = functools.partial(program.progress, unit="round")
         results = measurement.measure(robots, rows, threads, workers, FLAGS.rounds, FLAGS.steps, progress)
-        json_path.write_text(json.dumps(results, indent=1))
+        json_path.write_text(json.dumps(results, indent=1), encoding="utf-8")
         report.plot(results, plot_path)
     tables = report.tables(results)
     print(tables)

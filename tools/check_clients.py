@@ -65,7 +65,7 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
     wrong = next(filter(None, (_run(command, os.environ, _ROOT) for command in commands)), "")
     for block in client.blocks if not wrong else ():
         script = folder / "block.py"
-        script.write_text(block)
+        script.write_text(block, encoding="utf-8")
         wrong = wrong or _run([python, script], surroundings, folder)
     return wrong
 
@@ -77,7 +77,7 @@ def _of_this_repository(package: str) -> list[str]:
 
 def _run(command: list, surroundings: Mapping[str, str], folder: pathlib.Path) -> str:
     """What is wrong with a command, in one line."""
-    done = subprocess.run(command, cwd=folder, env=dict(surroundings), capture_output=True, text=True)
+    done = subprocess.run(command, cwd=folder, env=dict(surroundings), capture_output=True, encoding="utf-8")
     lines = done.stderr.strip().splitlines() or ["no message"]
     return f"{' '.join(map(str, command))}: status {done.returncode}: {lines[-1]}" if done.returncode else ""
 
@@ -89,7 +89,7 @@ def main() -> int:
         folder = pathlib.Path(folder)
         # Some leave caches and tokens in the user's home.
         surroundings = os.environ | {"HOME": str(folder), "MINARI_DATASETS_PATH": str(folder / "datasets")}
-        for client in clients(PAGE.read_text()):
+        for client in clients(PAGE.read_text(encoding="utf-8")):
             start = time.perf_counter()
             problem = check(client, surroundings, folder)
             failed |= bool(problem)

@@ -120,6 +120,6 @@ def read(path: Path) -> Configuration:
         OSError: the file cannot be read.
     """
     try:
-        return Configuration.from_dict(checks.mapping("configuration", json.loads(path.read_text())))
+        return Configuration.from_dict(checks.mapping("configuration", json.loads(path.read_text(encoding="utf-8"))))
     except ValueError as error:
         raise ValueError(f"{path}: {checks.quoted(error)}") from None

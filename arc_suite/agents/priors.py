@@ -44,7 +44,7 @@ def mapped(context: RunContext, task: Task) -> Replay:
     if not count:
         raise ValueError(f"prior {context.prior!r}: holds no episode")
     folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}")
-    with files.locked(folder):
+    with files.locked(folder / ".lock"):
         if not (folder / _COUNT).exists():
             replay = Replay(folder, count, size, joints)
             for episode in dataset:
@@ -56,7 +56,7 @@ def mapped(context: RunContext, task: Task) -> Replay:
             with files.writing_json(folder / _COUNT) as file:
                 file.update(total=replay.total, ends=replay.ends, dataset=context.prior)
     replay = Replay(folder, count, size, joints, mode="r")
-    known = json.loads((folder / _COUNT).read_text())
+    known = json.loads((folder / _COUNT).read_text(encoding="utf-8"))
     replay.restore(known["total"], known["ends"])
     return replay
 

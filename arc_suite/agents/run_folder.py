@@ -23,7 +23,7 @@ import numpy as np
 
 from arc_suite import checks, files
 
-CONFIG, CHECKPOINT = "config.json", "checkpoint.npz"
+CONFIG, CHECKPOINT, LOCK = "config.json", "checkpoint.npz", ".lock"
 TABLES = ("evaluations", "training", "times")
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
@@ -52,7 +52,7 @@ class RunFolder:
                     f"{path / name}.csv: shorter than at the checkpoint; delete {CHECKPOINT} to start over"
                 )
             file.truncate(lengths.get(name, 0))
-            first = (path / f"{name}.csv").read_text().partition("\n")[0]
+            first = (path / f"{name}.csv").read_text(encoding="utf-8").partition("\n")[0]
             self._columns[name] = first.split(",") if first else None
 
     def append(self, table: str, line: Mapping[str, float]) -> None:
@@ -105,7 +105,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
     """
     path = files.folder(path)
     with contextlib.ExitStack() as stack:
-        stack.enter_context(files.locked(path, f"{path}: another process goes on with this run"))
+        stack.enter_context(files.locked(path / LOCK, f"{path}: another process goes on with this run"))
         _configure(path, config)
         files.delete_unfinished(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
@@ -120,7 +120,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
         ValueError: no folder of a run.
     """
     try:
-        config = json.loads((Path(path) / CONFIG).read_text())
+        config = json.loads((Path(path) / CONFIG).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: no folder of a run: {checks.quoted(error)}") from None
     if not isinstance(config, dict):
@@ -170,7 +170,7 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     """
     path = Path(path) / f"{name}.csv"
     try:
-        text = path.read_text() if path.exists() else ""
+        text = path.read_text(encoding="utf-8") if path.exists() else ""
         header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
         if not lines:
             return {}

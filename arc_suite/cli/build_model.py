@@ -56,7 +56,7 @@ def main() -> None:
     arena = _arena(body)
     with contextlib.ExitStack() as stack:
         if FLAGS.output is not None:
-            stack.enter_context(files.writing(FLAGS.output)).write_text(_text(body, arena))
+            stack.enter_context(files.writing(FLAGS.output)).write_text(_text(body, arena), encoding="utf-8")
         elif not FLAGS.summary and FLAGS.render is None:
             print(_text(body, arena), end="")
         if FLAGS.render is not None:

@@ -55,7 +55,7 @@ def _packages() -> Iterator[Finding]:
 def _picture() -> Finding:
     command = [sys.executable, "-c", _PICTURE]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE)
+        done = subprocess.run(command, capture_output=True, encoding="utf-8", timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
         return Finding("picture", f"none within {_PATIENCE} s", "mend the OpenGL driver, or set MUJOCO_GL=osmesa")
     if done.returncode == 0:

@@ -95,4 +95,4 @@ def shard(text: str) -> tuple[int, int]:
 
 def last_line(log: Path) -> str:
     """Return the last line of a log."""
-    return (log.read_text(errors="replace").splitlines() or ["says nothing"])[-1]
+    return (log.read_text(encoding="utf-8", errors="replace").splitlines() or ["says nothing"])[-1]

@@ -157,7 +157,7 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
     with damages(dataset_id, path):
         if plain(path).stat().st_size > MAX_BYTES:
             raise ValueError(f"expected at most {MAX_BYTES} bytes")
-        metadata = json.loads(path.read_text())
+        metadata = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
     with damages(dataset_id, path):

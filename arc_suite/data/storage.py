@@ -76,12 +76,15 @@ class Storage:
             OSError: its files cannot be made.
         """
         place = ids.folder(dataset_id)
-        new, old = (place.with_name(f".{place.name}.{suffix}") for suffix in ("new", "old"))
-        if old.exists():  # killed while a dataset was replaced
-            shutil.rmtree(old) if place.exists() else old.rename(place)
+        new, old, lock = (place.with_name(f".{place.name}.{suffix}") for suffix in ("new", "old", "lock"))
         _make_namespace(dataset_id)
+        files.folder(place.parent)
         refusal = None if wait else f"dataset {dataset_id!r} is being collected by another process"
-        with _locked(new, place, overwrite, refusal) as folder:
+        with files.locked(lock, refusal):  # apart from the folders, which move
+            if old.exists():  # killed while a dataset was replaced
+                shutil.rmtree(old) if place.exists() else old.rename(place)
+            folder = new if overwrite or not place.exists() else place
+            files.folder(folder / "data")
             try:
                 storage = cls(dataset_id, folder, place, early=not overwrite)
             except ValueError:
@@ -209,7 +212,7 @@ class Storage:
         }
         path = self._folder / "data" / METADATA
         with files.writing(path) as temporary, _one_line(path):
-            temporary.write_text(json.dumps(self.metadata | counts, indent=2) + "\n")
+            temporary.write_text(json.dumps(self.metadata | counts, indent=2) + "\n", encoding="utf-8")
             _synchronise(temporary)
         _synchronise(path.parent)
 
@@ -238,20 +241,6 @@ class Storage:
         shutil.rmtree(old, ignore_errors=True)
 
 
-@contextlib.contextmanager
-def _locked(new: Path, place: Path, overwrite: bool, refusal: str | None) -> Iterator[Path]:
-    """Lock the folder to collect into, the new one or the place, against other processes."""
-    while True:
-        folder = new if overwrite or not place.exists() else place
-        files.folder(folder / "data")
-        with files.locked(folder, refusal) as is_there:
-            if is_there and (overwrite or folder == place or not place.exists()):
-                yield folder
-                return
-            if is_there:  # another process has moved its own to the place since we looked
-                shutil.rmtree(new)
-
-
 def _make_namespace(dataset_id: str) -> None:
     namespace = parse_dataset_id(dataset_id)[0]
     if namespace is not None and namespace not in list_local_namespaces():
@@ -260,8 +249,11 @@ def _make_namespace(dataset_id: str) -> None:
 
 def _exchange(one: Path, other: Path) -> bool:
     """Let two folders change their names at once, so that neither is ever missing; False where that cannot be done."""
-    renameat2 = getattr(ctypes.CDLL(None), "renameat2", None)  # Linux alone has it, and not on every file system
-    return renameat2 is not None and renameat2(_HERE, bytes(one), _HERE, bytes(other), _EXCHANGE) == 0
+    try:
+        renameat2 = ctypes.CDLL(None).renameat2
+    except (AttributeError, TypeError):  # macOS; Windows
+        return False
+    return renameat2(_HERE, bytes(one), _HERE, bytes(other), _EXCHANGE) == 0  # not on every file system
 
 
 def _image():
@@ -279,8 +271,10 @@ def _one_line(path: Path):
 
 
 def _synchronise(path: Path) -> None:
-    """Wait until a file or folder is on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
+    """Wait until a file or folder is on the disk; Windows opens no folders."""
+    if os.name == "nt" and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)  # Windows flushes what it may write
     try:
         os.fsync(descriptor)
     finally:

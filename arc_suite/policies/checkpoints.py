@@ -51,7 +51,8 @@ def agents(path: Path) -> list[Agent]:
     """
     try:
         found = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
-        return sorted((Agent(**json.loads(file.read_text())) for file in found), key=lambda agent: agent.steps)
+        agents = [Agent(**json.loads(file.read_text(encoding="utf-8"))) for file in found]
+        return sorted(agents, key=lambda agent: agent.steps)
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"{path}: damaged: {checks.quoted(error)}") from None
 

@@ -46,7 +46,7 @@ def save_body(body: Body, path: str | os.PathLike) -> None:
     Raises:
         OSError: the file cannot be written.
     """
-    Path(path).write_text(body_to_json(body))
+    Path(path).write_text(body_to_json(body), encoding="utf-8")
 
 
 def body_to_json(body: Body) -> str:

@@ -18,6 +18,12 @@ class ForkError(RuntimeError):
     """An object from before a fork was used in the child process."""
 
 
+def at_fork(**handlers) -> None:
+    """Register handlers as `os.register_at_fork` does; Windows has no forks."""
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(**handlers)
+
+
 def refuse(what: str):
     """Raise the ForkError of something whose remembered `count` is not the present one."""
     raise ForkError(
@@ -38,4 +44,4 @@ def _after_fork() -> None:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(thing))  # not even the interpreter's end destroys it
 
 
-os.register_at_fork(after_in_child=_after_fork)
+at_fork(after_in_child=_after_fork)

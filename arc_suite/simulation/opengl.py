@@ -21,6 +21,7 @@ from arc_suite import checks
 from arc_suite.simulation import forks
 
 _REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
+_WINDOWED = ("darwin", "win32")  # platforms that always have a display, and no EGL
 _OFF = ("off", "disable", "disabled", "false", "0")  # values of MUJOCO_GL that both libraries take for no backend
 _BACKEND = "dm_control._render"  # dm_control's choice of a backend, made when this module is executed
 
@@ -98,7 +99,7 @@ def _strict_glfw():
 
 def has_display() -> bool:
     """Return whether a window should open: always on macOS and Windows, elsewhere with X11 or Wayland."""
-    return sys.platform in ("darwin", "win32") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return sys.platform in _WINDOWED or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def require_window(instead: str = "use render_mode 'rgb_array'") -> None:
@@ -300,8 +301,12 @@ def _explain(error: Exception) -> str:
     else:
         reason = checks.quoted(error.__cause__ or error).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
-    return f"cannot render{backend}: {reason}; {_REMEDY}"
+    return f"cannot render{backend}: {reason}; {_remedy()}"
+
+
+def _remedy() -> str:
+    return "unset MUJOCO_GL: pictures are drawn by GLFW here" if sys.platform in _WINDOWED else _REMEDY
 
 
 # A fork waits for a renderer that is being made, so that the child finds none or a whole one.
-os.register_at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)
+forks.at_fork(before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release)

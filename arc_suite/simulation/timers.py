@@ -6,11 +6,12 @@ leaves it empty, but its Python bindings install a clock on import.
 
 import contextlib
 import ctypes
-import os
 import pathlib
 import threading
 
 import mujoco
+
+from arc_suite.simulation import forks
 
 
 class Off:
@@ -28,8 +29,7 @@ class Off:
         self._lock = threading.Lock()
         self._inside = 0  # threads
         self._taken = False
-        if hasattr(os, "register_at_fork"):
-            os.register_at_fork(after_in_child=self._leave_all)
+        forks.at_fork(after_in_child=self._leave_all)
 
     def __enter__(self):
         with self._lock:

@@ -49,15 +49,15 @@ def publish(run: Run, folder: Path, published: Path) -> None:
         return
     files.folder(target)
     config = target / run_folder.CONFIG
-    if config.exists() and config.read_text() != (source / run_folder.CONFIG).read_text():
+    if config.exists() and config.read_bytes() != (source / run_folder.CONFIG).read_bytes():
         (target / "style.csv").unlink(missing_ok=True)  # of another run
     for name in PUBLISHED:
         with files.writing(target / name) as temporary:
-            temporary.write_text((source / name).read_text())
+            temporary.write_bytes((source / name).read_bytes())
     training = table(source, "training")
     if np.any(training.get("phase_updates", 0)):
         with files.writing(target / "phases.csv") as temporary:
-            temporary.write_text(_phases(training))
+            temporary.write_text(_phases(training), encoding="utf-8")
     step = int(steps[-1])
     measured, drawn = table(target, "style"), target / results.STRIP
     up_to_date = bool(measured) and measured["step"][-1] == step
@@ -71,7 +71,7 @@ def publish(run: Run, folder: Path, published: Path) -> None:
     if not up_to_date:
         text = _style(run, source, step)  # slow; a kill meanwhile leaves no temporary file
         with files.writing(target / "style.csv") as temporary:
-            temporary.write_text(text)
+            temporary.write_text(text, encoding="utf-8")
 
 
 def _phases(training: Mapping[str, np.ndarray]) -> str:
@@ -92,7 +92,10 @@ def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
     places = {run.place: run for run in runs}
     if places.keys() <= known.keys() or not published.exists():
         return
-    with files.writing(published / results.DEMONSTRATORS) as temporary, temporary.open("w", newline="") as file:
+    with (
+        files.writing(published / results.DEMONSTRATORS) as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(("place", "preset", "seed", "return"))
         for place, presets in known.items():

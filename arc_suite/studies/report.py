@@ -148,10 +148,11 @@ def write(name: str, study: Study, published: Path) -> Path:
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
     with files.writing(published / REPORT) as temporary:
-        temporary.write_text(_page(sections))
+        temporary.write_text(_page(sections), encoding="utf-8")
     if tables.STUDIES.get(name) == study:
         with files.writing(published.parent / REPORT) as temporary:
-            temporary.write_text(_page({"Leaderboard": [_LEADERBOARD, _leaderboard(published.parent)]}))
+            page = _page({"Leaderboard": [_LEADERBOARD, _leaderboard(published.parent)]})
+            temporary.write_text(page, encoding="utf-8")
     return published / REPORT
 
 

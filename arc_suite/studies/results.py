@@ -75,7 +75,7 @@ def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
     """Return the returns of demonstrators, by place (`Run.place`) and preset, each (episodes,)."""
     found: dict[str, dict[str, list[float]]] = {}
     if (published / DEMONSTRATORS).exists():
-        with (published / DEMONSTRATORS).open(newline="") as file:
+        with (published / DEMONSTRATORS).open(encoding="utf-8", newline="") as file:
             for line in csv.DictReader(file):
                 found.setdefault(line["place"], {}).setdefault(line["preset"], []).append(float(line["return"]))
     return {place: {name: np.array(values) for name, values in presets.items()} for place, presets in found.items()}

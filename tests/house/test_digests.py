@@ -4,6 +4,7 @@ import functools
 
 import digests
 import numpy as np
+import platforms
 import pytest
 from tiers import turn
 
@@ -44,5 +45,6 @@ def test_digests_are_the_accepted_ones(name, case):
     if same_arithmetic():
         assert now == before
     else:  # bits differ from processor to processor, and soon so do walks
-        first = [[np.nan if reward is None else reward for reward in run["first"]] for run in (now, before)]
+        steps = digests.FIRST if platforms.GOLDEN else 2  # a reset, which has no reward, and one step
+        first = [[np.nan if reward is None else reward for reward in run["first"][:steps]] for run in (now, before)]
         np.testing.assert_allclose(*first, rtol=1e-6, atol=1e-6)

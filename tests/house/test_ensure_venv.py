@@ -2,14 +2,25 @@
 
 import os
 import pathlib
+import re
 import subprocess
 
 import pytest
 
 SCRIPT = pathlib.Path(__file__).parents[2] / "tools" / "ensure_venv.sh"
+CONFIG = SCRIPT.parents[1] / "setup.cfg"
+# A Python that the suite runs on: it makes environments, and writes down what it installs.
+FITS = """
+case "$1 $2" in
+"-m venv") mkdir -p "$4/bin"; echo "$0" > "$4/made_by"; cp "$0" "$4/bin/python";;
+"-m pip") shift 2; echo "$*" > "${0%/bin/python}/installed";;
+"-c import sys; sys.exit(sys.version_info < (3, 13))") exit STATUS;;
+esac
+"""
 PYTHONS = {
-    "fits": 'case "$1" in -m) mkdir -p "$4/bin"; echo "$0" > "$4/made_by";; esac; exit 0',
-    "3.13": 'case "$1" in -V) echo "Python 3.13.5";; *) exit 1;; esac',
+    "fits": FITS.replace("STATUS", "1"),
+    "3.13": FITS.replace("STATUS", "0"),
+    "3.15": 'case "$1" in -V) echo "Python 3.15.0";; *) exit 1;; esac',
     "broken": "echo no such version >&2; exit 127",
 }
 
@@ -21,7 +32,7 @@ def run(tmp_path):
             program = tmp_path / name.replace("_", ".")
             program.write_text(f"#!/bin/sh\n{PYTHONS[kind]}\n")
             program.chmod(0o755)
-        for tool in ("mkdir", "dirname"):
+        for tool in ("mkdir", "dirname", "cp"):
             (tmp_path / tool).symlink_to(f"/bin/{tool}")
         venv = tmp_path / "venv"
         done = subprocess.run(
@@ -37,9 +48,10 @@ def run(tmp_path):
     ("pythons", "chosen"),
     [
         ({"python3_11": "fits", "python3_12": "fits", "python3": "fits"}, "python3.11"),
-        ({"python3_11": "broken", "python3_12": "fits", "python3": "3.13"}, "python3.12"),
+        ({"python3_11": "broken", "python3_12": "fits", "python3": "3.15"}, "python3.12"),
         ({"python3_12": "fits"}, "python3.12"),
         ({"python3_12": "broken", "python3": "fits"}, "python3"),
+        ({"python3_13": "3.13", "python3": "3.15"}, "python3.13"),
     ],
 )
 def test_the_first_python_that_fits_is_taken(run, pythons, chosen):
@@ -47,12 +59,26 @@ def test_the_first_python_that_fits_is_taken(run, pythons, chosen):
 
 
 @pytest.mark.parametrize(
-    ("pythons", "found"), [({"python3": "3.13", "python3_12": "broken"}, "Python 3.13.5"), ({}, "no Python")]
+    ("pythons", "found"), [({"python3": "3.15", "python3_12": "broken"}, "Python 3.15.0"), ({}, "no Python")]
 )
 def test_without_one_a_line_says_what_to_install(run, pythons, found):
     status, error, made_by = run(**pythons)
     assert (status, made_by) == (1, None)
     assert error == (
-        f"arc_suite needs Python 3.11 or 3.12, found {found}: install one, such as by 'uv python install 3.12', "
-        "or see 'Python 3.13' in docs/install.md\n"
+        f"arc_suite needs Python 3.11 to 3.14, found {found}: install one, such as by 'uv python install 3.12'\n"
     )
+
+
+@pytest.mark.parametrize(("python", "comes"), [("fits", False), ("3.13", True)])
+def test_from_3_13_on_dm_control_comes_first_and_alone(run, tmp_path, python, comes):
+    run(python3=python)
+    installed = tmp_path / "venv" / "installed"
+    (pinned,) = re.findall(r"^    (dm-control==[^;]*);", CONFIG.read_text(), re.MULTILINE)
+    assert (installed.read_text() if installed.exists() else "") == comes * f"install -q --no-deps {pinned}\n"
+
+
+@pytest.mark.parametrize(("target", "extra"), [("demo", ".[video]"), ("test", ".[test]")])
+def test_what_a_target_installs(target, extra):
+    command = ["make", "--dry-run", "--directory", CONFIG.parent, "VENV=/nonexistent", target]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert [line.split()[-1] for line in done.stdout.splitlines() if "pip install" in line] == [f"'{extra}'"]

@@ -12,6 +12,7 @@ import pytest
 import arc_suite
 from arc_suite import models
 from arc_suite.robots import ROBOTS
+from arc_suite.simulation import opengl
 
 ROOT = pathlib.Path(__file__).parents[2]
 
@@ -139,6 +140,14 @@ def script(code, *arguments):
 
 
 @pytest.mark.slow
+def test_where_there_is_no_egl_the_remedy_is_another(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "win32")
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    with pytest.raises(opengl.RenderingUnavailable) as error, opengl._errors():
+        raise RuntimeError("invalid value for environment variable MUJOCO_GL: egl")
+    assert str(error.value).endswith(": egl; unset MUJOCO_GL: pictures are drawn by GLFW here")
+
+
 def test_import_opens_nothing():
     code = (
         "import sys, threading, arc_suite, dm_control.suite\n"

@@ -77,7 +77,7 @@ class _Field:
     def __init__(self, robot, rows, threads, workers, stack: contextlib.ExitStack):
         folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
         path = folder / f"{robot}.xml"
-        path.write_text(ordinary.full_model(robot).to_xml_string())
+        path.write_text(ordinary.full_model(robot).to_xml_string(), encoding="utf-8")
         ordinary_id = ordinary.register(robot, str(path))
         stack.callback(gymnasium.registry.pop, ordinary_id)
         # Processes fork before there are any threads.
@@ -156,11 +156,11 @@ def _size(robot: str, rows: int, threads: int) -> dict:
 
 def _memory() -> int:
     """Bytes of the process that lie in memory."""
-    return int(pathlib.Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+    return int(pathlib.Path("/proc/self/statm").read_text(encoding="utf-8").split()[1]) * resource.getpagesize()
 
 
 def _processor() -> str:
-    for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
+    for line in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
         if line.startswith("model name"):
             return line.split(":")[1].strip()
     return platform.machine()

@@ -69,14 +69,15 @@ def document(path: str) -> pathlib.Path:
     """
     if not pathlib.Path(path).is_file():
         raise ValueError(f"--document: no file {path}")
-    if not _MARKED.search(pathlib.Path(path).read_text()):
+    if not _MARKED.search(pathlib.Path(path).read_text(encoding="utf-8")):
         raise ValueError(f"{path} has no <!-- benchmark --> and <!-- end of benchmark -->")
     return pathlib.Path(path)
 
 
 def into_document(path: pathlib.Path, text: str) -> None:
     """Puts the tables between the marks of a Markdown file."""
-    path.write_text(_MARKED.sub(lambda match: f"{match[1]}{text}{match[2]}", path.read_text()))
+    page = path.read_text(encoding="utf-8")
+    path.write_text(_MARKED.sub(lambda match: f"{match[1]}{text}{match[2]}", page), encoding="utf-8")
 
 
 def plot(results: dict, path: pathlib.Path) -> None:

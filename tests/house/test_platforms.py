@@ -1,0 +1,120 @@
+"""The suite on other platforms: what Windows does not have, and texts whose encoding depends on the machine."""
+
+import ast
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+ROOT = pathlib.Path(__file__).parents[2]
+SOURCES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
+
+# Takes from Python what Windows does not have, and gives it a lock on a range of bytes as msvcrt has.
+WINDOWS = """
+import ctypes, fcntl, os, sys, types
+import gymnasium, minari, multiprocessing, subprocess
+posix = fcntl
+def locking(descriptor, mode, count):
+    here = os.lseek(descriptor, 0, os.SEEK_CUR)
+    try:
+        posix.lockf(descriptor, posix.LOCK_EX | posix.LOCK_NB, count, here)
+    except OSError as error:
+        raise PermissionError(13, "Permission denied") from error
+sys.modules["msvcrt"] = types.SimpleNamespace(LK_NBLCK=2, locking=locking)
+for name in ("fcntl", "resource", "termios", "pwd", "grp", "pty", "tty"):
+    sys.modules[name] = None
+for name in ("register_at_fork", "fork", "forkpty", "sched_getaffinity", "posix_fallocate", "mkfifo", "getuid",
+             "killpg", "setsid", "getpgid"):
+    delattr(os, name)
+class CDLL(ctypes.CDLL):
+    def __init__(self, name, *args, **kwargs):
+        if name is None or "EGL" in str(name):
+            raise (TypeError if name is None else OSError)("no such library")
+        super().__init__(name, *args, **kwargs)
+ctypes.CDLL = CDLL
+"""
+
+USE = """
+import functools, pathlib
+import numpy as np, tqdm
+import arc_suite
+from arc_suite import data, files
+from arc_suite.robots import ROBOTS, spec_files
+environment = arc_suite.load("queen", "walk", {"random": 0})
+environment.reset()
+assert environment.step(np.zeros(environment.action_spec().shape)).reward > 0.0
+with files.locked(".lock"):
+    with files.writing_json("a.json") as report:
+        report["leg"] = "Füße"
+    assert os.system(sys.executable + " other.py") == 0
+spec_files.save_body(ROBOTS["queen"], "queen.json")
+assert spec_files.load_body("queen.json") == ROBOTS["queen"]
+collect = functools.partial(data.collect, progress=functools.partial(tqdm.tqdm, disable=True))
+settings = data.Settings(arc_suite.Setup.of("tick"), "random", (), steps=4)
+for arguments in ({}, {"overwrite": True}):
+    assert collect("test-v0", settings, 2, **arguments) == 2
+assert len(data.open("test-v0")) == 2
+"""
+
+# Another process, which finds the lock held.
+OTHER = """
+from arc_suite import files
+try:
+    with files.locked(".lock", "held"):
+        raise SystemExit("not locked")
+except ValueError as error:
+    assert str(error) == "held"
+"""
+
+
+def run(code, folder, *options):
+    environ = os.environ | {"PYTHONPATH": str(ROOT), "MINARI_DATASETS_PATH": str(folder / "datasets")}
+    command = [sys.executable, *options, "-c", code]
+    return subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True)
+
+
+@pytest.mark.slow
+def test_what_windows_does_not_have_is_not_needed(tmp_path):
+    (tmp_path / "other.py").write_text(WINDOWS + OTHER)
+    done = run(WINDOWS + USE, tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "a.json").read_bytes().decode() == '{\n  "leg": "F\\u00fc\\u00dfe"\n}\n'
+
+
+@pytest.mark.slow
+def test_files_do_not_depend_on_the_encoding_of_the_machine(tmp_path):
+    strict = "import os, sys, warnings\nwarnings.filterwarnings('error', '', EncodingWarning, 'arc_suite')\n"
+    (tmp_path / "other.py").write_text(OTHER)
+    done = run(strict + USE, tmp_path, "-X", "warn_default_encoding")
+    assert done.returncode == 0, done.stderr
+
+
+NO_TEXT = ("os.open(", "data.open(", "open(dataset_id)")  # what opens no text
+
+
+def without_encoding(text):
+    """Return the calls that read or write text and name no encoding."""
+    calls = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
+    found = []
+    for call in calls:
+        name, given = ast.unparse(call.func).rpartition(".")[2], {keyword.arg for keyword in call.keywords}
+        modes = [node.value for node in ast.walk(call) if isinstance(node, ast.Constant)]
+        binary = any(isinstance(mode, str) and "b" in mode and set(mode) <= set("abrwx+") for mode in modes)
+        opens = name == "open" and not binary and not ast.unparse(call).startswith(NO_TEXT)
+        if (opens or name in ("read_text", "write_text") or "text" in given) and "encoding" not in given:
+            found.append(ast.unparse(call))
+    return found
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_text_names_its_encoding(path):
+    assert without_encoding(path.read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    "call", ["open(path)", "path.open('w')", "path.read_text()", "path.write_text('b')", "subprocess.run(a, text=True)"]
+)
+def test_the_check_of_encodings_finds_what_it_looks_for(call):
+    assert without_encoding(f"with files.writing('a') as path:\n    {call}") == [call]
