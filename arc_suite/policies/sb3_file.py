@@ -3,14 +3,13 @@
 A zip holds pickles, and so does a file of statistics of `VecNormalize`: reading one runs its code.
 """
 
-import pickle
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
-from stable_baselines3.common.save_util import load_from_zip_file
+from stable_baselines3.common.save_util import load_from_pkl, load_from_zip_file
 from stable_baselines3.common.vec_env import VecNormalize
 
 from arc_suite import checks
@@ -105,8 +104,7 @@ class Saved:
 
 def _statistics(path: Path, size: tuple[int, ...]) -> VecNormalize:
     try:
-        with path.open("rb") as file:
-            found = pickle.load(file)
+        found = load_from_pkl(path)
     except OSError:
         raise
     except Exception as error:  # a pickle may raise anything
