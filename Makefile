@@ -4,7 +4,7 @@
 # make check-long  tests that take long
 # make check-release  further cases of tests that have many, and tests that take minutes: half an hour, before a release
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
-# make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
+# make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make web     bundles the viewer that pages are made of, and three.js; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
@@ -89,9 +89,9 @@ check-sb3: VENV := .venv-sb3
 check-sb3: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q '$(TORCH)'
-	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest
+	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest matplotlib 'sbx-rl==0.28.0'
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
-	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py tests/policies/test_sb3_file.py
+	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py tests/policies/test_sb3_file.py tests/examples
 
 check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)

@@ -14,14 +14,14 @@ from collections.abc import Mapping
 from absl import flags
 
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, setups
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, policy_name, setups
 from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "all", f"{ROBOT_HELP}, or all.")
-flags.DEFINE_string("policy", "cpg", policies.HELP)
+define_policy()
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
@@ -46,10 +46,13 @@ def main() -> None:
     """Print the table and write the JSON."""
     asked = setups(_ROBOT)
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
-    players = {}
+    chosen, players = policy_name(FLAGS.policy), {}
     for name, setup in asked.items():
         environment, body = setup.load(), setup.body
-        players[name] = environment, policies.policy(FLAGS.policy, body, FLAGS.preset, task=environment.task.definition)
+        players[name] = (
+            environment,
+            policies.policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=environment.task.definition),
+        )
     experts = {name: evaluation.expert_return(setup) for name, setup in asked.items()}
     with files.writing_json(FLAGS.json) as file:
         reports = {}
@@ -65,7 +68,7 @@ def main() -> None:
         file.update(
             task=setup.task,
             task_kwargs=setup.task_kwargs,
-            policy=FLAGS.policy,
+            policy=chosen,
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,
             robots=reports,

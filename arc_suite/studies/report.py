@@ -11,19 +11,13 @@ import numpy as np
 from arc_suite import checks, evaluation, files
 from arc_suite.agents import run_folder
 from arc_suite.envs.setup import Setup
+from arc_suite.paper import FINALS as PAPER
 from arc_suite.studies import results, tables
 from arc_suite.studies.results import STRIP, Result
 from arc_suite.studies.tables import Run, Study
 
 REPORT, CURVES = "README.md", "curves.png"
 
-# Final returns after 1,000,000 steps, mean of five seeds, read off the paper's curves, within about 30.
-PAPER = {
-    "leaper": {"sac": 2860, "speq": 3120, "sope_eo": 3310, "sacfd": 3520, "speq_o2o": 3550, "sope": 3760},
-    "bastion": {"sac": 3080, "speq": 3350, "sope_eo": 3530, "sacfd": 3530, "speq_o2o": 3680, "sope": 3690},
-    "queen": {"sac": 3520, "speq": 3330, "sope_eo": 3580, "sacfd": 3220, "speq_o2o": 3620, "sope": 3730},
-    "tick": {"sac": 2590, "speq": 3590, "sope_eo": 3490, "sacfd": 3160, "speq_o2o": 3720, "sope": 3610},
-}
 ONLINE = ("sac", "speq", "sope_eo")
 WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
 COMPETITIVE = 100.0  # of return: within it of the best online algorithm the paper calls SAC competitive

@@ -80,6 +80,6 @@ def test_a_task_that_rounds_otherwise_alone_is_told_by_its_term(tmp_path):
         "        return super().terms(memory, readings) | {'forward': memory.forward_velocity**2}\n\n"
         "arc_suite.register(module=__name__, tasks=(Squaring,))\n"
     )
-    done = programs.arc_suite("check", "--task=squaring:squaring", "--robot=tick", cwd=tmp_path, path=tmp_path)
+    done = programs.arc_suite("check", "--task=squaring:squaring", "--robot=tick", cwd=tmp_path)
     assert done.returncode == 1 and done.stdout.startswith("tick, squaring: a batch of environments differs from one")
     assert done.stdout.endswith(": term forward\n")

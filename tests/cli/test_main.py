@@ -75,6 +75,19 @@ def test_only_the_program_that_runs_is_imported():
     assert done.stdout == f"{VERSION}{['arc_suite.cli.doctor', 'arc_suite.cli.main', 'arc_suite.cli.program']}\n"
 
 
+def test_modules_of_the_current_folder_come_last(tmp_path):
+    """A policy there is found by its name; files there hide neither registered names nor installed modules."""
+    for hidden in ("queen", "walk", "minari", "arc_suite"):
+        (tmp_path / f"{hidden}.py").write_text("raise SystemExit('imported from the current folder')\n")
+    (tmp_path / "pol.py").write_text("def make(robot):\n    return lambda timestep: [0.0] * 18\n")
+    evaluate = ("evaluate", "--robot=queen", "--task=walk", "--episodes=1", "--set=time_limit=0.5")
+    done = programs.arc_suite(*evaluate, "--policy=pol:make", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    assert programs.arc_suite("collect", "--verify=a/b-v0", cwd=tmp_path).stderr.startswith("arc-suite collect: ")
+    done = programs.arc_suite(*evaluate, "--policy=lop:make", cwd=tmp_path)
+    assert done.stderr == "arc-suite evaluate: policy 'lop:make': No module named 'lop'\n"
+
+
 @functools.cache
 def help_of(program):
     done = run(program, "--help")

@@ -20,8 +20,8 @@ def broken(robot): return lambda time_step: np.full(12, np.nan)
 """
 
 
-def run(*arguments, path=""):
-    return programs.arc_suite("style", *arguments, path=path)
+def run(*arguments, cwd=None):
+    return programs.arc_suite("style", *arguments, cwd=cwd)
 
 
 @pytest.mark.long
@@ -34,7 +34,7 @@ def test_report_of_two_policies(tmp_path):
         "--episodes=2",
         f"--json={figures}",
         f"--output={folder}",
-        path=tmp_path,
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
@@ -117,7 +117,7 @@ def test_other_tasks(tmp_path, task):
     (tmp_path / "staying.py").write_text(fixtures + registering)
     saved, figures, folder = tmp_path / "tick.npz", tmp_path / "style.json", tmp_path / "pictures"
     asked = (f"--task={task}", "--set=time_limit=2", "--set=arena=bumps", "--episodes=1")
-    done = run("--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", path=tmp_path)
+    done = run("--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     report = json.loads(figures.read_text(), parse_constant=pytest.fail)
     assert (report["task"], report["task_kwargs"]) == (task, {"time_limit": 2, "arena": "bumps"})
@@ -135,7 +135,7 @@ def test_other_tasks(tmp_path, task):
 
     # What was saved tells its task and settings; the same episode again gives the same figures.
     again = programs.arc_suite(
-        "style", f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", path=tmp_path
+        "style", f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", cwd=tmp_path
     )
     if task == "steer":
         assert again.returncode == 0, again.stderr
@@ -147,11 +147,11 @@ def test_other_tasks(tmp_path, task):
         refusal = f"task {task!r}: files import nothing; import 'staying' first"
         assert again.stderr == f"arc-suite style: {saved}: {refusal}\n"
         again = programs.arc_suite(
-            "style", f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path
+            "style", f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", cwd=tmp_path
         )
         assert again.returncode == 0, again.stderr
         assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]
-    other = run(f"--policy={saved}", "--set=arena=flat", f"--task={task}", path=tmp_path)
+    other = run(f"--policy={saved}", "--set=arena=flat", f"--task={task}", cwd=tmp_path)
     assert (other.returncode, other.stdout) == (1, "")
     name = task.rpartition(":")[2]
     assert other.stderr == (
@@ -202,7 +202,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
-    done = run(*arguments, path=tmp_path)
+    done = run(*arguments, cwd=tmp_path)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == f"arc-suite style: {message}"  # on a line that a progress bar has left
     assert "Traceback" not in done.stderr

@@ -77,7 +77,10 @@ def test_without_jax_it_says_what_to_install(tmp_path):
 
 def test_export_of_what_is_no_run(tmp_path):
     one_line(run("export", "runs/none", cwd=tmp_path), "arc-suite export: cannot read runs/none: no such file")
-    one_line(run("export", cwd=tmp_path), "arc-suite export: expected the folder of a run; see --help")
+    one_line(
+        run("export", cwd=tmp_path),
+        "arc-suite export: expected the folder of a run, a policy file or a zip of stable-baselines3; see --help",
+    )
 
 
 @pytest.fixture(scope="module")

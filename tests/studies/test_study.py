@@ -5,6 +5,7 @@ import importlib.util
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -281,6 +282,13 @@ def test_errors_are_one_line(arguments, line, tmp_path):
     assert done.stderr.startswith(line), done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_a_study_is_found_in_the_current_folder(tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "study.md").read_text(), re.DOTALL)
+    (tmp_path / "my_studies.py").write_text(code)
+    done = programs.arc_suite("study", "my_studies:MINE", "--shard=6/7", cwd=tmp_path)
+    assert done.stderr == "arc-suite study: --shard=6/7: no run, as the study has 6\n"
 
 
 @pytest.mark.parametrize("name", tables.STUDIES)
