@@ -299,7 +299,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Go on, bit-exact, from the snapshot of an environment of the same size and task.
 
         Raises:
-            ValueError: an array is missing or does not fit. The environment is to be thrown away then.
+            ValueError: an array is missing or does not fit; none has been used.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
