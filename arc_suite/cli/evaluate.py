@@ -2,7 +2,8 @@
 
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
 return is compared with that of the paper's demonstrator, where the task is the paper's. IQM is the
-interquartile mean of the return, with a stratified bootstrap interval.
+interquartile mean of the return, with a stratified bootstrap interval. The JSON is an entry for
+`arc-suite enter`: it holds every episode, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
   arc-suite evaluate --spec examples/spider.json
@@ -16,6 +17,7 @@ from absl import flags
 from arc_suite import checks, evaluation, files, policies, versions
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, policy_name, setups
 from arc_suite.cli.program import progress
+from arc_suite.evaluation import entries
 
 FLAGS = flags.FLAGS
 define_body()
@@ -63,12 +65,13 @@ def main() -> None:
                 names = {name: name for name in episodes[0].progress}
                 header = line("robot".ljust(width), names, "return", "IQM [95 % interval]", "steps", "paper's cpg")
                 print(header, "-" * len(header), sep="\n")
-            reports[robot] = report(episodes, experts[robot])
+            reports[robot] = {"provenance": entries.provenance(asked[robot])} | report(episodes, experts[robot])
             print(row(robot.ljust(width), reports[robot]), flush=True)
         file.update(
             task=setup.task,
             task_kwargs=setup.task_kwargs,
             policy=chosen,
+            policy_sha256=entries.policy_sha256(chosen),
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,
             robots=reports,

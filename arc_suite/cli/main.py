@@ -20,6 +20,7 @@ PROGRAMS = (
     "tune_cpg",
     "train",
     "study",
+    "enter",
     "export",
     "survey",
     "doctor",

@@ -26,6 +26,7 @@ TASKED = (
     "tune_cpg",
     "train",
     "survey",
+    "enter",
 )
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
@@ -111,7 +112,7 @@ def test_help_of_a_program(program):
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study") else []), "stray")
+    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study", "enter") else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 
