@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 try:
     import fcntl
@@ -16,6 +16,7 @@ except ImportError:  # Windows
     fcntl = None
     import msvcrt
 
+MAX_JSON = 1 << 24  # bytes
 _FAR = 1 << 30  # the byte that is locked on Windows, where nobody else can read or write a locked one
 _PAUSE = 0.1  # s between two attempts at a lock
 
@@ -71,6 +72,41 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def plain(path: str | os.PathLike) -> Path:
+    """Return the path of a file; reading a pipe would block.
+
+    Raises:
+        OSError: there is none.
+        ValueError: it is no file.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
+    if not path.is_file():
+        raise ValueError("expected a file")
+    return path
+
+
+def read_json(path: str | os.PathLike, most: int = MAX_JSON) -> Any:
+    """Return the content of a file of JSON that others may have written.
+
+    Args:
+        path: of the file.
+        most: bytes that it may have.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: it is no file, longer, or no JSON.
+    """
+    path = plain(path)
+    if path.stat().st_size > most:
+        raise ValueError(f"expected at most {most} bytes")
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except RecursionError:
+        raise ValueError("expected JSON that is not nested so deeply") from None
 
 
 def delete_unfinished(path: str | os.PathLike) -> None:

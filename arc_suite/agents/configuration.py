@@ -1,12 +1,11 @@
 """Configurations of runs: one value, read and written as JSON, from the flags or a study to the training."""
 
 import dataclasses
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
 
-from arc_suite import checks, evaluation, versions
+from arc_suite import checks, evaluation, files, versions
 from arc_suite.agents import algorithms
 from arc_suite.agents.learner import MOST_SEEDS
 from arc_suite.envs.setup import Setup
@@ -120,6 +119,6 @@ def read(path: Path) -> Configuration:
         OSError: the file cannot be read.
     """
     try:
-        return Configuration.from_dict(checks.mapping("configuration", json.loads(path.read_text(encoding="utf-8"))))
+        return Configuration.from_dict(checks.mapping("configuration", files.read_json(path)))
     except ValueError as error:
         raise ValueError(f"{path}: {checks.quoted(error)}") from None

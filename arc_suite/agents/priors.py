@@ -4,7 +4,6 @@ The files are next to the folder of the run: runs with the same prior data share
 """
 
 import hashlib
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -57,7 +56,7 @@ def mapped(context: RunContext, task: Task) -> Replay:
                 file.update(total=replay.total, ends=replay.ends, checksum=replay.checksum, dataset=context.prior)
     try:
         replay = Replay(folder, count, size, joints, mode="r")
-        known = json.loads((folder / _COUNT).read_text(encoding="utf-8"))
+        known = checks.mapping(_COUNT, files.read_json(folder / _COUNT))
         replay.restore(*(checks.integer(name, known[name], 0) for name in ("total", "ends", "checksum")))
         return replay
     except (Damaged, ValueError, KeyError, TypeError) as error:

@@ -13,22 +13,20 @@ Tables only grow; a run that resumes cuts them back to their lengths at the chec
 import contextlib
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, files
+from arc_suite import archives, checks, files
 
 CONFIG, CHECKPOINT, LOCK = "config.json", "checkpoint.npz", ".lock"
 TABLES = ("evaluations", "training", "times")
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
-# Errors of NumPy and zipfile for damaged files.
-_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+_NUMBERS = {"evaluated", "wall", "cpu", "return"}  # of the progress, once they are known
+_MAX_BYTES = 1 << 34  # of a checkpoint, unpacked: the labels of imitation are the most
 
 
 class RunFolder:
@@ -120,7 +118,7 @@ def config_of(path: str | os.PathLike) -> dict[str, Any]:
         ValueError: no folder of a run.
     """
     try:
-        config = json.loads((Path(path) / CONFIG).read_text(encoding="utf-8"))
+        config = files.read_json(Path(path) / CONFIG)
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: no folder of a run: {checks.quoted(error)}") from None
     if not isinstance(config, dict):
@@ -210,13 +208,15 @@ def _checkpoint(path: Path, with_arrays: bool = True) -> tuple[dict[str, np.ndar
     if not path.exists():
         return None, {}
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files if with_arrays or name == _PROGRESS}
+        arrays = archives.read(path, _MAX_BYTES, None if with_arrays else _PROGRESS)
         progress = json.loads(str(arrays.pop(_PROGRESS)))
-        if not isinstance(progress, dict):
-            raise ValueError("expected an object")
+        lengths = checks.mapping("tables", checks.mapping(_PROGRESS, progress).get("tables"))
+        for name in TABLES:
+            checks.integer(f"length of {name}", lengths.get(name, 0), 0)
+        for name in _NUMBERS & progress.keys():
+            checks.number(name, progress[name])
         return arrays, progress
-    except _DAMAGES as error:
+    except (OSError, ValueError, KeyError, RecursionError) as error:
         raise ValueError(f"{path} is damaged: {checks.quoted(error)}; delete it to start the run over") from None
 
 

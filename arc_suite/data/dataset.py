@@ -1,20 +1,18 @@
 """Opens datasets to be read."""
 
 import contextlib
-import json
 from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 
-from arc_suite import checks
+from arc_suite import checks, files
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
 from arc_suite.data.settings import Settings
 from arc_suite.envs.setup import Setup
 
 METADATA = "metadata.json"
-MAX_BYTES = 1 << 24  # of the metadata, which hold a body of at most 1 << 18
 
 # What damage makes h5py, json and our own checks raise.
 _DAMAGES = (
@@ -113,7 +111,7 @@ class Dataset:
     def reading(self):
         """Yield the open HDF5 file; what goes wrong in reading it becomes a ValueError of one line."""
         path = self.path / "data" / MAIN
-        with damages(self.id, path), h5py.File(plain(path), "r") as file:
+        with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
             yield file
 
 
@@ -130,17 +128,6 @@ def damages(dataset_id: str, file: Path):
         raise ValueError(f"dataset {dataset_id!r} is damaged: {file}: {checks.quoted(error)}") from None
 
 
-def plain(path: Path) -> Path:
-    """Return the path if it is that of a file; reading a pipe would block.
-
-    Raises:
-        OSError: there is no file.
-    """
-    if path.exists() and not path.is_file():
-        raise OSError("expected a file")
-    return path
-
-
 def _typed(name: str, value, kind: type):
     if not isinstance(value, kind):
         raise TypeError(f"expected {name} to be a {kind.__name__}")
@@ -155,9 +142,7 @@ def read_metadata(dataset_id: str, path: Path) -> dict:
     """
     path = path / "data" / METADATA
     with damages(dataset_id, path):
-        if plain(path).stat().st_size > MAX_BYTES:
-            raise ValueError(f"expected at most {MAX_BYTES} bytes")
-        metadata = json.loads(path.read_text(encoding="utf-8"))
+        metadata = files.read_json(path)
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:
         raise ValueError(f"dataset {dataset_id!r} was not collected by arc_suite")
     with damages(dataset_id, path):

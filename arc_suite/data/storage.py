@@ -26,7 +26,7 @@ from minari.namespace import create_namespace, list_local_namespaces
 
 from arc_suite import files
 from arc_suite.data import episodes, ids
-from arc_suite.data.dataset import MAIN, METADATA, damages, plain, read_metadata
+from arc_suite.data.dataset import MAIN, METADATA, damages, read_metadata
 from arc_suite.data.episodes import Episode
 
 PARTS = "parts"
@@ -181,7 +181,7 @@ class Storage:
         data = self._folder / "data"
         for path in sorted(data.glob(pattern)):
             part = path.relative_to(data).as_posix()
-            with damages(self.id, path), h5py.File(plain(path), "r") as file:
+            with damages(self.id, path), h5py.File(files.plain(path), "r") as file:
                 for index in map(episodes.index, file):
                     self._where[index] = part, episodes.read(file, index).length
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arc_suite import checks, policies, registry, versions
+from arc_suite import checks, files, policies, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.evaluation.protocol import EPISODES
@@ -51,9 +51,7 @@ def read(path: Path) -> dict[str, Any]:
         OSError: it cannot be read.
     """
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise ValueError(f"expected at most {_MAX_BYTES} bytes")
-        found = checks.mapping("entry", json.loads(path.read_text(encoding="utf-8")))
+        found = checks.mapping("entry", files.read_json(path, _MAX_BYTES))
         for name in ("policy", "seed", "versions", "robots", "policy_sha256"):
             if name not in found:
                 raise ValueError(f"expected a field {name}, got none")
@@ -62,7 +60,7 @@ def read(path: Path) -> dict[str, Any]:
         return dict(found)
     except OSError as error:
         raise OSError(f"cannot read {path}: {error.strerror.lower()}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ValueError(f"{path}: no entry: {checks.quoted(error)}") from None
 
 

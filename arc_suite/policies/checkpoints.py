@@ -6,7 +6,6 @@
 The folder `RUN/checkpoints` itself is a policy, too: its checkpoints take turns from seed to seed.
 """
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,7 +50,7 @@ def agents(path: Path) -> list[Agent]:
     """
     try:
         found = [path / AGENT] if (path / AGENT).exists() else list(path.glob(f"*/{AGENT}"))
-        agents = [Agent(**json.loads(file.read_text(encoding="utf-8"))) for file in found]
+        agents = [Agent(**files.read_json(file)) for file in found]
         return sorted(agents, key=lambda agent: agent.steps)
     except (OSError, TypeError, ValueError) as error:
         raise ValueError(f"{path}: damaged: {checks.quoted(error)}") from None

@@ -11,14 +11,13 @@ It holds no pickle and no code, so reading a file of others runs nothing.
 
 import json
 import os
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import checks, files, registry
+from arc_suite import archives, checks, files, registry
 from arc_suite.envs.setup import Setup
 
 EXTENSION = ".npz"
@@ -26,9 +25,7 @@ FILE = f"policy{EXTENSION}"  # in the folder of a run
 
 EPSILON = 1e-5  # of a layer norm, as in PyTorch
 
-# What may be wrong with a file.
-_DAMAGES = (OSError, ValueError, KeyError, TypeError, EOFError, MemoryError, zipfile.BadZipFile)
-_MAX_BYTES = 1 << 28
+_MAX_BYTES = 1 << 28  # of a file, unpacked
 
 
 class Layer(NamedTuple):
@@ -54,18 +51,23 @@ def _layer_norm(x, scale, offset):
 
 
 class Kind(NamedTuple):
-    """What a layer computes: a function of inputs (num_envs, n) float32 and of a number of arrays."""
+    """What a layer computes.
+
+    Attributes:
+        function: of inputs (num_envs, i) float32 and of arrays; returns outputs (num_envs, o) or (num_envs, i).
+        shapes: of the arrays, a letter for each axis.
+    """
 
     function: Callable
-    arrays: int = 0
+    shapes: tuple[str, ...] = ()
 
 
-# Arrays are weight (n, m) and bias (m,); scale and offset (n,); mean and factor (n,) and limit () of inputs, which
-# become (x - mean) * factor within +-limit.
+# Arrays are weight and bias; scale and offset; mean, factor and limit of inputs, which become (x - mean) * factor
+# within +-limit.
 KINDS = {
-    "linear": Kind(_linear, 2),
-    "layer_norm": Kind(_layer_norm, 2),
-    "normalise": Kind(lambda x, mean, factor, limit: ((x - mean) * factor).clip(-limit, limit), 3),
+    "linear": Kind(_linear, ("io", "o")),
+    "layer_norm": Kind(_layer_norm, ("i", "i")),
+    "normalise": Kind(lambda x, mean, factor, limit: ((x - mean) * factor).clip(-limit, limit), ("i", "i", "")),
     "relu": Kind(lambda x: np.maximum(x, np.float32(0.0))),
     "elu": Kind(lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, np.float32(0.0))))),
     "tanh": Kind(np.tanh),
@@ -154,27 +156,22 @@ def load(path: str | os.PathLike) -> Network:
     path = Path(path)
     path = path / FILE if path.is_dir() else path
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise ValueError(f"expected at most {_MAX_BYTES} bytes")
-        with np.load(path, allow_pickle=False) as stored:
-            known = json.loads(str(stored["policy"]))
-            arrays = {name: stored[name] for name in stored.files}
-        network = Network(
-            tuple(_layer(kind, index, arrays) for index, kind in enumerate(known["layers"])),
-            Setup.from_dict(known),
-            {
-                name: checks.integer(f"block {name}", size, 0)
-                for name, size in checks.mapping("blocks", known["blocks"]).items()
-            },
-        )
-        if network.joints < 1:  # finds out whether the shapes fit
-            raise ValueError("expected actions")
-        return network
+        arrays = archives.read(path, _MAX_BYTES)
+        known = checks.mapping("policy", json.loads(str(arrays.pop("policy"))))
+        blocks = {
+            name: checks.integer(f"block {name}", size, 0)
+            for name, size in checks.mapping("blocks", known["blocks"]).items()
+        }
+        layers, width = [], sum(blocks.values())
+        for index, kind in enumerate(known["layers"]):
+            layer, width = _layer(kind, index, arrays, width)
+            layers.append(layer)
+        return Network(tuple(layers), Setup.from_dict(known), blocks)
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except registry.NotImported as error:
         raise ValueError(f"policy {path}: {error}") from None
-    except _DAMAGES as error:
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise ValueError(f"{path}: no policy, or a damaged one: {checks.quoted(error)}") from None
 
 
@@ -184,8 +181,16 @@ def checkpoint_files(folder: Path) -> list[Path]:
     return sorted(found, key=lambda path: int(path.parent.name))
 
 
-def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray]) -> Layer:
-    found = tuple(arrays[f"{index}.{place}"] for place in range(KINDS[checks.name(kind, KINDS, "layer")].arrays))
-    if any(array.dtype != np.float32 for array in found):
-        raise ValueError(f"layer {index}: expected float32")
-    return Layer(kind, found)
+def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray], width: int) -> tuple[Layer, int]:
+    """Return a layer that takes inputs of a width, and the width of its outputs."""
+    sizes, found = {"i": width}, []
+    for place, letters in enumerate(KINDS[checks.name(kind, KINDS, "layer")].shapes):
+        array = arrays[f"{index}.{place}"]
+        sizes = dict(zip(letters, array.shape, strict=False)) | sizes  # the first array tells an axis' size
+        if array.dtype != np.float32 or array.shape != tuple(map(sizes.get, letters)):
+            given = f"{array.dtype} {array.shape}"
+            raise ValueError(f"layer {index}, {kind}: array {place} does not fit {width} inputs, got {given}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"layer {index}, {kind}: array {place} is not finite")
+        found.append(array)
+    return Layer(kind, tuple(found)), sizes.get("o", width)

@@ -112,6 +112,36 @@ def test_a_checkpoint_with_a_pickle(path):
     one_line(path, r"checkpoint\.npz is damaged: Object arrays cannot be loaded")
 
 
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("[]", "progress: expected a mapping"),
+        ('{"tables": 3}', "tables: expected a mapping"),
+        ('{"tables": {"training": "12"}}', "length of training: expected an integer from 0"),
+        ('{"evaluated": "2"}', "evaluated: expected a finite number"),
+        ('{"cpu": NaN}', "cpu: expected a finite number"),
+        ("[" * 100_000, "maximum recursion depth"),
+    ],
+)
+def test_progress_made_in_bad_faith(path, text, line):
+    np.savez(path / "checkpoint.npz", progress=np.array(text), **ARRAYS)
+    one_line(path, rf"checkpoint\.npz is damaged: {line}")
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "[]", "3"])
+def test_a_record_made_in_bad_faith(path, text):
+    (path / "config.json").write_text(text)
+    one_line(path, r"run: no folder of a run")
+
+
+def test_pipes_are_not_waited_for(path):
+    for name, line in (("checkpoint.npz", "is damaged: expected a file"), ("config.json", "expected a file")):
+        (path / name).unlink()
+        os.mkfifo(path / name)
+        with pytest.raises(ValueError, match=line):
+            run_folder.progress_of(path) if name == "checkpoint.npz" else run_folder.config_of(path)
+
+
 def test_a_table_that_has_lost_lines(path):
     (path / "training.csv").write_text("step,loss\n")
     one_line(path, r"training\.csv: shorter than at the checkpoint; delete checkpoint\.npz to start over$")

@@ -17,6 +17,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 # one row leans on nothing in it.
 ROOMS = (
     ("checks", "rotations", "markers", "files", "versions", "paper"),
+    ("archives",),  # files of arrays
     ("robots",),  # what moves
     ("arenas",),  # where
     ("models",),  # spec -> MJCF
@@ -45,6 +46,7 @@ THIRD_PARTY = {
     "rotations": set(),
     "markers": {"numpy"},
     "files": set(),
+    "archives": {"numpy"},
     "paper": set(),
     "versions": {"packaging"},
     "robots": set(),

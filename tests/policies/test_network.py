@@ -1,6 +1,8 @@
 """Policies in files: what a network computes, alone and among others, and files that are none."""
 
 import json
+import os
+import zipfile
 
 import numpy as np
 import pytest
@@ -134,10 +136,10 @@ def test_damaged_files(saved, kept):
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"layers": ["linear", "sigmoid"]}, "unknown layer 'sigmoid'"),
+        ({"layers": ["normalise", "sigmoid"]}, "unknown layer 'sigmoid'"),
         ({"layers": ["relu"]}, r"policy\.npz: moves 199 joints, and tick has 18$"),
         ({"layers": [*["relu"] * 9, "linear"]}, "a damaged one: '9.0'"),
-        ({"blocks": {"posture": 3}}, "broadcast"),
+        ({"blocks": {"posture": 3}}, r"layer 0, normalise: array 0 does not fit 3 inputs, got float32 \(199,\)"),
         ({"blocks": 3}, "blocks: expected a mapping"),
         ({"robot": None}, "expected robot to be a str"),
         (
@@ -153,6 +155,44 @@ def test_files_made_in_bad_faith(saved, change, line):
     known = json.loads(str(arrays.pop("policy"))) | change
     np.savez(file, policy=np.array(json.dumps(known)), **arrays)
     with pytest.raises(ValueError, match=line):
+        policies.policy(str(file), "tick")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "line"),
+    [
+        ("1.0", lambda array: array * np.nan, "layer 1, linear: array 0 is not finite"),
+        ("1.1", lambda array: array[:1], r"layer 1, linear: array 1 does not fit 199 inputs, got float32 \(1,\)"),
+        ("1.1", lambda array: array[:, None], "layer 1, linear: array 1 does not fit"),
+        ("1.0", lambda array: array[:, 0], "layer 1, linear: array 0 does not fit"),
+        ("2.0", lambda array: array.astype(float), "layer 2, layer_norm: array 0 does not fit"),
+        ("0.2", lambda array: array[None], "layer 0, normalise: array 2 does not fit"),
+        ("policy", lambda array: np.array("[" * 100_000), "maximum recursion depth"),
+    ],
+)
+def test_arrays_made_in_bad_faith(saved, name, change, line):
+    file = saved / "policy.npz"
+    with np.load(file) as stored:
+        arrays = {key: stored[key] for key in stored.files}
+    np.savez(file, **arrays | {name: change(arrays[name])})
+    with pytest.raises(ValueError, match=rf"policy\.npz: no policy, or a damaged one: {line}"):
+        policies.policy(str(file), "tick")
+
+
+def test_archives_made_in_bad_faith(saved):
+    """A large file that is packed small, another compression, and a pipe, which nobody writes to."""
+    file = saved / "policy.npz"
+    np.savez_compressed(file, policy=np.zeros(1 << 26))
+    assert file.stat().st_size < 1 << 20
+    with pytest.raises(ValueError, match=r"policy\.npz: .* expected at most 268435456 bytes, got 536\d+$"):
+        policies.policy(str(file), "tick")
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("policy.npy", b"")
+    with pytest.raises(ValueError, match=r"policy\.npz: .* policy\.npy: expected no compression, or deflate$"):
+        policies.policy(str(file), "tick")
+    file.unlink()
+    os.mkfifo(file)
+    with pytest.raises(ValueError, match=r"policy\.npz: .* expected a file$"):
         policies.policy(str(file), "tick")
 
 
