@@ -2,9 +2,26 @@
 
 import contextlib
 import sys
+from pathlib import Path
 
 # As in setup.cfg. MuJoCo and dm_control move together.
 NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
+
+
+class MissingExtra(ImportError, ValueError):
+    """An extra of the suite is not installed; the message gives the command that installs it."""
+
+    def __init__(self, need: str, extra: str, error: ImportError):
+        """Name the extra.
+
+        Args:
+            need: what needs which package, such as "ONNX needs onnx".
+            extra: of setup.cfg.
+            error: of the import that failed.
+        """
+        clone = Path(__file__).parents[1]
+        place = f"-e '{clone}[{extra}]'" if (clone / "setup.cfg").exists() else f"'arc_suite[{extra}]'"
+        super().__init__(f"{need}: pip install {place} ({error})")
 
 
 def installed(package: str) -> str | None:

@@ -5,7 +5,7 @@ import importlib
 import sys
 from pathlib import Path
 
-from arc_suite import checks
+from arc_suite import checks, versions
 from arc_suite.cli import program
 
 PROGRAMS = (
@@ -42,7 +42,10 @@ def main(*given: str) -> None:
     first, *others = [*given, *sys.argv[1:]] or ["--help"]
     if first in PROGRAMS:
         # Imported here and alone: a program defines its flags when it is imported, and some define the same.
-        module = importlib.import_module(f"arc_suite.cli.{first}")
+        try:
+            module = importlib.import_module(f"arc_suite.cli.{first}")
+        except versions.MissingExtra as error:
+            sys.exit(f"arc-suite {first}: {error}")
         program.run(module.main, f"arc-suite {first}", others)
     program.guard(lambda: _answer(first), "arc-suite")
 

@@ -123,7 +123,7 @@ def pictures(robots: list[str]):
     try:
         from arc_suite.style.plots import OF_GAIT, PICTURES
     except ImportError as error:
-        raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
+        raise versions.MissingExtra("pictures need matplotlib", "plot", error) from None
     with contextlib.ExitStack() as stack:
         targets = {}
         for robot in robots:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import evaluation, files
+from arc_suite import evaluation, files, versions
 from arc_suite.agents import algorithms, configuration, run_folder
 from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.training import train
@@ -126,7 +126,7 @@ def events(folder: Path) -> Iterator[Callable]:
     try:
         from tensorboardX import SummaryWriter
     except ImportError as error:
-        raise ValueError(f"--tensorboard needs tensorboardX: pip install 'arc_suite[tensorboard]' ({error})") from None
+        raise versions.MissingExtra("--tensorboard needs tensorboardX", "tensorboard", error) from None
     writers = []
 
     def write(step, metrics):

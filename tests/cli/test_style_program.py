@@ -105,7 +105,7 @@ def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_datasets_without_minari_say_what_to_install(tmp_path):
     done = programs.without("minari", tmp_path, "style", "--policy=arc_suite/tick/noisy-v0")
-    message = "datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')"
+    message = f"datasets need Minari: {programs.install('data')} (No module named 'minari')"
     assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 
@@ -174,7 +174,7 @@ def test_all_robots(tmp_path):
 @pytest.mark.slow
 def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
     done = programs.without("matplotlib", tmp_path, "style", f"--output={tmp_path}")
-    message = "pictures need matplotlib: pip install 'arc_suite[plot]' (No module named 'matplotlib')"
+    message = f"pictures need matplotlib: {programs.install('plot')} (No module named 'matplotlib')"
     assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 
