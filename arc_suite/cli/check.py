@@ -1,6 +1,6 @@
 """Check a body in a spec file, or a task.
 
-  arc-suite check examples/spider.json
+  arc-suite check spider
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold

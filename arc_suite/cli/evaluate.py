@@ -5,7 +5,7 @@ return is compared with that of the paper's demonstrator, where the task is the 
 interquartile mean of the return, with a stratified bootstrap interval.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
-  arc-suite evaluate --spec examples/spider.json
+  arc-suite evaluate --spec spider
   arc-suite evaluate --robot queen --set target_velocity=0.4
 """
 

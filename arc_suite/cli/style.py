@@ -2,7 +2,7 @@
 
   arc-suite style --robot queen --policy cpg --preset medium
   arc-suite style --policy my_package.policies:make --compare cpg --output out/style
-  arc-suite style --spec examples/spider.json --save out/spider.npz
+  arc-suite style --spec spider --save out/spider.npz
   arc-suite style --policy out/spider.npz --compare zero
   arc-suite style --policy arc_suite/queen/walk/cpg-medium-v0 --compare arc_suite/queen/walk/random-v0
 

@@ -9,10 +9,11 @@ import pytest
 from arc_suite import data, style
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec_files import EXAMPLES
 from arc_suite.style import METRICS
 
 ROOT = pathlib.Path(__file__).parents[2]
-SPIDER = ROOT / "examples" / "spider.json"
+SPIDER = EXAMPLES["spider"]
 FROZEN = """
 import numpy as np
 def frozen(robot): return lambda time_step: np.zeros({"tick": 18, "leaper": 12}[robot])
