@@ -1,36 +1,11 @@
 """The command `arc-suite`, which runs the programs."""
 
-import ast
 import importlib
 import sys
-from pathlib import Path
 
 from arc_suite import checks, versions
 from arc_suite.cli import program
-
-PROGRAMS = (
-    "build_model",
-    "check",
-    "render",
-    "animate",
-    "view",
-    "evaluate",
-    "style",
-    "collect",
-    "tune_cpg",
-    "train",
-    "study",
-    "export",
-    "survey",
-    "doctor",
-)
-
-_USAGE = """\
-arc-suite PROGRAM [flags]
-
-{programs}
-
-arc-suite PROGRAM --help shows the flags of a program, arc-suite --version the version."""
+from arc_suite.cli.programs import PROGRAMS, usage
 
 
 def main(*given: str) -> None:
@@ -54,13 +29,6 @@ def _answer(argument: str) -> None:
     if argument == "--version":
         print(program.VERSION)
     elif argument in ("--help", "-h"):
-        width = max(map(len, PROGRAMS))
-        print(_USAGE.format(programs="\n".join(f"  {name:<{width}}  {summary(name)}" for name in PROGRAMS)))
+        print(usage())
     else:
         checks.name(argument, PROGRAMS, "program")
-
-
-def summary(name: str) -> str:
-    """Return the first line of a program's docstring, read from its source without importing it."""
-    source = Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
-    return ast.get_docstring(ast.parse(source)).splitlines()[0]

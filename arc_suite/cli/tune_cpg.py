@@ -103,7 +103,7 @@ def main() -> None:
     try:
         from arc_suite.tuning import plots
     except ImportError as error:
-        raise versions.MissingExtra("the plot needs matplotlib", "plot", error) from None
+        raise versions.MissingExtra("the plot needs matplotlib", "tune", error) from None
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
         course, journal = search(setup, folder)
