@@ -12,6 +12,8 @@ def main() -> None:
     if sys.argv[1:2] in ([], ["-h"], ["--help"]):
         print(runpy.run_path(str(_PROGRAMS))["usage"]())
     else:
-        from arc_suite.cli import main
-
+        try:
+            from arc_suite.cli import main
+        except ImportError as error:
+            sys.exit(f"arc-suite: {error}")
         main.main()
