@@ -2,9 +2,9 @@
 # make check   lint and the fast tests: after every edit
 # make test    installs everything, runs the tests, on all cores
 # make check-long  tests that take long
-# make check-matrix  further cases of tests that have many: every task with every robot; 15 minutes, before a release
+# make check-release  further cases of tests that have many, and tests that take minutes: half an hour, before a release
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
-# make check-sb3  stable-baselines3's checker, a short SAC run and tests of our rows for it, in an environment of their own
+# make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
 # make web     bundles the viewer that pages are made of, and three.js; needs Node
@@ -13,6 +13,7 @@
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
+# make check-agents-release  the same for every algorithm, and for studies that are killed
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
@@ -27,7 +28,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-matrix lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents bench survey obedience soak fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -41,19 +42,19 @@ PARALLEL := -n auto --dist worksteal
 
 test: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m "not long and not matrix"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not long and not release"
 
 check-long: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m "long and not matrix"
+	$(PYTHON) -m pytest $(PARALLEL) -m "long and not release"
 
-check-matrix: $(INSTALLED)
+check-release: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m matrix
+	$(PYTHON) -m pytest $(PARALLEL) -m release
 
 check: lint $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
-	$(PYTHON) -m pytest $(PARALLEL) -m "not slow and not long and not matrix"
+	$(PYTHON) -m pytest $(PARALLEL) -m "not slow and not long and not release"
 
 lint: $(VENV)/linter
 	$(VENV)/bin/ruff check .
@@ -78,7 +79,7 @@ check-lowest: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	tools/ensure_egl.sh $(VENV)/bin/python
 	$(VENV)/bin/python -m pip install -q -e '.[test]' 'gymnasium==1.2.0'
-	$(VENV)/bin/python -m pytest $(PARALLEL) -m "not slow and not long and not matrix" tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "not slow and not long and not release" tests/envs tests/data/test_collection.py tests/data/test_dataset.py \
 		tests/tasks/test_conformance.py tests/simulation/test_divergence.py tests/house/test_threads.py \
 		tests/house/test_errors.py
 
@@ -89,9 +90,9 @@ check-sb3: VENV := .venv-sb3
 check-sb3: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q '$(TORCH)'
-	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest
+	$(VENV)/bin/python -m pip install -q -e '.[sb3]' pytest matplotlib 'sbx-rl==0.28.0'
 	$(VENV)/bin/python tools/check_sb3.py --steps 500
-	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py tests/policies/test_sb3_file.py
+	$(VENV)/bin/python -m pytest tests/envs/test_sb3.py tests/policies/test_sb3_file.py tests/examples
 
 check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
@@ -153,11 +154,14 @@ check-jax: setup.cfg
 	$(VENV)/bin/python -m pytest tests/tasks/test_jax.py
 
 # pandas before 3, as what rliable needs does not know it yet.
-check-agents: VENV := .venv-jax
-check-agents: setup.cfg
+check-agents check-agents-release: VENV := .venv-jax
+check-agents: MARKS := not long and not release
+check-agents-release: MARKS := long or release
+check-agents check-agents-release: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
-	$(VENV)/bin/python -m pytest $(PARALLEL) tests/agents tests/studies tests/cli/test_train.py tests/policies tests/evaluation/test_statistics.py
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/agents tests/studies/test_study.py tests/cli/test_train.py \
+		tests/policies/test_onnx_file.py tests/evaluation/test_statistics.py
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

@@ -67,7 +67,8 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
     seed, core, environment = context.seed, sac.core(hp), context.environment()
     size, joints = environment.task.definition.size, environment.single_action_space.shape[0]
     prior = None if context.prior is None else priors.mapped(context, environment.task.definition)
-    buffer = Replay(context.folder / "replay", min(hp.buffer_size, context.steps), size, joints, slack=SLICE)
+    mode = "w+" if context.checkpoint is None else "r+"
+    buffer = Replay(context.folder / "replay", min(hp.buffer_size, context.steps), size, joints, SLICE, mode)
     sources = _SOURCES[hp.prior](buffer, prior)
     state = sac.begin(hp, generator(seed, "networks", 0), size, joints)
     observation = environment.reset()[0][0]
@@ -152,7 +153,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
             **networks.named("sums", sums),
             "count": np.array([steps, updates, phase_updates, summed]),
             "earned": np.array([episode_return, latest_return]),
-            "replay": np.array([buffer.total, buffer.ends]),
+            "replay": np.array([buffer.total, buffer.ends, buffer.checksum]),
             "phase": np.array((phase.updates, phase.held_out, *phase.patience) if phase else (), float),
             **learner.environment_arrays(environment),
         }

@@ -8,8 +8,8 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from arc_suite import files
-from arc_suite.agents.learner import RunContext
+from arc_suite import checks, files
+from arc_suite.agents.learner import Damaged, RunContext
 from arc_suite.agents.replay import Replay
 from arc_suite.tasks import Task
 
@@ -29,7 +29,7 @@ def mapped(context: RunContext, task: Task) -> Replay:
     """Return the prior data of a run; its files are written from the dataset first, where they are missing.
 
     Raises:
-        ValueError: no such dataset, one that is damaged, or of another body or task.
+        ValueError: no such dataset, one that is damaged, or of another body or task, or damaged files.
         OSError: the disk is full, or the like.
     """
     dataset = _opened(context.prior)
@@ -54,11 +54,14 @@ def mapped(context: RunContext, task: Task) -> Replay:
                     ended = bool(episode.terminations[step])
                     replay.add(here, episode.actions[step], episode.rewards[step], ended, there, step == last)
             with files.writing_json(folder / _COUNT) as file:
-                file.update(total=replay.total, ends=replay.ends, dataset=context.prior)
-    replay = Replay(folder, count, size, joints, mode="r")
-    known = json.loads((folder / _COUNT).read_text(encoding="utf-8"))
-    replay.restore(known["total"], known["ends"])
-    return replay
+                file.update(total=replay.total, ends=replay.ends, checksum=replay.checksum, dataset=context.prior)
+    try:
+        replay = Replay(folder, count, size, joints, mode="r")
+        known = json.loads((folder / _COUNT).read_text(encoding="utf-8"))
+        replay.restore(*(checks.integer(name, known[name], 0) for name in ("total", "ends", "checksum")))
+        return replay
+    except (Damaged, ValueError, KeyError, TypeError) as error:
+        raise ValueError(f"prior {context.prior!r}: {folder} is damaged: {checks.quoted(error)}; delete it") from None
 
 
 def _opened(prior: str):

@@ -2,18 +2,22 @@
 
 An observation is stored once, as the next one of a transition is the observation of the transition after it. Last
 observations of episodes are in a file of their own. A million transitions of Queen take 0.9 GB. Files have their
-full size from the start, so a disk that is too small is an error at the start.
+full size from the start, so a disk that is too small is an error at the start. Checkpoints hold a checksum of what
+can be sampled, as a file that was deleted or cut reads as zeros.
 """
 
 import os
+import zlib
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import files
+from arc_suite.agents.learner import Damaged
 
 _ENDS = 256  # final observations by which their file grows
+_CHUNK = 4096  # transitions that are read at once
 
 
 class Transitions(NamedTuple):
@@ -43,10 +47,11 @@ class Replay:
     Attributes:
         total: transitions added since the start.
         ends: episodes that ended since the start.
+        checksum: sum of the CRC-32 of the transitions that can be sampled, with their numbers since the start.
     """
 
-    def __init__(self, folder: Path, capacity: int, size: int, joints: int, slack: int = 0, mode: str = "r+"):
-        """Map the files, after making them where they are missing.
+    def __init__(self, folder: Path, capacity: int, size: int, joints: int, slack: int = 0, mode: str = "w+"):
+        """Map the files.
 
         Args:
             folder: of the files.
@@ -54,20 +59,23 @@ class Replay:
             size: of an observation.
             joints: of an action.
             slack: further transitions that are kept.
-            mode: "r+", or "r" to only read existing files.
+            mode: "w+" to make the files where they are missing, "r+" to resume from them, "r" to read them alone.
 
         Raises:
+            Damaged: a file to resume from or to read is missing or too short.
             OSError: the disk is full, or the like.
         """
         self._folder, self._capacity, self._size, self._mode = files.folder(folder), capacity, size, mode
         self._slots = capacity + slack + 1  # one more for the observation that comes next
-        self._observations = self._mapped("observations", np.float32, (self._slots, size))
-        self._actions = self._mapped("actions", np.float32, (self._slots, joints))
-        self._rewards = self._mapped("rewards", np.float32, (self._slots,))
-        self._goes_on = self._mapped("goes_on", np.float32, (self._slots,))
-        self._end = self._mapped("ends", np.int32, (self._slots,))  # which of the final observations is next, or -1
-        self._final = self._mapped("final_observations", np.float32, (_ENDS, size))
-        self.total = self.ends = 0
+        make = mode == "w+"
+        self._observations = self._mapped("observations", np.float32, (self._slots, size), make)
+        self._actions = self._mapped("actions", np.float32, (self._slots, joints), make)
+        self._rewards = self._mapped("rewards", np.float32, (self._slots,), make)
+        self._goes_on = self._mapped("goes_on", np.float32, (self._slots,), make)
+        self._end = self._mapped("ends", np.int32, (self._slots,), make)  # which final observation is next, or -1
+        self._final = self._mapped("final_observations", np.float32, (_ENDS, size), make)
+        self._checksums = np.zeros(self._slots, np.uint32)
+        self.total = self.ends = self.checksum = 0
 
     def __len__(self) -> int:
         """Return the number of transitions that can be sampled."""
@@ -84,7 +92,10 @@ class Replay:
             self.ends += 1
         else:
             self._observations[(slot + 1) % self._slots] = next_observation
+        if self.total >= self._capacity:
+            self.checksum -= int(self._checksums[(self.total - self._capacity) % self._slots])
         self.total += 1
+        self._count_in(self.total - 1, self.at(np.array([len(self) - 1])))
 
     def at(self, indices: np.ndarray) -> Transitions:
         """Return copies of transitions by index; index 0 is the oldest.
@@ -102,31 +113,54 @@ class Replay:
         numbers = (array[slots] for array in (self._observations, self._actions, self._rewards, self._goes_on))
         return Transitions(*numbers, nexts)
 
-    def restore(self, total: int, ends: int) -> None:
-        """Resume with the given counters; at most `slack` later transitions may be on disk."""
-        self.total, self.ends = total, ends
+    def restore(self, total: int, ends: int, checksum: int) -> None:
+        """Resume with the given counters; at most `slack` later transitions may be on disk.
+
+        Raises:
+            Damaged: the files hold other transitions.
+        """
+        self.total, self.ends, self.checksum = total, ends, 0
         self._make_room(ends)
+        for first in range(0, len(self), _CHUNK):
+            indices = np.arange(first, min(first + _CHUNK, len(self)))
+            self._count_in(total - len(self) + first, self.at(indices))
+        if self.checksum != checksum:
+            raise Damaged(f"{self._folder} holds other transitions")
+
+    def _count_in(self, number: int, transitions: Transitions) -> None:
+        """Add transitions to the checksum; the first one has a number since the start."""
+        columns = [array.reshape(len(array), -1) for array in transitions]
+        for row in np.concatenate(columns, axis=1):
+            self._checksums[number % self._slots] = crc = zlib.crc32(row, number & 0xFFFFFFFF)
+            self.checksum += crc
+            number += 1
 
     def _make_room(self, ends: int) -> None:
         rows = len(self._final)
         while rows < ends:
             rows *= 2
         if rows > len(self._final):
-            self._final = self._mapped("final_observations", np.float32, (rows, self._size))
+            self._final = self._mapped("final_observations", np.float32, (rows, self._size), make=self._mode != "r")
 
-    def _mapped(self, name: str, dtype, shape: tuple[int, ...]) -> np.ndarray:
+    def _mapped(self, name: str, dtype, shape: tuple[int, ...], make: bool) -> np.ndarray:
         path, size = self._folder / name, int(np.prod(shape)) * np.dtype(dtype).itemsize
-        try:
-            with path.open("rb" if self._mode == "r" else "a+b") as file:
-                if self._mode == "r":
-                    pass
-                elif hasattr(os, "posix_fallocate"):
-                    os.posix_fallocate(file.fileno(), 0, size)
-                elif os.fstat(file.fileno()).st_size < size:
-                    file.truncate(size)
-        except OSError as error:
-            raise OSError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from None
-        return np.memmap(path, dtype, self._mode, shape=shape)
+        if make:
+            _allocate(path, size)
+        elif not (path.is_file() and path.stat().st_size >= size):
+            raise Damaged(f"{path} is missing or too short")
+        return np.memmap(path, dtype, "r" if self._mode == "r" else "r+", shape=shape)
+
+
+def _allocate(path: Path, size: int) -> None:
+    """Make a file, or lengthen it."""
+    try:
+        with path.open("a+b") as file:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+            elif os.fstat(file.fileno()).st_size < size:
+                file.truncate(size)
+    except OSError as error:
+        raise OSError(f"cannot write {path}: {(error.strerror or str(error)).lower()}") from None
 
 
 class Protected:

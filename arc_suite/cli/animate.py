@@ -16,7 +16,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, export, files, policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, only_setup
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, only_setup, policy_name
 from arc_suite.cli.program import VERSION, progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
@@ -25,7 +25,7 @@ FLAGS = flags.FLAGS
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
-flags.DEFINE_string("policy", "cpg", policies.HELP)
+define_policy()
 flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: tuned, or medium where there is none]")
 flags.DEFINE_list("clips", list(export.DEFAULT), f"Which, with commas between them: {', '.join(export.CLIPS)}.")
 flags.DEFINE_float("fps", export.FPS, "Frames a second.", 1.0, 1000.0)
@@ -53,7 +53,7 @@ def main() -> None:
         clips = export.clips(
             setup,
             FLAGS.clips,
-            FLAGS.policy,
+            policy_name(FLAGS.policy),
             FLAGS.preset,
             FLAGS.fps,
             lambda names: progress(names, "recording", unit="clip", leave=False),

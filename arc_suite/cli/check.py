@@ -1,24 +1,29 @@
 """Check a body in a spec file, or a task.
 
   arc-suite check spider
+  arc-suite check --walk spider
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
-nothing up, none that can step. A task: a batch of environments must compute bit for bit what each computes
-alone, over 200 control steps; the line names the terms, metrics and blocks that differ. Exit status 1 if
-there is any flaw or difference.
+nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps; where it falls,
+the line names the fields to leave out, which are then sized to suit the body. MJCF and URDF are not read.
+
+A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
+the line names the terms, metrics and blocks that differ. Exit status 1 if there is any flaw, fall or difference.
 """
 
 from absl import flags
 
 from arc_suite.cli.flags import ROBOT_HELP, define_task, task
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import conformance
+from arc_suite.evaluation import conformance, trial
 from arc_suite.models.soundness import flaws
+from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import load_body
 
 FLAGS = flags.FLAGS
 define_task()
+flags.DEFINE_bool("walk", False, "Let the demonstrator walk a body that has no flaw.")
 flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
 
 
@@ -26,6 +31,8 @@ def main(spec: str | None = None) -> int:
     """Print the flaws of the body in a spec file, or how a task differs, and return the exit status."""
     if (spec is None) != FLAGS["task"].present:
         raise ValueError("expected a spec file or --task; see --help")
+    if FLAGS.walk and spec is None:
+        raise ValueError("--walk: expected a spec file, got --task")
     return _check_task() if spec is None else _check_body(spec)
 
 
@@ -34,9 +41,29 @@ def _check_body(spec: str) -> int:
     found = flaws(body)
     for flaw in found:
         print(f"{spec}: {flaw.text}")
-    if not found:
-        print(f"{spec}: {body.name} stands and can take steps")
-    return int(bool(found))
+    if found:
+        return 1
+    print(f"{spec}: {body.name} stands and can take steps")
+    return _check_walk(spec, body) if FLAGS.walk else 0
+
+
+def _check_walk(spec: str, body: Body) -> int:
+    tried = trial.walk(body)
+    if not tried.fell:
+        print(f"{spec}: {_said(tried)}")
+        return 0
+    cure = trial.left_out(body)
+    advice = (
+        f"leaving out {', '.join(trial.FIELDS)} of its joints does not help"
+        if cure is None
+        else f"leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
+    )
+    print(f"{spec}: {body.name} falls after {tried.length} control steps: {advice}")
+    return 1
+
+
+def _said(tried: trial.Trial) -> str:
+    return f"walks {tried.length} control steps at {tried.speed:.2f} m/s (target {tried.target:.2f})"
 
 
 def _check_task() -> int:

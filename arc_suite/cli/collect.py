@@ -19,7 +19,7 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, setups
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, made_body, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
@@ -28,7 +28,7 @@ FLAGS = flags.FLAGS
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all in turn.")
-flags.DEFINE_string("policy", "cpg", policies.HELP)
+define_policy()
 flags.DEFINE_integer("checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", 0)
 flags.DEFINE_enum(
     "quality",
@@ -106,7 +106,7 @@ def chosen() -> tuple[str, str]:
         ValueError: --checkpoint and --quality together, or a run without such a checkpoint.
     """
     if FLAGS.checkpoint is None and FLAGS.quality is None:
-        return FLAGS.policy, ""
+        return policy_name(FLAGS.policy), ""
     if FLAGS.checkpoint is not None and FLAGS.quality is not None:
         raise ValueError("expected one of --checkpoint and --quality, got both")
     run = pathlib.Path(FLAGS.policy)

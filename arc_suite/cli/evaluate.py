@@ -2,7 +2,8 @@
 
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
 return is compared with that of the paper's demonstrator, where the task is the paper's. IQM is the
-interquartile mean of the return, with a stratified bootstrap interval.
+interquartile mean of the return, with a stratified bootstrap interval. The JSON is an entry for
+`arc-suite enter`: it holds every episode, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
   arc-suite evaluate --spec spider
@@ -14,14 +15,15 @@ from collections.abc import Mapping
 from absl import flags
 
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, setups
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, policy_name, setups
 from arc_suite.cli.program import progress
+from arc_suite.evaluation import entries
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "all", f"{ROBOT_HELP}, or all.")
-flags.DEFINE_string("policy", "cpg", policies.HELP)
+define_policy()
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
@@ -46,10 +48,13 @@ def main() -> None:
     """Print the table and write the JSON."""
     asked = setups(_ROBOT)
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
-    players = {}
+    chosen, players = policy_name(FLAGS.policy), {}
     for name, setup in asked.items():
         environment, body = setup.load(), setup.body
-        players[name] = environment, policies.policy(FLAGS.policy, body, FLAGS.preset, task=environment.task.definition)
+        players[name] = (
+            environment,
+            policies.policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=environment.task.definition),
+        )
     experts = {name: evaluation.expert_return(setup) for name, setup in asked.items()}
     with files.writing_json(FLAGS.json) as file:
         reports = {}
@@ -60,12 +65,13 @@ def main() -> None:
                 names = {name: name for name in episodes[0].progress}
                 header = line("robot".ljust(width), names, "return", "IQM [95 % interval]", "steps", "paper's cpg")
                 print(header, "-" * len(header), sep="\n")
-            reports[robot] = report(episodes, experts[robot])
+            reports[robot] = {"provenance": entries.provenance(asked[robot])} | report(episodes, experts[robot])
             print(row(robot.ljust(width), reports[robot]), flush=True)
         file.update(
             task=setup.task,
             task_kwargs=setup.task_kwargs,
-            policy=FLAGS.policy,
+            policy=chosen,
+            policy_sha256=entries.policy_sha256(chosen),
             preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,
             robots=reports,

@@ -6,8 +6,9 @@ from typing import Any
 
 from absl import flags
 
-from arc_suite import checks, registry
+from arc_suite import checks, policies, registry
 from arc_suite.envs.setup import Setup
+from arc_suite.policies import zips
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS
@@ -36,6 +37,39 @@ def define_task() -> None:
         "Setting of the task, name=value; repeat it for several. Values are JSON where they parse, else text: "
         "--set target_velocity=0.8 --set gait=ripple --set weights='{\"posture\": -0.01}'.",
     )
+
+
+def define_policy(text: str = policies.HELP) -> None:
+    """Define --policy and --vecnormalize, for programs that take any policy.
+
+    Args:
+        text: help of --policy.
+    """
+    flags.DEFINE_string("policy", "cpg", text)
+    define_vecnormalize()
+
+
+def define_vecnormalize() -> None:
+    """Define --vecnormalize, for programs that take a zip of stable-baselines3."""
+    flags.DEFINE_string(
+        "vecnormalize",
+        None,
+        "Statistics that VecNormalize.save wrote, for a zip of stable-baselines3; their pickles run code. "
+        "[default: ZIP_vecnormalize.pkl or vecnormalize.pkl next to a zip that was trained with VecNormalize]",
+    )
+
+
+def policy_name(name: str) -> str:
+    """Return the name of a policy with the statistics of --vecnormalize, if there are any.
+
+    Raises:
+        ValueError: --vecnormalize without a zip.
+    """
+    if FLAGS.vecnormalize is None:
+        return name
+    if zips.parts(name) is None:
+        raise ValueError(f"--vecnormalize={FLAGS.vecnormalize}: goes with a zip of stable-baselines3, got {name!r}")
+    return zips.named(name, FLAGS.vecnormalize)
 
 
 def made_body() -> Body | None:

@@ -14,6 +14,8 @@ def main(*given: str) -> None:
     Args:
         *given: arguments before those of the command line.
     """
+    # Modules that flags name may lie in the current folder. It comes last: no file there hides an installed module.
+    sys.path.append("")
     first, *others = [*given, *sys.argv[1:]] or ["--help"]
     if first in PROGRAMS:
         # Imported here and alone: a program defines its flags when it is imported, and some define the same.

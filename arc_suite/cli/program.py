@@ -6,6 +6,7 @@ import inspect
 import io
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import ModuleType
@@ -68,21 +69,25 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
 
     A wrong flag, a ValueError, an OSError and a RenderingUnavailable become one line on standard
     error and exit status 1, Ctrl-C one line and exit status 130; any other exception is a mistake of
-    ours and keeps its traceback. Where nobody reads the output any more, as in `program | head`, the
-    work goes on without it, so that its files are written.
+    ours and keeps its traceback. A warning is one line on standard error, too. Where nobody reads the
+    output any more, as in `program | head`, the work goes on without it, so that its files are written.
 
     Args:
         work: takes nothing, returns an exit status or None.
         name: the program's, with which the line begins.
     """
 
-    def fail(reason, status):
+    def say(reason, *_, **__):
         print(f"{name}: {' '.join(str(reason).split())}", file=sys.stderr)
+
+    def fail(reason, status):
+        say(reason)
         return status
 
     # A stream that was closed before the start is None.
     output, errors = (_Output(stream or io.StringIO()) for stream in (sys.stdout, sys.stderr))
-    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+    with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors), warnings.catch_warnings():
+        warnings.showwarning = say
         try:
             status = work()
         except (flags.Error, ValueError, OSError, RenderingUnavailable) as error:

@@ -15,6 +15,7 @@ PROGRAMS = (
     "tune_cpg",
     "train",
     "study",
+    "enter",
     "export",
     "survey",
     "doctor",

@@ -22,12 +22,12 @@ from absl import flags
 import arc_suite
 from arc_suite import checks, files, style
 from arc_suite.cli import films
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_task, task
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_policy, define_task, policy_name, task
 from arc_suite.cli.program import progress
 from arc_suite.export import pages
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
-from arc_suite.policies import HELP, PRESET_HELP, Policy, alone, policy
+from arc_suite.policies import PRESET_HELP, Policy, alone, policy
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".html": 400}
 _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
@@ -37,7 +37,7 @@ FLAGS = flags.FLAGS
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all of them side by side.")
-flags.DEFINE_string("policy", "cpg", HELP)
+define_policy()
 flags.DEFINE_string("preset", "medium", PRESET_HELP)
 flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)
 flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
@@ -62,7 +62,7 @@ def main() -> None:
         name: arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed}) for name, body in walkers.items()
     }
     policies = {
-        name: policy(FLAGS.policy, body, FLAGS.preset, task=environments[name].task.definition)
+        name: policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=environments[name].task.definition)
         for name, body in walkers.items()
     }
     if not FLAGS.output:

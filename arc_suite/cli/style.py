@@ -19,7 +19,7 @@ import pathlib
 from absl import flags
 
 from arc_suite import evaluation, files, policies, style, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, setups
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, made_body, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.export import pages
@@ -29,7 +29,7 @@ FLAGS = flags.FLAGS
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all. [default: the one of stored tracks, else queen]")
-flags.DEFINE_string("policy", "cpg", sources.HELP)
+define_policy(sources.HELP)
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
 flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
 flags.DEFINE_string("compare_preset", "medium", "Preset of --compare, if that is the cpg.")
@@ -48,7 +48,7 @@ flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz)
 
 def chosen_sources() -> dict[str, style.Source]:
     """Return the sources of the columns, by label."""
-    first = style.source(FLAGS.policy, FLAGS.preset)
+    first = style.source(policy_name(FLAGS.policy), FLAGS.preset)
     if FLAGS.compare is None:
         return {first.label: first}
     second = style.source(FLAGS.compare, FLAGS.compare_preset)

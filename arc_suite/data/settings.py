@@ -9,7 +9,7 @@ from arc_suite import policies
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import checkpoints, network
+from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
 
@@ -70,7 +70,7 @@ class Settings(NamedTuple):
         del known["setup"]
         known["presets_sha256"] = [_sha256(repr(presets.get(preset))) for preset in self.presets]
         if policies.is_file(self.policy):
-            known["policy_sha256"] = network.digest(self.policy)
+            known["policy_sha256"] = policies.digest(self.policy)
             known["agents"] = [agent._asdict() for agent in checkpoints.agents(Path(self.policy))]
         return known
 

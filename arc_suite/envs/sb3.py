@@ -1,5 +1,7 @@
 """A vector environment for stable-baselines3, which must be installed to import this module."""
 
+import contextlib
+import copy
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,6 +9,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common import vec_env
 
+from arc_suite.envs.setup import ATTRIBUTE, Setup
 from arc_suite.envs.vector import VectorEnv
 
 
@@ -15,6 +18,9 @@ class VecEnv(vec_env.VecEnv):
 
     `VecEnv(gymnasium.make_vec("arc_suite/queen-walk-v0", num_envs=16, autoreset_mode="SameStep"))`
     gives the same bits as a `DummyVecEnv` of as many single environments, on all cores.
+
+    Agents save their spaces. This observation space has an attribute with robot, task and settings, so that the zip of
+    an agent tells what it was trained for.
     """
 
     def __init__(self, environments: VectorEnv):
@@ -35,7 +41,10 @@ class VecEnv(vec_env.VecEnv):
             )
         self.environments = environments
         self._actions = None
-        super().__init__(environments.num_envs, environments.single_observation_space, environments.single_action_space)
+        observations = copy.copy(environments.single_observation_space)
+        with contextlib.suppress(ValueError):  # settings that files cannot hold
+            setattr(observations, ATTRIBUTE, Setup.of(*environments.arguments).to_dict())
+        super().__init__(environments.num_envs, observations, environments.single_action_space)
 
     def reset(self) -> np.ndarray:
         """Start an episode in every environment, from the seeds of the latest `seed` if that was not used yet."""

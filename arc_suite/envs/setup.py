@@ -20,6 +20,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 from arc_suite.tasks.contract import STEPS, Task
 
+ATTRIBUTE = "arc_suite"  # of an observation space: the setup that an agent was trained in, as `Setup.to_dict`
+
 
 @dataclasses.dataclass(frozen=True)
 class Setup:

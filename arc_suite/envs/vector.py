@@ -71,6 +71,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     `diverged`; the others notice nothing.
 
     Attributes:
+        arguments: robot, task and its settings, as `Setup.of` takes them.
         autoreset_mode: what happens to an environment whose episode has ended.
         batch: the simulations. Writing their state is for experiments.
         task: what the environments do; its `split` gives an observation's blocks by name.
@@ -124,7 +125,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         pictures.check_size(height, width)
         threads = usable_cores() if num_threads is None else checks.integer("num_threads", num_threads, 1)
 
-        self._task, model = prepared(domain_name, task_name, task_kwargs)
+        self.arguments = domain_name, task_name, task_kwargs
+        self._task, model = prepared(*self.arguments)
         pictures.check_camera(model, camera_id)
         self._step_limit = (
             np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
@@ -297,7 +299,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Go on, bit-exact, from the snapshot of an environment of the same size and task.
 
         Raises:
-            ValueError: an array is missing or does not fit. The environment is to be thrown away then.
+            ValueError: an array is missing or does not fit; none has been used.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")

@@ -7,13 +7,10 @@ import numpy as np
 
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.paper import DEMONSTRATORS
 from arc_suite.policies import Policy, alone
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting
-
-# Returns of the paper's demonstrators in the task walk, read off the expert lines of its figures. The README's table
-# has those of ours.
-EXPERT_RETURNS = {"queen": 2048.0, "bastion": 2311.0, "tick": 1971.0, "leaper": 2630.0}
 
 _PROGRESS = "progress_"  # prefix of the task's metrics in an info
 
@@ -35,7 +32,7 @@ class Episode(NamedTuple):
 def expert_return(setup: Setup) -> float | None:
     """Return what the paper's demonstrator earns; None for other tasks, settings and robots than the paper's."""
     published = setup.kind.name == "walk" and not setup.task_kwargs
-    return EXPERT_RETURNS.get(setup.body.name) if published else None
+    return DEMONSTRATORS.get(setup.body.name) if published else None
 
 
 def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Iterator:

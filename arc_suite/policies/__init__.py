@@ -1,6 +1,6 @@
 """Policies: one protocol of acting, and policies by name."""
 
-from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, is_file, policy, preset_names
+from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, digest, is_file, policy, preset_names, trained
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
 
 __all__ = [
@@ -14,7 +14,9 @@ __all__ = [
     "Script",
     "Sum",
     "alone",
+    "digest",
     "is_file",
     "policy",
     "preset_names",
+    "trained",
 ]

@@ -1,6 +1,8 @@
-"""Policies by name: some need no training; any other is found on Python's path."""
+"""Policies by name: some need no training; any other is a file, or is found on Python's path."""
 
+import hashlib
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -9,13 +11,14 @@ import numpy as np
 from arc_suite import checks, versions
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.selection import preset_names
-from arc_suite.policies import network
+from arc_suite.envs.setup import Setup
+from arc_suite.policies import network, zips
+from arc_suite.policies.network import Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
-_ZIP = ".zip"  # in which stable-baselines3 saves
 _CHUNK = 256  # control steps that are drawn at once
 
 
@@ -47,7 +50,7 @@ POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
-    "saved, whose pickles are run; or module:attribute, a function that makes a policy from a robot's name, or from "
+    "saved, whose pickles run code; or module:attribute, a function that makes a policy from a robot's name, or from "
     "any other Body."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the robot has."
@@ -67,7 +70,7 @@ def policy(
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
             episode's seed; the path of a run's folder, of a policy file (.npz), see `network`, or of a
             folder of checkpoints, which take turns from seed to seed, see `checkpoints`; that of a zip of
-            stable-baselines3, see `sb3_file`; or `module:attribute`, a function on Python's path that makes
+            stable-baselines3, see `zips`; or `module:attribute`, a function on Python's path that makes
             a function from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
         robot: queen, bastion, tick or leaper, or any body.
         presets: of the demonstrator, a name or several that take turns from seed to seed; see `cpg.Demonstrator`.
@@ -111,34 +114,85 @@ def is_file(name: str) -> bool:
     """Return whether a policy's name is that of a folder of a run or of checkpoints that is there, or of a zip."""
     if name in POLICIES:
         return False
-    return name.endswith(_ZIP) or (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
+    return bool(zips.parts(name)) or (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
+
+
+def digest(name: str) -> str:
+    """Return the sha256 of the files of a policy: of a run, of all checkpoints, or of a zip and its statistics.
+
+    Raises:
+        ValueError: as `zips.statistics`.
+        OSError: a file cannot be read.
+    """
+    if zipped := zips.parts(name):
+        files = filter(None, (zipped[0], zips.statistics(*zipped)))
+    else:
+        path = Path(name)
+        files = network.checkpoint_files(path) or [path / network.FILE if path.is_dir() else path]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+
+
+def trained(name: str | os.PathLike) -> Network:
+    """Return a policy file, the policy of a run's folder, or a zip of stable-baselines3, as a network.
+
+    Raises:
+        ValueError: a damaged file, a zip that does not hold its setup, or a network of other layers.
+        OSError: a file cannot be read.
+    """
+    if (zipped := zips.parts(name)) is None:
+        return network.load(name)
+    if (setup := zips.setup(zipped[0])) is None:
+        raise ValueError(f"policy {zipped[0]}: {_UNKNOWN}")
+    return _saved(*zipped).network(setup)
 
 
 def _is_path(name: str) -> bool:
-    return is_file(name) or name.endswith((network.EXTENSION, _ZIP)) or (os.sep in name and ":" not in name)
+    return is_file(name) or name.endswith(network.EXTENSION) or (os.sep in name and ":" not in name)
 
 
 def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
-    if path.suffix == _ZIP:
-        return _from_zip(path, body)
+    if zipped := zips.parts(path):
+        return _from_zip(*zipped, body, task)
     made = network.load(path)
-    setup = made.setup
-    if setup.body != body and not (is_robot(setup.body) and setup.body.name == body.name):
-        name = "another body of that name" if setup.body.name == body.name else setup.body.name
-        raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
-    if made.joints != len(body.joint_names):
-        raise ValueError(f"policy {path}: moves {made.joints} joints, and {body.name} has {len(body.joint_names)}")
-    if task is not None and (actions := setup.definition.actions) != task.actions:
-        raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
+    _check(path, made.setup, body, task)
+    _check_joints(path, made.joints, body)
     return made
 
 
-def _from_zip(path: Path, body: Body) -> Policy:
+def _from_zip(path: Path, statistics: Path | None, body: Body, task: Task | None) -> Policy:
+    setup = zips.setup(path)
+    if setup is None:
+        warnings.warn(f"policy {path}: {_UNKNOWN}", stacklevel=5)
+    else:
+        _check(path, setup, body, task)
+    made = _saved(path, statistics)
+    _check_joints(path, made.joints, body)
+    return made
+
+
+_UNKNOWN = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
+
+
+def _saved(path: Path, statistics: Path | None):
     try:
         from arc_suite.policies import sb3_file
     except ImportError as error:
         raise versions.MissingExtra(f"policy {path}: zips need stable-baselines3", "sb3", error) from None
-    return sb3_file.Saved(path, body)
+    return sb3_file.Saved(path, zips.statistics(path, statistics))
+
+
+def _check(path: Path, setup: Setup, body: Body, task: Task | None) -> None:
+    """Raise a ValueError of one line if a policy was trained for another body, or for other actions."""
+    if setup.body != body and not (is_robot(setup.body) and setup.body.name == body.name):
+        name = "another body of that name" if setup.body.name == body.name else setup.body.name
+        raise ValueError(f"policy {path}: made for {name}, and not for {body.name}")
+    if task is not None and (actions := setup.definition.actions) != task.actions:
+        raise ValueError(f"policy {path}: its actions are a {actions} a joint, and {task.name} takes a {task.actions}")
+
+
+def _check_joints(path: Path, joints: int, body: Body) -> None:
+    if joints != len(body.joint_names):
+        raise ValueError(f"policy {path}: moves {joints} joints, and {body.name} has {len(body.joint_names)}")
 
 
 def _from_path(path: str, body: Body, num_envs: int) -> Policy:

@@ -9,7 +9,6 @@ A policy file is an archive of arrays with one JSON text:
 It holds no pickle and no code, so reading a file of others runs nothing.
 """
 
-import hashlib
 import json
 import os
 import zipfile
@@ -177,13 +176,6 @@ def load(path: str | os.PathLike) -> Network:
         raise ValueError(f"policy {path}: {error}") from None
     except _DAMAGES as error:
         raise ValueError(f"{path}: no policy, or a damaged one: {checks.quoted(error)}") from None
-
-
-def digest(path: str | os.PathLike) -> str:
-    """Return the sha256 of a policy file, of a run's policy file, or of all policy files of a folder of checkpoints."""
-    path = Path(path)
-    files_of = [path / FILE] if (path / FILE).is_file() else checkpoint_files(path) if path.is_dir() else [path]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files_of)).hexdigest()
 
 
 def checkpoint_files(folder: Path) -> list[Path]:

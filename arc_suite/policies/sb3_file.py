@@ -1,7 +1,6 @@
 """Policies that stable-baselines3 has saved, as zips; it must be installed to import this module.
 
-A zip holds pickles: reading one runs its code. The statistics of `VecNormalize` lie in another file, so
-that policies of normalised observations need a function of one's own (`--policy module:attribute`).
+A zip holds pickles, and so does a file of statistics of `VecNormalize`: reading one runs its code.
 """
 
 import zipfile
@@ -10,25 +9,40 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from stable_baselines3.common.save_util import load_from_zip_file
+from stable_baselines3.common.save_util import load_from_pkl, load_from_zip_file
+from stable_baselines3.common.vec_env import VecNormalize
 
 from arc_suite import checks
-from arc_suite.robots.spec import Body
+from arc_suite.envs.setup import Setup
+from arc_suite.policies.network import Layer, Network
+
+_LAYERS = {
+    torch.nn.Linear: lambda module: Layer("linear", (_array(module.weight.T), _array(module.bias))),
+    torch.nn.ReLU: lambda module: Layer("relu"),
+    torch.nn.Tanh: lambda module: Layer("tanh"),
+}
+_TOLERANCE = 1e-4  # of an action, between a network of layers and torch's
 
 
 class Saved:
-    """The deterministic policy of an algorithm of stable-baselines3, whichever it is."""
+    """The deterministic policy of an algorithm of stable-baselines3, whichever it is.
 
-    def __init__(self, path: Path, body: Body):
+    Attributes:
+        joints: that it moves.
+    """
+
+    def __init__(self, path: Path, statistics: Path | None = None):
         """Read a zip.
 
+        Args:
+            path: of the zip.
+            statistics: file that `VecNormalize.save` wrote; None for a policy of plain observations.
+
         Raises:
-            ValueError: it is none of stable-baselines3, or of another body.
+            ValueError: it is none of stable-baselines3.
             OSError: it cannot be read.
         """
         self._path = path
-        if not path.is_file():
-            raise OSError(f"cannot read {path}: no such file")
         try:
             data, parameters, _ = load_from_zip_file(path, device="cpu")
             spaces = data["observation_space"], data["action_space"]
@@ -37,10 +51,8 @@ class Saved:
         except (zipfile.BadZipFile, ValueError, KeyError, TypeError, RuntimeError, AssertionError) as error:
             raise ValueError(f"policy {path}: no policy of stable-baselines3: {checks.quoted(error)}") from None
         self._policy.set_training_mode(False)
-        self._size = spaces[0].shape
-        if spaces[1].shape != (len(body.joint_names),):
-            moved = spaces[1].shape
-            raise ValueError(f"policy {path}: moves {moved} joints, and {body.name} has {len(body.joint_names)}")
+        self._size, (self.joints,) = spaces[0].shape, spaces[1].shape
+        self._statistics = None if statistics is None else _statistics(statistics, self._size)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
@@ -54,5 +66,64 @@ class Saved:
         flat = np.concatenate(list(observation.values()), axis=-1, dtype=np.float32)
         if flat.shape[1:] != self._size:
             raise ValueError(f"policy {self._path}: expected observations {self._size}, got {flat.shape[1:]}")
+        return self._actions(flat).astype(float)
+
+    def network(self, setup: Setup) -> Network:
+        """Return the policy as layers, with the statistics as the first.
+
+        Args:
+            setup: that it was trained in.
+
+        Raises:
+            ValueError: a policy that is no multilayer perceptron of known layers, or of another size.
+        """
+        task = setup.definition
+        if self._size != (task.size,):
+            raise ValueError(f"policy {self._path}: expected observations ({task.size},), got {self._size}")
+        try:
+            layers = tuple(_LAYERS[type(module)](module) for module in _modules(self._policy))
+        except (KeyError, AttributeError, TypeError) as error:
+            raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quoted(error)}") from None
+        layers = (*layers, Layer("tanh" if self._policy.squash_output else "clip"))
+        if (known := self._statistics) is not None and known.norm_obs:
+            factor = 1.0 / np.sqrt(known.obs_rms.var + known.epsilon)
+            arrays = known.obs_rms.mean, factor, known.clip_obs
+            layers = (Layer("normalise", tuple(np.asarray(array, np.float32) for array in arrays)), *layers)
+        made = Network(layers, setup, task.blocks)
+        samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
+        if np.abs(made.actions(samples) - self._actions(samples)).max() > _TOLERANCE:
+            raise ValueError(f"policy {self._path}: expected a perceptron, got another network")
+        return made
+
+    def _actions(self, observations: np.ndarray) -> np.ndarray:
+        if self._statistics is not None:
+            observations = self._statistics.normalize_obs(observations)
         with torch.no_grad():
-            return np.stack([self._policy.predict(each, deterministic=True)[0] for each in flat]).astype(float)
+            return np.stack([self._policy.predict(each, deterministic=True)[0] for each in observations])
+
+
+def _statistics(path: Path, size: tuple[int, ...]) -> VecNormalize:
+    try:
+        found = load_from_pkl(path)
+    except OSError:
+        raise
+    except Exception as error:  # a pickle may raise anything
+        raise ValueError(f"{path}: no statistics of VecNormalize: {checks.quoted(error)}") from None
+    if not isinstance(found, VecNormalize):
+        raise ValueError(f"{path}: expected statistics of VecNormalize, got {type(found).__name__}")
+    if found.norm_obs and found.obs_rms.mean.shape != size:
+        raise ValueError(f"{path}: expected statistics of observations {size}, got {found.obs_rms.mean.shape}")
+    return found
+
+
+def _modules(policy) -> list[torch.nn.Module]:
+    """Return the modules from observations to actions before squashing or clipping."""
+    if not hasattr(policy, "actor"):
+        return [*policy.mlp_extractor.policy_net, policy.action_net]
+    if hasattr(policy.actor, "latent_pi"):
+        return [*policy.actor.latent_pi, policy.actor.mu]
+    return [*policy.actor.mu][:-1]
+
+
+def _array(parameter) -> np.ndarray:
+    return parameter.detach().numpy().astype(np.float32)

@@ -70,6 +70,8 @@ def body_from_json(text: str | bytes) -> Body:
     Raises:
         SpecError: not JSON, or no body.
     """
+    if text.lstrip()[:1] in ("<", b"<"):
+        raise SpecError("expected a body in JSON, got XML: MJCF and URDF cannot be read; see docs/bodies.md")
     try:
         # Integers of any length become floats, which the field's range then refuses.
         value = json.loads(text, object_pairs_hook=_object, parse_int=_integer)

@@ -148,12 +148,32 @@ class Batch:
         models = {f"{_OF_MODEL}{name}": np.stack([getattr(own, name) for own in self._own]) for name in self._changed}
         return {"state": self._simulations.state.copy(), **fields, **models}
 
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Continue bit-identically from the arrays of `snapshot`.
+    def checked(self, arrays: Mapping[str, np.ndarray], changeable: Iterable[str]) -> Mapping[str, np.ndarray]:
+        """Return the arrays if `restore` can take them: MuJoCo trusts what it is given, and ends the process.
+
+        Args:
+            arrays: of a snapshot.
+            changeable: fields of the model that it may hold.
 
         Raises:
-            KeyError, ValueError: an array is missing or does not fit.
+            ValueError: an array is missing, too many, of another shape or type, or not finite.
         """
+        model, count = self._simulations.model, self._simulations.nsim
+        expected = {"state": self._simulations.state, **vars(self.data)}
+        for field in changeable:
+            name, compiled = f"{_OF_MODEL}{field}", getattr(model, field)
+            if name in arrays:
+                expected[name] = np.broadcast_to(compiled, (count, *compiled.shape))
+        if missing := expected.keys() ^ arrays.keys():
+            raise ValueError(f"{min(missing)}: {'missing' if min(missing) in expected else 'no array of a snapshot'}")
+        for name, like in expected.items():
+            found = fitting(name, arrays[name], like)
+            if not np.isfinite(found).all():
+                raise ValueError(f"{name}: expected finite numbers")
+        return arrays
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Continue bit-identically from the arrays of `snapshot`."""
         models = {name.removeprefix(_OF_MODEL): array for name, array in arrays.items() if name.startswith(_OF_MODEL)}
         if models or self._own is not None:
             each = range(self._simulations.nsim)
@@ -175,6 +195,17 @@ class Batch:
     def _check_process(self) -> None:
         if self._forks != forks.count:
             forks.refuse("vector environment")
+
+
+def fitting(name: str, array: np.ndarray, like: np.ndarray) -> np.ndarray:
+    """Return an array that has the shape and type of another one.
+
+    Raises:
+        ValueError: it has not.
+    """
+    if (array.shape, array.dtype) != (like.shape, like.dtype):
+        raise ValueError(f"{name}: expected {like.dtype} {like.shape}, got {array.dtype} {array.shape}")
+    return array
 
 
 def _silent(model: mujoco.MjModel) -> mujoco.MjModel:

@@ -11,19 +11,14 @@ import numpy as np
 from arc_suite import checks, evaluation, files
 from arc_suite.agents import run_folder
 from arc_suite.envs.setup import Setup
-from arc_suite.studies import results, tables
+from arc_suite.paper import FINALS as PAPER
+from arc_suite.studies import leaderboard, results, tables
+from arc_suite.studies.leaderboard import table
 from arc_suite.studies.results import STRIP, Result
 from arc_suite.studies.tables import Run, Study
 
 REPORT, CURVES = "README.md", "curves.png"
 
-# Final returns after 1,000,000 steps, mean of five seeds, read off the paper's curves, within about 30.
-PAPER = {
-    "leaper": {"sac": 2860, "speq": 3120, "sope_eo": 3310, "sacfd": 3520, "speq_o2o": 3550, "sope": 3760},
-    "bastion": {"sac": 3080, "speq": 3350, "sope_eo": 3530, "sacfd": 3530, "speq_o2o": 3680, "sope": 3690},
-    "queen": {"sac": 3520, "speq": 3330, "sope_eo": 3580, "sacfd": 3220, "speq_o2o": 3620, "sope": 3730},
-    "tick": {"sac": 2590, "speq": 3590, "sope_eo": 3490, "sacfd": 3160, "speq_o2o": 3720, "sope": 3610},
-}
 ONLINE = ("sac", "speq", "sope_eo")
 WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
 COMPETITIVE = 100.0  # of return: within it of the best online algorithm the paper calls SAC competitive
@@ -149,10 +144,7 @@ def write(name: str, study: Study, published: Path) -> Path:
         _curves(groups, demonstrators).savefig(temporary)
     with files.writing(published / REPORT) as temporary:
         temporary.write_text(_page(sections), encoding="utf-8")
-    if tables.STUDIES.get(name) == study:
-        with files.writing(published.parent / REPORT) as temporary:
-            page = _page({"Leaderboard": [_LEADERBOARD, _leaderboard(published.parent)]})
-            temporary.write_text(page, encoding="utf-8")
+    leaderboard.write(published, _rows(published.name, groups))
     return published / REPORT
 
 
@@ -187,22 +179,12 @@ _CLAIMS = (
     "Margin of each claim, in its own unit: it holds above zero. The paper's margin is from its final returns after "
     "1,000,000 steps, if they decide the claim. Ours are from finished runs alone, at their steps."
 )
-_LEADERBOARD = (
-    "All committed studies, written by `arc-suite study NAME --report`. Return: mean of the latest evaluation, and "
-    "interquartile mean with 95 % bootstrap interval over seeds, or of a single seed over episodes. Then the task's "
-    "own metric, speed in m/s; headings are relative to the x axis, which is not the direction of a command."
-)
 
 
 def _page(sections: Mapping[str, Sequence[str]]) -> str:
     texts = [("#" if not place else "##") + f" {title}" for place, title in enumerate(sections)]
     parts = itertools.chain.from_iterable(zip(texts, ("\n\n".join(body) for body in sections.values()), strict=True))
     return "\n\n".join(parts) + "\n"
-
-
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [columns, ["---"] * len(columns), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
 def _title(study: Study, found: Sequence[Result]) -> str:
@@ -216,7 +198,7 @@ def _reached(found: Sequence[Result]) -> str:
         run, configuration = each.run, each.run.configuration
         reached = f"{each.steps[-1]:,} of {configuration.steps:,}"
         lines.append((run.place, run.kind, str(configuration.seed), reached, f"{each.cpu[-1] / 60.0:.1f}"))
-    return _table(("robot, task", "algorithm", "seed", "steps", "CPU min"), lines)
+    return table(("robot, task", "algorithm", "seed", "steps", "CPU min"), lines)
 
 
 def _curves(groups: Groups, demonstrators):
@@ -270,7 +252,7 @@ def _finals(groups: Groups, demonstrators) -> str:
         for preset, totals in demonstrators.get(place, {}).items():
             paper = f"{expert:.0f}" if preset == "medium" and expert else "-"
             lines.append((place, f"demonstrator {preset}", "-", "-", _mean(totals), _iqm(totals), paper))
-    return _table(("robot, task", "algorithm", "steps", "seeds", "return", "IQM [95 %]", "paper, 1M steps"), lines)
+    return table(("robot, task", "algorithm", "steps", "seeds", "return", "IQM [95 %]", "paper, 1M steps"), lines)
 
 
 def _efficiency(groups: Groups) -> str:
@@ -285,7 +267,7 @@ def _efficiency(groups: Groups) -> str:
             area = np.mean([each.returns.mean() for each in seeds])
             lines.append((place, kind, *cells, f"{area:.1f}"))
     heads = ("robot, task", "algorithm", "steps to demonstrator", "CPU min", "steps to 3,500", "CPU min", "area")
-    return _table(heads, lines)
+    return table(heads, lines)
 
 
 def _improvements(groups: Groups) -> str:
@@ -297,7 +279,7 @@ def _improvements(groups: Groups) -> str:
             found = None if x == y else results.improvement(groups, x, y)
             cells.append("-" if found is None else "{:.2f} [{:.2f}, {:.2f}]".format(found[0], *found[1]))
         lines.append((x, *cells))
-    return _table(("more than", *names), lines)
+    return table(("more than", *names), lines)
 
 
 def _phases(groups: Groups) -> str:
@@ -308,7 +290,7 @@ def _phases(groups: Groups) -> str:
             if len(updates):
                 figures = (updates.mean(), updates.min(), updates.max())
                 lines.append((place, kind, str(len(updates)), *(f"{figure:,.0f}" for figure in figures)))
-    return _table(("robot, task", "algorithm", "phases", "mean", "least", "most"), lines)
+    return table(("robot, task", "algorithm", "phases", "mean", "least", "most"), lines)
 
 
 def _style(groups: Groups) -> str:
@@ -318,7 +300,7 @@ def _style(groups: Groups) -> str:
         for kind, seeds in kinds.items():
             cells = [_size(name, seeds) for name in names]
             lines.append((place, kind, *cells))
-    return _table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
+    return table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
 
 
 def _size(name: str, seeds: Sequence[Result]) -> str:
@@ -338,7 +320,7 @@ def _claims(found: Sequence[Result]) -> str:
         paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
         ours = {robot: claim.compared(robot, measured) for robot in PAPER}
         lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
-    return _table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
+    return table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
 
 
 def _robot_and_algorithm(result: Result) -> tuple[str, str]:
@@ -378,25 +360,18 @@ def _verdict(figures: Mapping[str, float | None]) -> str:
     return f"{sum(known)} of {len(known)} robots" if known else "not measured"
 
 
-def _leaderboard(folder: Path) -> str:
-    lines = []
-    for name, study in tables.STUDIES.items():
-        for kinds in results.grouped(results.results(study.runs, folder / name)).values():
-            for seeds in kinds.values():
-                lines.append((name, seeds))
-    lines.sort(key=lambda line: (line[1][0].run.place, -np.mean([each.final for each in line[1]])))
-    cells = []
-    for name, seeds in lines:
+def _rows(name: str, groups: Groups) -> list[tuple[str, ...]]:
+    """Return the rows of a study in the leaderboard, by `leaderboard.HEADS`."""
+    rows = []
+    for seeds in (seeds for kinds in groups.values() for seeds in kinds.values()):
         run, values = seeds[0].run, results.scores(seeds)
         figure = next(iter(seeds[0].progress))
         own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
-        style = [_size(name, seeds) for name in ("gait_compliance", "heading_error", "torso_pitch")]
+        style = [_size(metric, seeds) for metric in ("gait_compliance", "heading_error", "torso_pitch")]
         command = f"arc-suite train --config studies/{name}/{run.name}/{run_folder.CONFIG}"
         steps = f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}"
         cpu = f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}"
         result = f"{np.mean([each.final for each in seeds]):.1f}"
         link = f"[{name}]({name}/{REPORT})"
-        cells.append((run.place, run.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
-    heads = ("robot, task", "algorithm", "return", "IQM [95 %]", "metric", "gait compliance")
-    heads += ("heading error, rad", "torso pitch, rad")
-    return _table((*heads, "steps", "CPU min", "study", "command of seed 0"), cells)
+        rows.append((run.place, run.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
+    return rows

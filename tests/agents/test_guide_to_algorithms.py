@@ -1,13 +1,11 @@
 """The guide to adding an algorithm: its code runs."""
 
 import importlib.util
-import os
 import pathlib
 import re
-import subprocess
-import sys
 
 import numpy as np
+import programs
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
@@ -21,11 +19,9 @@ def run(tmp_path):
     """Runs the guide's commands in the folder of its files, with other flags at the end."""
     (tmp_path / "my_algorithms.py").write_text(MY_ALGORITHMS)
     (tmp_path / "random_search.py").write_text(RANDOM_SEARCH)
-    environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
 
     def command(text, *flags):
-        arguments = [sys.executable, "-m", *text.replace("arc-suite", "arc_suite").split(), *flags]
-        done = subprocess.run(arguments, env=environ, cwd=tmp_path, capture_output=True, text=True)
+        done = programs.run(*text.split(), *flags, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         return done.stdout
 
@@ -46,6 +42,7 @@ def test_a_new_learner(run, tmp_path):
     assert "\nleaper " in run(EVALUATE, "--episodes=1", "--set", "time_limit=2")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(importlib.util.find_spec("jax") is None, reason="of the extra agents: make check-agents")
 def test_new_hyperparameters(run, tmp_path):
     out = run(TRAIN_PATIENT, "--steps=50", "--hp=hidden=8", "--hp=batch=4", "--set", "time_limit=2")

@@ -245,7 +245,7 @@ def test_hyperparameters_that_do_not_fit_are_refused():
         dataclasses.replace(SMALL, num_envs=0)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_it_learns(begun):
     """Standing still on the way to walking, in a minute: falls end."""
     changes = {"num_envs": 32, "horizon": 16, "minibatch": 256, "hidden": 64, "epochs": 4}

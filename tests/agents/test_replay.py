@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from arc_suite.agents.learner import Damaged
 from arc_suite.agents.replay import Protected, Replay
 
 SIZE, JOINTS = 3, 2
@@ -52,18 +53,39 @@ def test_goes_on_from_where_it_was(tmp_path):
     """What was added after a checkpoint is overwritten by the same, and sampled from before it is what it was."""
     replay = Replay(tmp_path, 10, SIZE, JOINTS, slack=6)
     added = fill(replay, [(9, True)] * 3)
-    total, ends = replay.total, replay.ends
+    counters = replay.total, replay.ends, replay.checksum
     fill(replay, [(6, True)], start=1000)
-    again = Replay(tmp_path, 10, SIZE, JOINTS, slack=6)
-    again.restore(total, ends)
+    again = Replay(tmp_path, 10, SIZE, JOINTS, 6, "r+")
+    again.restore(*counters)
     check(again, added)
+    fill(replay, [(3, True)], start=1006)  # more than the slack
+    with pytest.raises(Damaged, match=r"holds other transitions$"):
+        again.restore(*counters)
+
+
+@pytest.mark.parametrize("name", ["observations", "actions", "rewards", "goes_on", "ends", "final_observations"])
+def test_a_file_that_is_gone_cut_or_overwritten(tmp_path, name):
+    replay = Replay(tmp_path, 10, SIZE, JOINTS)
+    fill(replay, EPISODES)
+    counters = replay.total, replay.ends, replay.checksum
+    content = (tmp_path / name).read_bytes()
+    (tmp_path / name).write_bytes(bytes(len(content)))
+    with pytest.raises(Damaged, match=rf"^{tmp_path} holds other transitions$"):
+        Replay(tmp_path, 10, SIZE, JOINTS, 0, "r+").restore(*counters)
+    (tmp_path / name).write_bytes(content[:-1])
+    with pytest.raises(Damaged, match=rf"^{tmp_path / name} is missing or too short$"):
+        Replay(tmp_path, 10, SIZE, JOINTS, 0, "r+")
+    (tmp_path / name).unlink()
+    with pytest.raises(Damaged, match=rf"^{tmp_path / name} is missing or too short$"):
+        Replay(tmp_path, 10, SIZE, JOINTS, 0, "r")
+    assert not (tmp_path / name).exists()
 
 
 def test_files_are_read_alone(tmp_path):
     replay = Replay(tmp_path, 20, SIZE, JOINTS)
     added = fill(replay, EPISODES)
     prior = Replay(tmp_path, len(added), SIZE, JOINTS, mode="r")
-    prior.restore(replay.total, replay.ends)
+    prior.restore(replay.total, replay.ends, replay.checksum)
     check(prior, added)
     with pytest.raises(ValueError, match="read-only"):
         fill(prior, EPISODES)

@@ -34,7 +34,7 @@ def test_both_files_and_a_row_for_each_clip(tmp_path):
     assert (tmp_path / "tick.glb").read_bytes() == data
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_any_body_as_rigid_parts(tmp_path):
     flags = ("--legs=4", "--links=2", "--rig=nodes", "--root_motion=moving", "--clips=walk", "-o", "walker.glb")
     done = animate(*flags, cwd=tmp_path)

@@ -1,6 +1,7 @@
 """`arc-suite check` tells what is wrong with a body in a spec file."""
 
 import json
+import re
 from pathlib import Path
 
 import programs
@@ -55,6 +56,7 @@ def test_a_standing_height_that_does_not_fit_is_told_with_one_that_does(path):
     [
         ((), "expected a spec file or --task; see --help"),
         (("--task=wlak",), "unknown task 'wlak'; did you mean 'walk'? (there are: " + ", ".join(TASKS) + ")"),
+        (("--task=walk", "--walk"), "--walk: expected a spec file, got --task"),
         (("missing.json",), "cannot read missing.json: no such file or directory"),
         (("a.json", "b.json"), "unexpected argument 'b.json'; see --help"),
     ],
@@ -80,6 +82,56 @@ def test_a_task_that_rounds_otherwise_alone_is_told_by_its_term(tmp_path):
         "        return super().terms(memory, readings) | {'forward': memory.forward_velocity**2}\n\n"
         "arc_suite.register(module=__name__, tasks=(Squaring,))\n"
     )
-    done = programs.arc_suite("check", "--task=squaring:squaring", "--robot=tick", cwd=tmp_path, path=tmp_path)
+    done = programs.arc_suite("check", "--task=squaring:squaring", "--robot=tick", cwd=tmp_path)
     assert done.returncode == 1 and done.stdout.startswith("tick, squaring: a batch of environments differs from one")
     assert done.stdout.endswith(": term forward\n")
+
+
+def _quadruped(**joint):
+    """A spec of the size of a Go2, of 15 kg, with fields of its joints."""
+
+    def leg(name, x, y):
+        parts = (
+            ("hip", [1, 0, 0], [0, 0.0955 if y > 0 else -0.0955, 0], 0.04, 48),
+            ("thigh", [0, 1, 0], [-0.14, 0, -0.16], 0.025, 60),
+            ("calf", [0, 1, 0], [0.14, 0, -0.16], 0.02, 60),
+        )
+        links = [
+            {"name": name, "end": end, "radius": radius}
+            | {"joint": {"name": name, "axis": axis, "range_deg": [-reach, reach], **joint}}
+            for name, axis, end, radius, reach in parts
+        ]
+        return {"name": name, "mount": [x, y, 0.0], "links": links, "foot": {"radius": 0.022}}
+
+    solid = {"name": "base", "shape": "box", "size": [0.19, 0.047, 0.057]}
+    legs = [
+        leg(f"{end}{side}", x, y) for end, x in (("f", 0.19), ("r", -0.19)) for side, y in (("l", 0.05), ("r", -0.05))
+    ]
+    return json.dumps({"name": "quadruped", "density": 700.0, "torso": {"solids": [solid]}, "legs": legs})
+
+
+@pytest.mark.slow
+def test_a_body_that_falls_is_told_what_to_leave_out(path):
+    path.write_text(_quadruped(motor={"gear": 23.7}, armature=0.01, damping=0.1))
+    done = check("--walk", path)
+    stands, falls = done.stdout.splitlines()
+    assert (done.returncode, stands) == (1, f"{path}: quadruped stands and can take steps")
+    found = re.fullmatch(
+        rf"{path}: quadruped falls after (\d+) control steps: leave out (.*) of its joints: "
+        r"it then walks 100 control steps at -?[\d.]+ m/s \(target 0\.37\)",
+        falls,
+    )
+    assert int(found[1]) < 100 and set(found[2].split(" and ")) <= {"motor", "damping", "armature"}
+    path.write_text(_quadruped())
+    done = check("--walk", path)
+    assert done.returncode == 0
+    assert done.stdout.splitlines()[1].startswith(f"{path}: walks 100 control steps at 0.")
+
+
+@pytest.mark.parametrize("text", ["<mujoco/>", '\n<?xml version="1.0"?>\n<robot name="a"/>'])
+def test_xml_is_one_line(tmp_path, text):
+    path = tmp_path / "robot.xml"
+    path.write_text(text)
+    done = check(path)
+    line = "expected a body in JSON, got XML: MJCF and URDF cannot be read; see docs/bodies.md"
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite check: {path}: {line}\n")

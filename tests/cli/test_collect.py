@@ -21,8 +21,8 @@ def root(tmp_path, monkeypatch):
     return tmp_path / "datasets"
 
 
-def run(*arguments, path=""):
-    return programs.arc_suite("collect", *arguments, path=path)
+def run(*arguments):
+    return programs.arc_suite("collect", *arguments)
 
 
 @pytest.mark.slow

@@ -28,6 +28,7 @@ TASKED = (
     "tune_cpg",
     "train",
     "survey",
+    "enter",
 )
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
@@ -97,6 +98,19 @@ def test_the_console_script_runs_programs():
     assert (done.returncode, done.stdout, done.stderr) == (1, "", run("rendr").stderr)
 
 
+def test_modules_of_the_current_folder_come_last(tmp_path):
+    """A policy there is found by its name; files there hide neither registered names nor installed modules."""
+    for hidden in ("queen", "walk", "minari", "arc_suite"):
+        (tmp_path / f"{hidden}.py").write_text("raise SystemExit('imported from the current folder')\n")
+    (tmp_path / "pol.py").write_text("def make(robot):\n    return lambda timestep: [0.0] * 18\n")
+    evaluate = ("evaluate", "--robot=queen", "--task=walk", "--episodes=1", "--set=time_limit=0.5")
+    done = programs.arc_suite(*evaluate, "--policy=pol:make", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr
+    assert programs.arc_suite("collect", "--verify=a/b-v0", cwd=tmp_path).stderr.startswith("arc-suite collect: ")
+    done = programs.arc_suite(*evaluate, "--policy=lop:make", cwd=tmp_path)
+    assert done.stderr == "arc-suite evaluate: policy 'lop:make': No module named 'lop'\n"
+
+
 @functools.cache
 def help_of(program):
     done = run(program, "--help")
@@ -120,7 +134,7 @@ def test_help_of_a_program(program):
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study") else []), "stray")
+    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study", "enter") else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 

@@ -18,8 +18,8 @@ from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json
 
 
-def render(folder, *arguments, path=""):
-    return programs.arc_suite("render", "--width=64", "--height=48", *arguments, cwd=folder, path=path)
+def render(folder, *arguments):
+    return programs.arc_suite("render", "--width=64", "--height=48", *arguments, cwd=folder)
 
 
 def views_of(path, columns, rows):

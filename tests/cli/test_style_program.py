@@ -21,8 +21,8 @@ def broken(robot): return lambda time_step: np.full(12, np.nan)
 """
 
 
-def run(*arguments, path=""):
-    return programs.arc_suite("style", *arguments, path=path)
+def run(*arguments, cwd=None):
+    return programs.arc_suite("style", *arguments, cwd=cwd)
 
 
 @pytest.mark.long
@@ -35,7 +35,7 @@ def test_report_of_two_policies(tmp_path):
         "--episodes=2",
         f"--json={figures}",
         f"--output={folder}",
-        path=tmp_path,
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
@@ -62,7 +62,7 @@ def test_report_of_two_policies(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["gait.png", "path.png", "reward.png", "speed.png"]
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_saved_body_beside_a_policy(tmp_path):
     saved, figures = tmp_path / "spider.npz", tmp_path / "style.json"
     done = run(f"--spec={SPIDER}", "--episodes=2", "--seed=4", f"--save={saved}", f"--json={figures}")
@@ -89,7 +89,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
         assert (other.returncode, other.stdout, other.stderr) == (1, "", f"arc-suite style: {message}\n")
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
@@ -118,7 +118,7 @@ def test_other_tasks(tmp_path, task):
     (tmp_path / "staying.py").write_text(fixtures + registering)
     saved, figures, folder = tmp_path / "tick.npz", tmp_path / "style.json", tmp_path / "pictures"
     asked = (f"--task={task}", "--set=time_limit=2", "--set=arena=bumps", "--episodes=1")
-    done = run("--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", path=tmp_path)
+    done = run("--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     report = json.loads(figures.read_text(), parse_constant=pytest.fail)
     assert (report["task"], report["task_kwargs"]) == (task, {"time_limit": 2, "arena": "bumps"})
@@ -136,7 +136,7 @@ def test_other_tasks(tmp_path, task):
 
     # What was saved tells its task and settings; the same episode again gives the same figures.
     again = programs.arc_suite(
-        "style", f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", path=tmp_path
+        "style", f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", cwd=tmp_path
     )
     if task == "steer":
         assert again.returncode == 0, again.stderr
@@ -148,11 +148,11 @@ def test_other_tasks(tmp_path, task):
         refusal = f"task {task!r}: files import nothing; import 'staying' first"
         assert again.stderr == f"arc-suite style: {saved}: {refusal}\n"
         again = programs.arc_suite(
-            "style", f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", path=tmp_path
+            "style", f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", cwd=tmp_path
         )
         assert again.returncode == 0, again.stderr
         assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]
-    other = run(f"--policy={saved}", "--set=arena=flat", f"--task={task}", path=tmp_path)
+    other = run(f"--policy={saved}", "--set=arena=flat", f"--task={task}", cwd=tmp_path)
     assert (other.returncode, other.stdout) == (1, "")
     name = task.rpartition(":")[2]
     assert other.stderr == (
@@ -161,7 +161,7 @@ def test_other_tasks(tmp_path, task):
     )
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_all_robots(tmp_path):
     done = run("--robot=all", "--policy=random", "--episodes=1", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr
@@ -203,7 +203,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
     (tmp_path / "own_walkers.py").write_text(FROZEN)
-    done = run(*arguments, path=tmp_path)
+    done = run(*arguments, cwd=tmp_path)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1] == f"arc-suite style: {message}"  # on a line that a progress bar has left
     assert "Traceback" not in done.stderr

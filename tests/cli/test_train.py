@@ -77,7 +77,10 @@ def test_without_jax_it_says_what_to_install(tmp_path):
 
 def test_export_of_what_is_no_run(tmp_path):
     one_line(run("export", "runs/none", cwd=tmp_path), "arc-suite export: cannot read runs/none: no such file")
-    one_line(run("export", cwd=tmp_path), "arc-suite export: expected the folder of a run; see --help")
+    one_line(
+        run("export", cwd=tmp_path),
+        "arc-suite export: expected the folder of a run, a policy file or a zip of stable-baselines3; see --help",
+    )
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +109,7 @@ class TestRun:
         assert done.returncode == 0 and FINISHED.fullmatch(done.stdout)
         assert (folder / "evaluations.csv").read_bytes() == before
 
+    @pytest.mark.long
     def test_its_configuration_trains_the_same_run(self, folder, tmp_path):
         done = run("train", f"--config={folder / 'config.json'}", cwd=tmp_path)
         assert done.returncode == 0 and FINISHED.fullmatch(done.stdout), done.stderr
@@ -147,6 +151,7 @@ class TestRun:
         size = (tmp_path / "tick.onnx").stat().st_size
         assert done.stdout == f"wrote tick.onnx: 199 observations, 18 actions, {size} bytes\n"
 
+    @pytest.mark.long
     def test_ctrl_c_is_one_line_and_the_run_resumes(self, tmp_path):
         command = [sys.executable, "-m", "arc_suite", "train", *TINY, "--steps=100000", "-o", "run"]
         process = subprocess.Popen(

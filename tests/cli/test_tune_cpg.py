@@ -21,7 +21,7 @@ def tune(*arguments):
     return subprocess.run(command(*arguments), capture_output=True, text=True)
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     straight, broken = tmp_path / "straight", tmp_path / "broken"
     done = tune("--generations=4", f"--output={straight}")
@@ -79,7 +79,7 @@ def test_bad_input_is_one_line(arguments, message):
     assert done.stdout == ""
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_another_search_in_the_folder_is_refused(tmp_path):
     tune("--generations=1", f"--output={tmp_path}")
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}

@@ -18,7 +18,7 @@ def fitted(body):
     return Balanced(arc_suite.load(body, "steer").task.definition, PRESETS["leaper"]["balanced"])
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize(("task", "difficulty", "further"), [("rough", 1.0 / 3.0, 0.05), ("slopes", 2.0 / 3.0, 0.2)])
 def test_balance_takes_leaper_further(task, difficulty, further):
     ground = {"difficulty": difficulty, "terrain_seed": 1}

@@ -109,7 +109,7 @@ def test_another_task_is_refused_in_one_line():
         Demonstrator("tick", "planned")(environment.reset())
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_robots_reach_goals_and_hit_nothing(robot):
     """At least four goals in 1000 steps, fewer than one collision in twenty."""

@@ -16,6 +16,7 @@ from arc_suite.robots import ROBOTS
 from arc_suite.tuning import Evaluator
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(RETURNS, never, lambda robot: robot == "tick"))
 def test_medium_earns_the_published_return(robot):
     environment = arc_suite.load(robot, "walk")
@@ -25,7 +26,7 @@ def test_medium_earns_the_published_return(robot):
     assert {episode.length for episode in results} == {1000}
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("robot", RETURNS)
 def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
     presets = [PRESETS[robot][name] for name in ("refined", "tuned", "medium")]
@@ -40,6 +41,7 @@ def test_what_was_searched_for_earns_most_and_walks_no_worse_than_medium(robot):
             assert each.mean() <= medium.mean(), cost
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "leaper"))
 def test_no_preset_falls_and_medium_walks_at_the_target_speed(robot):
     environment = arc_suite.load(robot, "walk")

@@ -102,7 +102,7 @@ def test_a_row_that_begins_again_does_as_the_first_time(robot, task, preset):
     assert_array_equal(walked(), walked())
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("robot", ["queen", "bastion", "tick"])
 def test_who_sees_crosses_trenches(robot):
     trenches = {"difficulty": 0.8}  # half a standing height wide

@@ -9,6 +9,7 @@ import minari
 import numpy as np
 import pytest
 from datasets import ID, QUEEN, SHORT, SPIDER, TICK, collect, digests, quiet, verify
+from tiers import never, tiers
 
 from arc_suite import data, evaluation, policies
 from arc_suite.cpg.presets import PRESETS
@@ -67,27 +68,25 @@ BUMPS = Setup.of("queen", "walk", {"arena": "bumps"})
 RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
 
 
-@pytest.mark.slow
+REPLAYED = {
+    "queen": RANDOM,
+    "spider": RANDOM._replace(setup=SPIDER, steps=20),
+    "tick": RANDOM._replace(setup=TICK, steps=200),
+    "steer": RANDOM._replace(setup=Setup.of("queen", "steer", {"gait": "ripple", "weights": {"tracking": 2.0}})),
+    "bumps": RANDOM._replace(setup=BUMPS),
+    "shoved": RANDOM._replace(setup=Setup.of("queen", "shoved"), steps=60),
+    "modifiers": RANDOM._replace(setup=Setup.of("queen", "steer", MODIFIERS), steps=60),
+    "spider by positions": data.Settings(Setup.of(SPIDER.body, "walk", MODIFIERS), noise=0.05, seed=3, steps=60),
+    "spider steers on bumps": RANDOM._replace(setup=Setup.of(SPIDER.body, "steer", {"arena": "bumps"})),
+    "no gait": None,  # of a task that the test registers
+}
+
+
 @pytest.mark.parametrize(
-    "settings",
-    [
-        RANDOM,
-        RANDOM._replace(setup=SPIDER, steps=20),
-        RANDOM._replace(setup=TICK, steps=200),
-        RANDOM._replace(setup=Setup.of("queen", "steer", {"gait": "ripple", "weights": {"tracking": 2.0}})),
-        RANDOM._replace(setup=BUMPS),
-        RANDOM._replace(setup=Setup.of("queen", "shoved"), steps=60),
-        RANDOM._replace(setup=Setup.of("queen", "steer", MODIFIERS), steps=60),
-        data.Settings(Setup.of(SPIDER.body, "walk", MODIFIERS), noise=0.05, seed=3, steps=60),
-        RANDOM._replace(setup=Setup.of(SPIDER.body, "steer", {"arena": "bumps"})),
-        "stay",
-    ],
-    ids=["queen", "spider", "tick", "steer", "bumps", "shoved", "modifiers", "spider by positions"]
-    + ["spider steers on bumps", "no gait"],
+    "name", tiers(REPLAYED, never, lambda name: name in ("spider", "shoved", "modifiers", "no gait"))
 )
-def test_minari_opens_a_dataset_whose_environment_replays_it(settings, stay):
-    if settings == "stay":  # registered here
-        settings = RANDOM._replace(setup=Setup.of("queen", "stay"))
+def test_minari_opens_a_dataset_whose_environment_replays_it(name, stay):
+    settings = REPLAYED[name] or RANDOM._replace(setup=Setup.of("queen", "stay"))
     assert collect(ID, settings, 4) == 4
     dataset = minari.load_dataset(ID)
     assert len(dataset) == 4
@@ -147,23 +146,22 @@ def test_an_episode_is_what_the_single_environment_plays():
         np.testing.assert_array_equal(episode.rewards, [timestep.reward for timestep in steps][1:])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "settings",
-    [
-        data.Settings(QUEEN, "cpg", ("slow", "medium", "fast"), noise=0.1, **SHORT),
-        data.Settings(SPIDER, "cpg", ("medium", "fast"), **SHORT),
-        data.Settings(TICK, "random", (), steps=60),
-        data.Settings(TICK, "own:make", (), noise=0.2, **SHORT),
-    ],
-    ids=["presets and noise", "spider", "random", "own"],
-)
-def test_episodes_depend_on_seed_and_settings_alone(settings):
+COLLECTED = {
+    "presets and noise": data.Settings(QUEEN, "cpg", ("slow", "medium", "fast"), noise=0.1, **SHORT),
+    "spider": data.Settings(SPIDER, "cpg", ("medium", "fast"), **SHORT),
+    "random": data.Settings(TICK, "random", (), steps=60),
+    "own": data.Settings(TICK, "own:make", (), noise=0.2, **SHORT),
+}
+
+
+@pytest.mark.parametrize("name", tiers(COLLECTED, never, lambda name: name in ("presets and noise", "own")))
+def test_episodes_depend_on_seed_and_settings_alone(name):
+    settings = COLLECTED[name]
     collect(ID, settings, 7, num_envs=7, threads=1)
     expected = digests()
-    for name, rows, threads in (("a", 1, 1), ("b", 3, 2), ("c", 100, 4)):
-        collect(f"{ID[:-3]}-{name}-v0", settings, 7, num_envs=rows, threads=threads)
-        assert digests(f"{ID[:-3]}-{name}-v0") == expected
+    for other, rows, threads in (("a", 1, 1), ("b", 3, 2), ("c", 100, 4)):
+        collect(f"{ID[:-3]}-{other}-v0", settings, 7, num_envs=rows, threads=threads)
+        assert digests(f"{ID[:-3]}-{other}-v0") == expected
     later = settings._replace(seed=settings.seed + 4)
     collect(f"{ID[:-3]}-later-v0", later, 3)
     assert digests(f"{ID[:-3]}-later-v0") == expected[4:]

@@ -145,7 +145,7 @@ def last_line(text):
     return text.rstrip("\n").rpartition("\n")[2].rpartition("\r")[2].strip()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("accident", "status", "line"),
     [

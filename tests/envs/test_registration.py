@@ -6,6 +6,7 @@ import re
 import subprocess
 import sys
 
+import programs
 import pytest
 
 import arc_suite
@@ -48,6 +49,13 @@ def test_guide(package):
         "print(environment.reset()[0].shape, environment.unwrapped.task.settings.parameters.target_velocity)\n"
     )
     assert package(USING + checks) == ["(107,) 0.15"]
+
+
+def test_programs_find_the_robot_in_the_current_folder(package, tmp_path):
+    done = programs.arc_suite(
+        "evaluate", "--robot=hopper:hopper", "--preset=slow", "--episodes=1", "--set=time_limit=1", cwd=tmp_path
+    )
+    assert (done.returncode, done.stderr) == (0, "") and "\nhopper  " in done.stdout
 
 
 @pytest.mark.long
@@ -134,7 +142,7 @@ print(gymnasium.make("creatures.hopper:arc_suite/hopper-walk-v0").reset()[0].sha
     assert package(code) == ["(2,)", "(107,)"]
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_preset_of_its_own_and_a_row_without_noise_serve_every_program(package, tmp_path):
     module = REGISTERING.replace('"base_noise": 0.02,', "").replace('("fast", 24)', '("fast", 24), ("prowl", 15)')
     (tmp_path / "hopper.py").write_text(module)

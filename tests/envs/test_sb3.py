@@ -58,6 +58,14 @@ def test_rows_are_stable_baselines_own(both):
     assert rows.has_attr("task") and not rows.has_attr("nothing")
 
 
+def test_agents_save_what_they_were_trained_for(both):
+    """The space is that of single environments, with an attribute."""
+    rows, dummy = both
+    known = {"robot": "tick", "task": "walk", "task_kwargs": {"time_limit": 1.0}}
+    assert rows.observation_space.arc_suite == known
+    assert not hasattr(rows.environments.single_observation_space, "arc_suite")
+
+
 def test_calls_of_rows(both):
     rows, _ = both
     rows.set_attr("note", 7)
@@ -79,7 +87,7 @@ def test_stable_baselines_wrappers_take_them(both):
 
 
 def test_other_modes_are_one_line():
-    message = "^stable-baselines3 resets at once: expected rows of this suite made with autoreset_mode='SameStep', got "
+    message = "^stable-baselines3 resets at once: expected a vector environment of this suite with autoreset_mode='Same"
     for rows in (gymnasium.make_vec(ID, num_envs=2), gymnasium.make(ID)):
         with pytest.raises(ValueError, match=message) as error:
             sb3.VecEnv(rows)

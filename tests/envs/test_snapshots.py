@@ -105,3 +105,46 @@ def test_something_is_missing():
     del arrays["random/keys"]
     with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: 'random/keys'$"):
         rows().restore(arrays)
+
+
+def changed(arrays, name, place, value):
+    array = arrays[name].copy()
+    array[place] = value
+    return {**arrays, name: array}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda arrays: {**arrays, "batch/model_jnt_qposadr": np.full((ROWS, 19), 10**8)},
+            "model_jnt_qposadr: no array",
+        ),
+        (lambda arrays: {**arrays, "batch/model_body_mass": np.ones((ROWS, 2))}, "model_body_mass: expected float64"),
+        (lambda arrays: changed(arrays, "batch/state", (1, 3), np.nan), "state: expected finite numbers"),
+        (lambda arrays: changed(arrays, "batch/qpos", (0, 0), np.inf), "qpos: expected finite numbers"),
+        (lambda arrays: {**arrays, "batch/qpos": arrays["batch/qpos"].astype(np.float32)}, "qpos: expected float64"),
+        (
+            lambda arrays: changed(arrays, "random/positions", 2, 10**9),
+            "random/positions: expected numbers from 0",
+        ),
+        (lambda arrays: changed(arrays, "random/positions", 0, -1), "random/positions: expected numbers from 0"),
+        (
+            lambda arrays: changed(arrays, "random/normals", 0, np.nan),
+            "random/normals: expected numbers from -64",
+        ),
+        (lambda arrays: {**arrays, "random/keys": arrays["random/keys"][:, :5]}, "random/keys: expected uint32"),
+        (lambda arrays: {**arrays, "memory/0": np.zeros((ROWS, 7, 7))}, "memory: expected"),
+    ],
+)
+def test_a_snapshot_from_elsewhere_is_refused_before_anything_changes(change, message):
+    environment = rows("shoved", random=4)
+    environment.reset()
+    arrays = environment.snapshot()
+    environment.step(np.ones((ROWS, 18)))
+    before = environment.snapshot()
+    with pytest.raises(ValueError) as caught:
+        environment.restore(change(arrays))
+    assert str(caught.value).startswith(f"snapshot: of another task or number of environments: {message}")
+    after = environment.snapshot()
+    assert all(np.array_equal(array, after[name], equal_nan=True) for name, array in before.items())

@@ -237,6 +237,7 @@ def test_presets_return(robot, preset):
         assert clip.cycles == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", tiers(range(20), never, lambda seed: seed == 0))
 def test_random_bodies_step_once_a_cycle(seed):
     body = random_body(seed)
@@ -247,6 +248,7 @@ def test_random_bodies_step_once_a_cycle(seed):
             assert falls.count((foot, event)) == clip.cycles
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", EACH)
 def test_clips_are_in_step(robot):
     clips = made(robot)
@@ -324,7 +326,7 @@ def test_the_recording_is_the_episode_to_the_bit():
     np.testing.assert_array_equal(recording.qpos[::SUBSTEPS], poses[9:])
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_the_same_bytes():
     first, second = (export.glb(ROBOTS["tick"], export.clips(Setup.of("tick"), ["walk", "idle"])) for _ in range(2))
     assert first == second
@@ -357,7 +359,7 @@ def test_errors_are_one_line(arguments, message):
     assert str(caught.value).startswith(message) and "\n" not in str(caught.value)
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_clip_can_be_made(robot):
     body = ROBOTS[robot]
@@ -379,7 +381,7 @@ def test_every_clip_can_be_made(robot):
         assert twists[name][axis] == pytest.approx(asked, rel=0.25), name
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_clip_goes_as_fast_beside_others():
     """Bastion's fast does not return together with its strides to a side, and still goes as fast as alone."""
     together, alone = (

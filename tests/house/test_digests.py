@@ -25,10 +25,10 @@ def same_arithmetic():
 
 
 def marked(name, case):
-    """`make check` has two cases, `make test` each task on robots in turn, `make check-matrix` the rest."""
+    """`make check` has two cases, `make test` each task on robots in turn, `make check-release` the rest."""
     plain = not case.task_kwargs and case.command is None and case.preset is None
     slow = plain and turn(case.robot, ROBOTS, list(TASKS).index(case.task))
-    marks = [] if name in QUICK else pytest.mark.slow if slow else pytest.mark.matrix
+    marks = [] if name in QUICK else pytest.mark.slow if slow else pytest.mark.release
     return pytest.param(name, case, marks=marks, id=name)
 
 

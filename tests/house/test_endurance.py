@@ -18,7 +18,7 @@ STEPS = 60
 ENVIRON = os.environ | {"PYTHONPATH": str(FOLDER.parent)}
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_row():
     found = {}
     for threads in (["1", "8"], ["2"]):
@@ -35,7 +35,7 @@ def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_row():
     assert all(len(set(kind)) == len(walks) for kind in zip(*walks, strict=True))
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.skipif(not os.path.exists("/proc/self/task"), reason="reads Linux's /proc")
 def test_soak_in_short():
     command = [sys.executable, FOLDER / "soak.py", "--steps=8000", "--block=2000", "--lives=4", "--slope=1000"]
@@ -75,7 +75,7 @@ def test_500_divergences_of_a_single_environment_are_all_reported(on_divergence)
     assert reported == 500
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_1000_divergences_of_rows_are_all_reported(mode):
     envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=50, autoreset_mode=mode)

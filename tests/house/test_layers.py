@@ -16,7 +16,7 @@ PACKAGE = pathlib.Path(arc_suite.__file__).parent
 # From the ground up: a module imports its own room and those above it in this list. What stands in
 # one row leans on nothing in it.
 ROOMS = (
-    ("checks", "rotations", "markers", "files", "versions"),
+    ("checks", "rotations", "markers", "files", "versions", "paper"),
     ("robots",),  # what moves
     ("arenas",),  # where
     ("models",),  # spec -> MJCF
@@ -45,6 +45,7 @@ THIRD_PARTY = {
     "rotations": set(),
     "markers": {"numpy"},
     "files": set(),
+    "paper": set(),
     "versions": {"packaging"},
     "robots": set(),
     "robots.generator": {"numpy"},
@@ -91,6 +92,7 @@ THIRD_PARTY = {
 # Modules of the suite that these may import, and no others.
 INSIDE = {
     "rotations": set(),
+    "paper": set(),
     "robots.spec": set(),
     "robots.queen": {"robots.spec"},
     "robots.bastion": {"robots.spec"},

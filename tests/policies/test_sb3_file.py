@@ -1,9 +1,12 @@
 """Zips of stable-baselines3 as policies of every program."""
 
 import importlib.util
+import pickle
+import zipfile
 
 import gymnasium
 import numpy as np
+import programs
 import pytest
 
 import arc_suite
@@ -11,11 +14,16 @@ from arc_suite import evaluation, policies
 from arc_suite.envs.vector import VectorEnv
 
 HAS_SB3 = importlib.util.find_spec("stable_baselines3") is not None
+UNKNOWN = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
+
+pytestmark = pytest.mark.filterwarnings(f"ignore:.*{UNKNOWN}")
 needs_sb3 = pytest.mark.skipif(not HAS_SB3, reason="of the extra `sb3`: make check-sb3")
 
 
 @pytest.mark.skipif(HAS_SB3, reason="stable-baselines3 is installed")
 def test_without_it_one_line_says_what_to_install(tmp_path):
+    with zipfile.ZipFile(tmp_path / "sac.zip", "w") as archive:
+        archive.writestr("data", "{}")
     with pytest.raises(ValueError, match=r"^policy .*\.zip: zips need stable-baselines3: pip install -e '.*\[sb3\]'"):
         policies.policy(str(tmp_path / "sac.zip"), "tick")
 
@@ -55,7 +63,7 @@ def test_in_rows_it_does_the_same(saved):
 @needs_sb3
 def test_errors_are_one_line(saved, tmp_path):
     path = saved[0]
-    with pytest.raises(ValueError, match=r"SAC\.zip: moves \(18,\) joints, and leaper has 12$"):
+    with pytest.raises(ValueError, match=r"SAC\.zip: moves 18 joints, and leaper has 12$"):
         policies.policy(str(path / "SAC.zip"), "leaper")
     with pytest.raises(ValueError, match=r"^policy .*: expected observations \(199,\), got \(205,\)$"):
         evaluation.run(arc_suite.load("tick", "steer"), policies.policy(str(path / "SAC.zip"), "tick"), 0)
@@ -65,3 +73,105 @@ def test_errors_are_one_line(saved, tmp_path):
     with pytest.raises(ValueError, match=r"damaged\.zip: no policy of stable-baselines3: ") as caught:
         policies.policy(str(tmp_path / "damaged.zip"), "tick")
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def normalised(tmp_path_factory):
+    """A zip of PPO and the statistics that it was trained with, the raw observation and what it does there."""
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from arc_suite.envs import sb3
+
+    folder = tmp_path_factory.mktemp("normalised")
+    rows = VectorEnv("tick", "walk", 4, 1, "SameStep", task_kwargs={"time_limit": 1.0})
+    environments = VecNormalize(sb3.VecEnv(rows))
+    agent = PPO("MlpPolicy", environments, n_steps=16, batch_size=32, n_epochs=1, device="cpu", seed=0).learn(128)
+    agent.save(folder / "ppo.zip")
+    environments.save(folder / "stats.pkl")
+    observation = arc_suite.load("tick", "walk").reset(0)
+    flat = np.concatenate(list(observation.observation.values()), dtype=np.float32)
+    return folder, observation, agent.predict(environments.normalize_obs(flat), deterministic=True)[0]
+
+
+@needs_sb3
+def test_statistics_are_applied(normalised):
+    folder, timestep, expected = normalised
+    with pytest.raises(ValueError, match=r"ppo\.zip: was trained with VecNormalize, whose statistics are missing: "):
+        policies.policy(str(folder / "ppo.zip"), "tick")
+    policy = policies.policy(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}", "tick")
+    assert np.array_equal(policies.alone(policy)(timestep), expected.astype(float))
+
+
+@needs_sb3
+def test_a_zip_knows_its_robot(normalised, saved, recwarn):
+    name = f"{normalised[0] / 'ppo.zip'}+{normalised[0] / 'stats.pkl'}"
+    with pytest.raises(ValueError, match=r"ppo\.zip: made for tick, and not for queen$"):
+        policies.policy(name, "queen")
+    policies.policy(name, "tick")
+    assert not [each for each in recwarn if "arc_suite" in str(each.message)]
+    with pytest.warns(UserWarning, match=r"PPO\.zip: does not hold the robot and task that it was trained for; "):
+        policies.policy(str(saved[0] / "PPO.zip"), "queen")
+
+
+@needs_sb3
+def test_programs_take_statistics(normalised):
+    folder = normalised[0]
+    evaluate = ("evaluate", "--robot=tick", "--policy=ppo.zip", "--episodes=1", "--set=time_limit=1")
+    done = programs.arc_suite(*evaluate, "--vecnormalize=stats.pkl", cwd=folder)
+    assert (done.returncode, done.stderr) == (0, "")
+    done = programs.arc_suite(*evaluate, "--vecnormalize=stats.pkl", "--policy=cpg", cwd=folder)
+    line = "--vecnormalize=stats.pkl: goes with a zip of stable-baselines3, got 'cpg'"
+    assert done.stderr == f"arc-suite evaluate: {line}\n"
+
+
+@needs_sb3
+def test_a_program_warns_in_one_line(saved):
+    done = programs.arc_suite(
+        "evaluate", "--robot=tick", "--policy=PPO.zip", "--episodes=1", "--set=time_limit=1", cwd=saved[0]
+    )
+    assert done.returncode == 0 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("arc-suite evaluate: policy PPO.zip: does not hold the robot and task ")
+
+
+@needs_sb3
+def test_what_are_no_statistics_is_one_line(normalised, tmp_path):
+    zipped = normalised[0] / "ppo.zip"
+    (tmp_path / "text.pkl").write_text("text")
+    (tmp_path / "list.pkl").write_bytes(pickle.dumps([1, 2]))
+    for name, message in (("text", "no statistics of VecNormalize: "), ("list", "expected statistics of VecNormalize")):
+        with pytest.raises(ValueError, match=rf"{name}\.pkl: {message}") as error:
+            policies.policy(f"{zipped}+{tmp_path / name}.pkl", "tick")
+        assert "\n" not in str(error.value)
+
+
+@needs_sb3
+@pytest.mark.parametrize("name", ["SAC", "PPO", "TD3"])
+def test_as_layers(name, tmp_path):
+    """The network that `arc-suite export` writes does what the agent does."""
+    import stable_baselines3
+
+    from arc_suite.envs import sb3
+
+    rows = sb3.VecEnv(VectorEnv("leaper", "walk", 2, 1, "SameStep"))
+    getattr(stable_baselines3, name)("MlpPolicy", rows, device="cpu", seed=0).save(tmp_path / "agent.zip")
+    network, policy = (
+        make(str(tmp_path / "agent.zip")) for make in (policies.trained, lambda p: policies.policy(p, "leaper"))
+    )
+    assert network.setup.body.name == "leaper"
+    observation = {name: block[None] for name, block in arc_suite.load("leaper", "walk").reset(0).observation.items()}
+    np.testing.assert_allclose(network.act(observation, np.zeros(1)), policy.act(observation, np.zeros(1)), atol=1e-5)
+
+
+@needs_sb3
+def test_statistics_are_the_first_layer(normalised):
+    folder, timestep, expected = normalised
+    network = policies.trained(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}")
+    assert network.layers[0].kind == "normalise" and network.layers[-1].kind == "clip"
+    np.testing.assert_allclose(policies.alone(network)(timestep), expected, atol=1e-4)
+
+
+@needs_sb3
+def test_a_zip_without_a_setup_is_not_exported(saved):
+    with pytest.raises(ValueError, match=r"PPO\.zip: does not hold the robot and task that it was trained for; "):
+        policies.trained(str(saved[0] / "PPO.zip"))

@@ -5,6 +5,7 @@ import importlib.util
 import json
 import os
 import pathlib
+import re
 import signal
 import subprocess
 import sys
@@ -81,7 +82,7 @@ def contents(folder):
     return found
 
 
-@pytest.mark.long
+@pytest.mark.release
 @pytest.mark.parametrize("name", ["WITH_NUMPY", "WITH_JAX"])
 def test_killed_twice(name, tmp_path, begun):
     """First with all its processes, then alone, so that its runs go on; two jobs make what one makes."""
@@ -105,7 +106,7 @@ def test_killed_twice(name, tmp_path, begun):
     assert [path for path in whole if whole[path] != killed[path]] == []
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     (tmp_path / "study").mkdir()
     command = ["-m", "arc_suite", "study", "tiny_studies:WITH_NUMPY", "--jobs=2"]
@@ -281,6 +282,13 @@ def test_errors_are_one_line(arguments, line, tmp_path):
     assert done.stderr.startswith(line), done.stderr
     assert done.stderr.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_a_study_is_found_in_the_current_folder(tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "study.md").read_text(), re.DOTALL)
+    (tmp_path / "my_studies.py").write_text(code)
+    done = programs.arc_suite("study", "my_studies:MINE", "--shard=6/7", cwd=tmp_path)
+    assert done.stderr == "arc-suite study: --shard=6/7: no run, as the study has 6\n"
 
 
 @pytest.mark.parametrize("name", tables.STUDIES)

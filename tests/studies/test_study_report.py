@@ -1,5 +1,6 @@
 """Reports of studies: every number comes from published tables, and says what it should."""
 
+import csv
 import pathlib
 import re
 import shutil
@@ -7,11 +8,9 @@ import shutil
 import numpy as np
 import pytest
 
-from arc_suite import evaluation
+from arc_suite import evaluation, paper
 from arc_suite.agents import configuration
-from arc_suite.evaluation.protocol import EXPERT_RETURNS
 from arc_suite.studies import report, results, tables
-from arc_suite.studies.report import PAPER
 from arc_suite.studies.tables import Study, run
 
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
@@ -38,11 +37,11 @@ def constant(*levels):
 @pytest.fixture
 def made(tmp_path):
     """A study as the paper's table of finals would have it, two seeds of everything, and its folder."""
-    keys = [(robot, name, seed) for robot in PAPER for name in PAPER[robot] for seed in (0, 1)]
+    keys = [(robot, name, seed) for robot in paper.FINALS for name in paper.FINALS[robot] for seed in (0, 1)]
     runs = tuple(run(robot, name, 2000, seed) for robot, name, seed in keys)
     for each, (robot, name, seed) in zip(runs, keys, strict=True):
         start, style = 100.0 if name in report.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
-        publish(tmp_path / "mine", each, constant(start, float(PAPER[robot][name]) + seed), style)
+        publish(tmp_path / "mine", each, constant(start, float(paper.FINALS[robot][name]) + seed), style)
     text = "place,preset,seed,return\n" + "".join(f"queen, walk,medium,{s},2048.0\n" for s in range(10))
     (tmp_path / "mine" / "demonstrators.csv").write_text(text.replace("queen, walk", '"queen, walk"'))
     return Study("as in the paper", runs), tmp_path / "mine"
@@ -95,7 +94,7 @@ def test_claims(made):
         *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
     ]
     assert "queen -300" in held["with prior data all end higher than without"][0]
-    least = min(PAPER["queen"][name] for name in report.ONLINE) - EXPERT_RETURNS["queen"]
+    least = min(paper.FINALS["queen"][name] for name in report.ONLINE) - paper.DEMONSTRATORS["queen"]
     assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
 
 
@@ -197,7 +196,16 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
 
 
 def test_the_papers_table_has_every_robot_and_algorithm():
-    assert PAPER.keys() == EXPERT_RETURNS.keys()
-    for finals in PAPER.values():
+    assert paper.FINALS.keys() == paper.DEMONSTRATORS.keys()
+    for finals in paper.FINALS.values():
         assert set(finals) == {*report.ONLINE, *report.WITH_PRIOR}
     assert evaluation.EPISODES == 10
+
+
+def test_the_papers_returns_as_a_table():
+    """The file for users' plots holds the suite's own numbers."""
+    with (pathlib.Path(__file__).parents[2] / "studies" / "paper.csv").open(newline="") as file:
+        rows = {(row["robot"], row["algorithm"]): float(row["return"]) for row in csv.DictReader(file)}
+    finals = {(robot, name): value for robot, values in paper.FINALS.items() for name, value in values.items()}
+    assert rows == finals | {(robot, "demonstrator"): value for robot, value in paper.DEMONSTRATORS.items()}
+    assert len(finals) == 24

@@ -106,6 +106,7 @@ def test_difficulty_0_is_level(kind):
     assert not arena.height(x, y).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "bastion"))
 def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
     level = terrain.made(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
@@ -300,7 +301,7 @@ def test_a_curriculum_rises_for_who_walks():
     assert levels == [levels[0], levels[0] + 1, levels[0] + 2]
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_ground_has_no_scale():
     distances = []
     for scale in (0.075, 1.0, 10.0):

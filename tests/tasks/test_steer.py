@@ -205,7 +205,7 @@ def test_nothing_tells_where_the_body_heads(robot):
         assert_allclose(block, before[name], atol=1e-12, err_msg=name)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_same_shape_earns_the_same_at_any_size():
     """Costs, commands and contact forces have no scale."""
     returns = []

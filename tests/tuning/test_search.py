@@ -10,7 +10,7 @@ from arc_suite.tuning import Evaluator, Search
 SETTINGS = {"setup": Setup.of("bastion"), "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_search_goes_on_where_it_was_broken_off():
     straight, resumed = Search(**SETTINGS), Search(**SETTINGS)
     generations = [straight.step() for _ in range(4)]
@@ -37,7 +37,7 @@ def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_
     assert straight.candidates == 48
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_search_learns():
     search = Search(**SETTINGS | {"episodes": 1, "steps": 80})
     first = search.step()

@@ -1,0 +1,123 @@
+"""Entries of a leaderboard: files of `arc-suite evaluate --json`, checked by playing their episodes again."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from arc_suite import checks, policies, registry, versions
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import protocol
+from arc_suite.evaluation.protocol import EPISODES
+
+_MAX_BYTES = 1 << 20
+_OF_SETUP = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "model_sha256")
+
+
+class Entry(NamedTuple):
+    """An evaluation of a policy on one robot.
+
+    Attributes:
+        setup: body, task and settings.
+        policy: its name, as on the command line.
+        policy_sha256: hash of its files; None for a policy without files.
+        episodes: results of the protocol's episodes.
+    """
+
+    setup: Setup
+    policy: str
+    policy_sha256: str | None
+    episodes: list[protocol.Episode]
+
+
+def provenance(setup: Setup) -> dict[str, Any]:
+    """Return, JSON-able, what a setup's results depend on: names, settings, and hashes of body, model and task."""
+    settings = repr(setup.definition.settings)
+    known = setup.provenance() | {"task_sha256": hashlib.sha256(settings.encode()).hexdigest()}
+    return {name: known[name] for name in _OF_SETUP}
+
+
+def policy_sha256(policy: str) -> str | None:
+    """Return the hash of a policy's files; None for one without files, such as a demonstrator."""
+    return policies.digest(policy) if policies.is_file(policy) or policy.endswith(".npz") else None
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Return the JSON of an entry.
+
+    Raises:
+        ValueError: no JSON of `arc-suite evaluate`.
+        OSError: it cannot be read.
+    """
+    try:
+        if path.stat().st_size > _MAX_BYTES:
+            raise ValueError(f"expected at most {_MAX_BYTES} bytes")
+        found = checks.mapping("entry", json.loads(path.read_text(encoding="utf-8")))
+        for name in ("policy", "seed", "versions", "robots", "policy_sha256"):
+            if name not in found:
+                raise ValueError(f"expected a field {name}, got none")
+        for report in checks.mapping("robots", found["robots"]).values():
+            checks.mapping("provenance", checks.mapping("report", report).get("provenance"))
+        return dict(found)
+    except OSError as error:
+        raise OSError(f"cannot read {path}: {error.strerror.lower()}") from None
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{path}: no entry: {checks.quoted(error)}") from None
+
+
+def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> list[Entry]:
+    """Return the entries of a file, one for each robot, after playing their episodes again.
+
+    The file imports nothing and names no policy file: the caller does.
+
+    Args:
+        path: of the file that `arc-suite evaluate --json` wrote.
+        policy: name of the policy; None for one that needs no files.
+        progress: wraps the seeds of a robot.
+
+    Raises:
+        ValueError: no entry; other versions, body, model, task or policy than the file says; or other episodes.
+        OSError: a file cannot be read.
+    """
+    found = read(path)
+    here = versions.recorded()
+    _same(path, "versions", found["versions"], here)
+    name = found["policy"] if policy is None else policy
+    if policy is None and name not in policies.POLICIES:
+        raise ValueError(f"{path}: policy {checks.quoted(name)!r}: expected --policy with its file, got none")
+    _same(path, "policy_sha256", found["policy_sha256"], policy_sha256(name))
+    if found["seed"] != 0:
+        raise ValueError(f"{path}: expected episodes from seed 0, got {checks.quoted(found['seed'])}")
+    entries = []
+    if not found["robots"]:
+        raise ValueError(f"{path}: expected robots, got none")
+    for report in found["robots"].values():
+        told = report["provenance"]
+        try:
+            setup = Setup.from_dict(told)
+        except (ValueError, registry.NotImported) as error:
+            raise ValueError(f"{path}: {error}") from None
+        known = provenance(setup)
+        for field in _OF_SETUP:
+            _same(path, field, told.get(field), known[field])
+        environment = setup.load()
+        player = policies.policy(name, setup.body, found.get("preset") or "medium", task=environment.task.definition)
+        episodes = protocol.episodes(environment, player, progress(range(EPISODES)))
+        totals = [each.total for each in episodes]
+        _same(path, f"returns of {setup.body.name}", _totals(report), totals)
+        entries.append(Entry(setup, name, found["policy_sha256"], episodes))
+    return entries
+
+
+def _totals(report: Mapping[str, Any]) -> list:
+    episodes = report.get("episodes")
+    if not isinstance(episodes, Iterable):
+        return []
+    return [each.get("total") if isinstance(each, dict) else None for each in episodes]
+
+
+def _same(path: Path, name: str, told, here) -> None:
+    if told != here:
+        told, here = (checks.quoted(json.dumps(each)) for each in (told, here))
+        raise ValueError(f"{path}: {name}: the file says {told}, and here it is {here}")

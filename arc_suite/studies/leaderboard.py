@@ -1,0 +1,105 @@
+"""The leaderboard: rows of studies and of entries, each in a table of its own folder, and one page of all.
+
+studies/<study>/leaderboard.csv     rows of a study, by `report.write`
+studies/entries/leaderboard.csv     rows of entries, by `enter`; next to it the entries themselves
+studies/README.md                   the page
+"""
+
+import csv
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from arc_suite import evaluation, files
+from arc_suite.evaluation.entries import Entry
+
+PAGE, TABLE, ENTRIES = "README.md", "leaderboard.csv", "entries"
+HEADS = (
+    *("robot, task", "algorithm", "return", "IQM [95 %]", "metric", "gait compliance", "heading error, rad"),
+    *("torso pitch, rad", "steps", "CPU min", "study", "command of seed 0"),
+)
+_NAME = re.compile(r"[\w.-]+")
+_TEXT = (
+    "All committed studies, written by `arc-suite study NAME --report`, and entries, written by `arc-suite enter`. "
+    "Return: mean of the latest evaluation, and interquartile mean with 95 % bootstrap interval over seeds, or of a "
+    "single seed over episodes. Then the task's own metric, speed in m/s; headings are relative to the x axis, which "
+    "is not the direction of a command."
+)
+
+
+def write(folder: Path, lines: Sequence[Sequence[str]]) -> None:
+    """Write the rows of a folder, and the page of all rows one folder above.
+
+    Args:
+        folder: of a study, or of entries.
+        lines: cells by `HEADS`.
+
+    Raises:
+        ValueError: a damaged table of rows.
+        OSError: a file cannot be written.
+    """
+    with files.writing(folder / TABLE) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
+    every = [row for path in sorted(folder.parent.glob(f"*/{TABLE}")) for row in _rows(path)]
+    every.sort(key=lambda row: (row[0], -float(row[2])))
+    with files.writing(folder.parent / PAGE) as temporary:
+        temporary.write_text(f"# Leaderboard\n\n{_TEXT}\n\n{table(HEADS, every)}\n", encoding="utf-8")
+
+
+def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> Path:
+    """Add checked entries to the leaderboard; entries of the same name, robot and task are replaced.
+
+    Args:
+        source: file of the entries, which is copied.
+        name: of the algorithm.
+        entries: of the file.
+        studies: folder of the leaderboard.
+
+    Returns:
+        The page.
+
+    Raises:
+        ValueError: a name of other characters than letters, digits, `_`, `-` and `.`.
+    """
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
+    folder = files.folder(studies / ENTRIES)
+    rows = {(row[0], row[1]): row for row in (_rows(folder / TABLE) if (folder / TABLE).exists() else ())}
+    for entry in entries:
+        place = str(entry.setup)
+        copied = folder / f"{entry.setup.body.name}-{entry.setup.kind.name}-{name}.json"
+        with files.writing(copied) as temporary:
+            temporary.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
+        totals = np.array([episode.total for episode in entry.episodes])
+        middle, (low, high) = evaluation.iqm_and_interval([totals])
+        figures = {key: np.mean([each.progress[key] for each in entry.episodes]) for key in entry.episodes[0].progress}
+        figure = next(iter(figures))
+        compliance = f"{figures['gait_compliance']:.3f}" if "gait_compliance" in figures else "-"
+        result = f"{totals.mean():.1f}", f"{middle:.1f} [{low:.1f}, {high:.1f}]", f"{figure} {figures[figure]:.3f}"
+        link = f"[entry]({ENTRIES}/{copied.name})"
+        rows[place, name] = [place, name, *result, compliance, "-", "-", "-", "-", link, _command(entry)]
+    write(folder, list(rows.values()))
+    return studies / PAGE
+
+
+def table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (heads, ["---"] * len(heads), *lines))
+
+
+def _command(entry: Entry) -> str:
+    setup = entry.setup
+    settings = [f"--set={name}={json.dumps(value)}" for name, value in setup.task_kwargs.items()]
+    words = ["arc-suite evaluate", f"--robot={setup.body.name}", f"--task={setup.task}", f"--policy={entry.policy}"]
+    return f"`{' '.join([*words, *settings])}`"
+
+
+def _rows(path: Path) -> list[list[str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        heads, *rows = csv.reader(file)
+    if tuple(heads) != HEADS or any(len(row) != len(HEADS) for row in rows):
+        raise ValueError(f"{path}: expected rows of {', '.join(HEADS)}")
+    return rows

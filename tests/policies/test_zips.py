@@ -1,0 +1,84 @@
+"""What a zip of stable-baselines3 tells without its pickles: its setup, and which statistics belong to it."""
+
+import json
+import zipfile
+
+import pytest
+
+import arc_suite
+from arc_suite import policies
+from arc_suite.envs.setup import Setup
+from arc_suite.policies import zips
+
+ON_POLICY = {"rollout_buffer_class": {}, "_last_obs": {}}
+
+
+def write(path, **data):
+    """Write a zip as stable-baselines3 lays it out, without networks."""
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("data", json.dumps(data))
+    return path
+
+
+def test_names():
+    assert zips.parts("a/ppo.zip") == (zips.Path("a/ppo.zip"), None)
+    assert zips.parts(zips.named("ppo.zip", "b/stats.pkl")) == (zips.Path("ppo.zip"), zips.Path("b/stats.pkl"))
+    assert zips.parts("cpg") is zips.parts("policy.npz") is zips.parts("my.zip:make") is None
+
+
+def test_the_setup(tmp_path):
+    setup = Setup.of("tick", "steer", {"time_limit": 2.0})
+    path = write(tmp_path / "ppo.zip", observation_space={"arc_suite": setup.to_dict()})
+    assert zips.setup(path) == setup
+    assert zips.setup(write(tmp_path / "plain.zip", observation_space={"low": 0})) is None
+    with pytest.raises(ValueError, match=r"^policy .*ppo\.zip: made for tick, and not for queen$"):
+        policies.policy(str(path), "queen")
+    task = arc_suite.load("tick", "steer", {"actions": "position"}).task.definition
+    with pytest.raises(ValueError, match=r"its actions are a torque a joint, and steer takes a position$"):
+        policies.policy(str(path), "tick", task=task)
+    write(path, observation_space={"arc_suite": setup.to_dict() | {"task": "nowhere:stroll"}})
+    with pytest.raises(ValueError, match=r"^policy .*: task 'nowhere:stroll': files import nothing; import 'nowhere' "):
+        zips.setup(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["tick_300_steps_vecnormalize.pkl", "tick_vecnormalize_300_steps.pkl", "vecnormalize.pkl"]
+)
+def test_statistics_lie_next_to_the_zip(tmp_path, name):
+    path = write(tmp_path / "tick_300_steps.zip", **ON_POLICY, _last_original_obs={})
+    with pytest.raises(ValueError) as error:
+        zips.statistics(path)
+    assert str(error.value) == (
+        f"policy {path}: was trained with VecNormalize, whose statistics are missing: expected --vecnormalize FILE, or "
+        "tick_300_steps_vecnormalize.pkl or tick_vecnormalize_300_steps.pkl or vecnormalize.pkl next to it"
+    )
+    (tmp_path / name).touch()
+    assert zips.statistics(path) == tmp_path / name
+    before = policies.digest(str(path))
+    (tmp_path / name).write_text("others")
+    assert policies.digest(str(path)) != before
+
+
+def test_only_a_zip_that_was_trained_with_statistics_takes_them(tmp_path):
+    (tmp_path / "vecnormalize.pkl").touch()
+    path = write(tmp_path / "ppo.zip", **ON_POLICY, _last_original_obs=None)
+    assert zips.statistics(path) is None
+    with pytest.raises(ValueError, match=r"was trained without VecNormalize: expected no statistics, got .*\.pkl$"):
+        zips.statistics(path, tmp_path / "vecnormalize.pkl")
+    sac = write(tmp_path / "sac.zip", _last_obs={}, _last_original_obs={})  # which it has either way
+    assert zips.statistics(sac) == tmp_path / "vecnormalize.pkl"
+    with pytest.raises(OSError, match=r"^cannot read .*none\.pkl: no such file$"):
+        zips.statistics(sac, tmp_path / "none.pkl")
+    (tmp_path / "vecnormalize.pkl").unlink()
+    assert zips.statistics(sac) is None
+
+
+def test_what_is_no_zip_is_one_line(tmp_path):
+    (tmp_path / "text.zip").write_text("text")
+    for path in (tmp_path / "text.zip", write(tmp_path / "list.zip"), tmp_path / "none.zip"):
+        if path.name == "list.zip":
+            with zipfile.ZipFile(path, "w") as archive:
+                archive.writestr("data", "[1, 2]")
+        with pytest.raises((ValueError, OSError), match=r"no policy of stable-baselines3: |no such file$") as error:
+            zips.setup(path)
+        assert "\n" not in str(error.value)
