@@ -6,6 +6,7 @@
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
 # make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
+# make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
 # make web     bundles the viewer that pages are made of, and three.js; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
@@ -27,7 +28,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo test check check-long check-release lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -108,6 +109,14 @@ $(VIEWER): $(wildcard web/*)
 	npm ci --prefix .node-web --no-audit --no-fund --silent
 	NODE_PATH=$(CURDIR)/.node-web/node_modules node web/build.js $@
 
+# Other builds go on without the viewer; what is to be released has it.
+dist: VENV := .venv-dist
+dist: $(VIEWER)
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q build
+	rm -rf dist
+	$(VENV)/bin/python -m build --outdir dist .
+
 check-web: VENV := .venv-web
 check-web: setup.cfg $(VIEWER)
 	tools/ensure_venv.sh $(VENV)
@@ -177,4 +186,4 @@ golden: $(INSTALLED)
 	$(PYTHON) tests/digests.py
 
 clean:
-	rm -rf .venv .venv-* .node-* out build *.egg-info
+	rm -rf .venv .venv-* .node-* out build dist *.egg-info

@@ -2,9 +2,31 @@
 
 import contextlib
 import sys
+from pathlib import Path
 
 # As in setup.cfg. MuJoCo and dm_control move together.
 NEEDS = {"mujoco": ">=3.17,<3.18", "dm-control": "==1.0.50", "gymnasium": ">=1.2,<1.5", "shimmy": "==2.0.1"}
+
+
+def clone() -> Path | None:
+    """Return the folder of the clone that this package lies in; None for an installed package."""
+    folder = Path(__file__).parents[1]
+    return folder if (folder / "setup.cfg").exists() else None
+
+
+class MissingExtra(ImportError, ValueError):
+    """An extra of the suite is not installed; the message gives the command that installs it."""
+
+    def __init__(self, need: str, extra: str, error: ImportError):
+        """Name the extra.
+
+        Args:
+            need: what needs which package, such as "ONNX needs onnx".
+            extra: of setup.cfg.
+            error: of the import that failed.
+        """
+        place = f"-e '{clone()}[{extra}]'" if clone() else f"'arc_suite[{extra}]'"
+        super().__init__(f"{need}: pip install {place} ({error})")
 
 
 def installed(package: str) -> str | None:

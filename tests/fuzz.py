@@ -26,13 +26,13 @@ from tqdm import tqdm
 import arc_suite
 from arc_suite import data, policies, style
 from arc_suite.envs.setup import Setup
-from arc_suite.robots.spec_files import load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
 ID = "arc_suite/test/fuzz-v0"
 SETTINGS = data.Settings(Setup.of("tick"), "random", (), steps=5)
 QUIET = functools.partial(tqdm, disable=True)
-SPEC = pathlib.Path(__file__).parents[1] / "examples" / "spider.json"
+SPEC = EXAMPLES["spider"]
 
 READ, REFUSED, TRACEBACK, CRASHED, TOO_LONG = OUTCOMES = ("read", "refused", "traceback", "crashed", "too long")
 _ODD = (None, True, -1, 0, 1e308, -0.0, 2**70, float("nan"), "", "queen", "x" * 10_000, [], {}, [[]], {"": {}})

@@ -11,6 +11,7 @@ It times the same full update in PyTorch, where torch is installed.
 
 from absl import flags
 
+from arc_suite import versions
 from arc_suite.cli import program
 
 FLAGS = flags.FLAGS
@@ -22,7 +23,7 @@ def main() -> None:
     try:
         from benchmark import learning
     except ImportError as error:
-        raise ValueError(f"learning needs JAX: pip install 'arc_suite[agents]' ({error})") from None
+        raise versions.MissingExtra("learning needs JAX", "agents", error) from None
     line = "{:<44} {:>12} {:>12} {:>9}"
     header = line.format("updates per second of one core", "measured", "limit", "share")
     print(header, "-" * len(header), sep="\n")

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from arc_suite import checks
+from arc_suite import checks, versions
 from arc_suite.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
 
 
@@ -39,7 +39,7 @@ class Algorithm(NamedTuple):
         except ImportError as error:
             if not self.learner.startswith("arc_suite."):
                 raise ValueError(f"learner {self.learner}: {error}") from None
-            raise ValueError(f"training needs JAX: pip install 'arc_suite[agents]' ({error})") from None
+            raise versions.MissingExtra("training needs JAX", "agents", error) from None
 
     def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Algorithm":
         """Return the algorithm with some hyperparameters changed.

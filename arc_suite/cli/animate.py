@@ -3,7 +3,7 @@
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
   arc-suite animate --legs 8 --links 3 --rig nodes --output spider.glb
-  arc-suite animate --spec examples/spider.json --policy my_package.policies:make --clips walk --output spider.glb
+  arc-suite animate --spec spider --policy my_package.policies:make --clips walk --output spider.glb
 
 The clip walk is the policy's; slow and fast are the demonstrator's presets; turn_left, turn_right, strafe_left,
 strafe_right, back and stop are commands that its preset steered follows; idle stands and breathes. Loops begin at the

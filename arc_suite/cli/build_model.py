@@ -6,7 +6,7 @@ The body is a robot of the suite, a spec file, or one made to order:
   arc-suite build_model --legs 6 --links 3 > walker.xml
   arc-suite build_model --legs 5 --layout radial --scale 2 --json --output starfish.json
   arc-suite build_model --seed 7 --summary --render random.png
-  arc-suite build_model --spec examples/spider.json --summary
+  arc-suite build_model --spec spider --summary
   arc-suite build_model --robot tick --task stairs --set difficulty=1 --output stairs.xml
 """
 

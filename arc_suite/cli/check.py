@@ -1,7 +1,7 @@
 """Check a body in a spec file, or a task.
 
-  arc-suite check examples/spider.json
-  arc-suite check --walk examples/spider.json
+  arc-suite check spider
+  arc-suite check --walk spider
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold

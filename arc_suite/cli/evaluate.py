@@ -6,7 +6,7 @@ interquartile mean of the return, with a stratified bootstrap interval. The JSON
 `arc-suite enter`: it holds every episode, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
-  arc-suite evaluate --spec examples/spider.json
+  arc-suite evaluate --spec spider
   arc-suite evaluate --robot queen --set target_velocity=0.4
 """
 

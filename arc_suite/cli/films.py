@@ -8,6 +8,8 @@ import imageio.v2 as imageio
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from arc_suite import versions
+
 _SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
 
 
@@ -132,7 +134,7 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     try:
         import imageio_ffmpeg  # noqa: F401
     except ImportError as error:
-        raise ValueError(f"MP4 needs imageio-ffmpeg: pip install 'arc_suite[video]' ({error})") from None
+        raise versions.MissingExtra("MP4 needs imageio-ffmpeg", "video", error) from None
     with imageio.get_writer(
         path,
         format="FFMPEG",

@@ -20,7 +20,8 @@ ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
 
 def define_body() -> None:
     """Define --spec, --legs and --links, for programs that take any body."""
-    flags.DEFINE_string("spec", None, "A body from this JSON file, in place of a robot.")
+    examples = ", ".join(spec_files.EXAMPLES)
+    flags.DEFINE_string("spec", None, f"A body in place of a robot: a JSON file, or one of {examples}.")
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
     flags.DEFINE_integer(
         "links", None, "Actuated links of each leg of a body made to order. [default: 3]", *generator.LINKS

@@ -1,37 +1,11 @@
 """The command `arc-suite`, which runs the programs."""
 
-import ast
 import importlib
 import sys
-from pathlib import Path
 
-from arc_suite import checks
+from arc_suite import checks, versions
 from arc_suite.cli import program
-
-PROGRAMS = (
-    "build_model",
-    "check",
-    "render",
-    "animate",
-    "view",
-    "evaluate",
-    "style",
-    "collect",
-    "tune_cpg",
-    "train",
-    "study",
-    "enter",
-    "export",
-    "survey",
-    "doctor",
-)
-
-_USAGE = """\
-arc-suite PROGRAM [flags]
-
-{programs}
-
-arc-suite PROGRAM --help shows the flags of a program, arc-suite --version the version."""
+from arc_suite.cli.programs import PROGRAMS, usage
 
 
 def main(*given: str) -> None:
@@ -45,7 +19,10 @@ def main(*given: str) -> None:
     first, *others = [*given, *sys.argv[1:]] or ["--help"]
     if first in PROGRAMS:
         # Imported here and alone: a program defines its flags when it is imported, and some define the same.
-        module = importlib.import_module(f"arc_suite.cli.{first}")
+        try:
+            module = importlib.import_module(f"arc_suite.cli.{first}")
+        except versions.MissingExtra as error:
+            sys.exit(f"arc-suite {first}: {error}")
         program.run(module.main, f"arc-suite {first}", others)
     program.guard(lambda: _answer(first), "arc-suite")
 
@@ -54,13 +31,6 @@ def _answer(argument: str) -> None:
     if argument == "--version":
         print(program.VERSION)
     elif argument in ("--help", "-h"):
-        width = max(map(len, PROGRAMS))
-        print(_USAGE.format(programs="\n".join(f"  {name:<{width}}  {summary(name)}" for name in PROGRAMS)))
+        print(usage())
     else:
         checks.name(argument, PROGRAMS, "program")
-
-
-def summary(name: str) -> str:
-    """Return the first line of a program's docstring, read from its source without importing it."""
-    source = Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
-    return ast.get_docstring(ast.parse(source)).splitlines()[0]

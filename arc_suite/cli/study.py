@@ -16,6 +16,7 @@ from pathlib import Path
 
 from absl import flags
 
+from arc_suite import versions
 from arc_suite.cli.program import progress
 from arc_suite.envs.vector import usable_cores
 from arc_suite.studies import publication, report, runner, tables
@@ -73,7 +74,7 @@ def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
     try:
         from arc_suite.studies import cluster
     except ImportError as error:
-        raise ValueError(f"--submit needs submitit: pip install 'arc_suite[cluster]' ({error})") from None
+        raise versions.MissingExtra("--submit needs submitit", "cluster", error) from None
     arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
     parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
     for job in cluster.submit(arguments, jobs, FLAGS.hours, folder / "jobs", **parameters):

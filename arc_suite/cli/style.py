@@ -2,7 +2,7 @@
 
   arc-suite style --robot queen --policy cpg --preset medium
   arc-suite style --policy my_package.policies:make --compare cpg --output out/style
-  arc-suite style --spec examples/spider.json --save out/spider.npz
+  arc-suite style --spec spider --save out/spider.npz
   arc-suite style --policy out/spider.npz --compare zero
   arc-suite style --policy arc_suite/queen/walk/cpg-medium-v0 --compare arc_suite/queen/walk/random-v0
 
@@ -123,7 +123,7 @@ def pictures(robots: list[str]):
     try:
         from arc_suite.style.plots import OF_GAIT, PICTURES
     except ImportError as error:
-        raise ValueError(f"pictures need matplotlib: pip install 'arc_suite[plot]' ({error})") from None
+        raise versions.MissingExtra("pictures need matplotlib", "plot", error) from None
     with contextlib.ExitStack() as stack:
         targets = {}
         for robot in robots:

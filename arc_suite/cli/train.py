@@ -8,7 +8,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --robot queen --task steer --algorithm dagger
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
-  arc-suite train --spec examples/spider.json --algorithm speq --hp phase_updates=7500
+  arc-suite train --spec spider --algorithm speq --hp phase_updates=7500
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite evaluate --robot tick --policy runs/tick-walk-sac-0
 """
@@ -20,7 +20,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import evaluation, files
+from arc_suite import evaluation, files, versions
 from arc_suite.agents import algorithms, configuration, run_folder
 from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.training import train
@@ -126,7 +126,7 @@ def events(folder: Path) -> Iterator[Callable]:
     try:
         from tensorboardX import SummaryWriter
     except ImportError as error:
-        raise ValueError(f"--tensorboard needs tensorboardX: pip install 'arc_suite[tensorboard]' ({error})") from None
+        raise versions.MissingExtra("--tensorboard needs tensorboardX", "tensorboard", error) from None
     writers = []
 
     def write(step, metrics):

@@ -2,7 +2,7 @@
 
   arc-suite view --robot queen
   arc-suite view --robot tick --task steer
-  arc-suite view --spec examples/spider.json --set arena=bumps
+  arc-suite view --spec spider --set arena=bumps
 
 Double-click a part and drag with Ctrl held to pull at it; drag without Ctrl to turn the camera. Space pauses,
 backspace restarts. In a task with a command, such as steer, the arrow keys set it: forward and back, turn left

@@ -5,11 +5,13 @@ episode = dataset[0]
 track = style.record(dataset.settings.setup.load(), episode.playback(), episode.seed, max_steps=episode.length)
 """
 
+from arc_suite import versions
+
 try:
     import h5py  # noqa: F401
     import minari  # noqa: F401
 except ImportError as error:
-    raise ImportError(f"datasets need Minari: pip install 'arc_suite[data]' ({error})") from error
+    raise versions.MissingExtra("datasets need Minari", "data", error) from error
 
 from arc_suite.data.collection import collect
 from arc_suite.data.dataset import Dataset, open

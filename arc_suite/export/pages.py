@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from arc_suite import versions
 from arc_suite.export.parts import parts as described
 from arc_suite.export.scenery import scenery
 from arc_suite.models.outline import outline
@@ -31,7 +32,8 @@ def viewer() -> str:
     """
     script = resources.files("arc_suite.export").joinpath("web", "viewer.js")
     if not script.is_file():
-        raise ValueError("no viewer for pages in this clone: `make web` builds it, which needs Node")
+        cure = "`make web` builds it" if versions.clone() else "install a wheel that `make dist` has built in a clone"
+        raise ValueError(f"no viewer for pages: {cure}, which needs Node")
     return script.read_text(encoding="utf-8")
 
 

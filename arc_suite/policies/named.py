@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import checks, versions
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.setup import Setup
@@ -177,8 +177,7 @@ def _saved(path: Path, statistics: Path | None):
     try:
         from arc_suite.policies import sb3_file
     except ImportError as error:
-        advice = "pip install 'arc_suite[sb3]'"
-        raise ValueError(f"policy {path}: zips need stable-baselines3: {advice} ({error})") from None
+        raise versions.MissingExtra(f"policy {path}: zips need stable-baselines3", "sb3", error) from None
     return sb3_file.Saved(path, zips.statistics(path, statistics))
 
 

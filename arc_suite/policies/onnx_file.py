@@ -9,7 +9,7 @@ import os
 
 import numpy as np
 
-from arc_suite import files
+from arc_suite import files, versions
 from arc_suite.policies.network import EPSILON, Layer, Network
 
 OPSET = 17  # the first with LayerNormalization
@@ -58,7 +58,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
         import onnx
         from onnx import TensorProto, helper, numpy_helper
     except ImportError as error:
-        raise ValueError(f"ONNX needs the package onnx: pip install 'arc_suite[onnx]' ({error})") from None
+        raise versions.MissingExtra("ONNX needs the package onnx", "onnx", error) from None
     operators = [operator for layer in network.layers for operator in _operators(layer)]
     nodes, constants, present = [], [], INPUT
     for index, (operator, arrays, attributes) in enumerate(operators):

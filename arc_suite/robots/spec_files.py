@@ -16,17 +16,26 @@ from arc_suite.robots.spec import Body, SpecError
 
 MAX_BYTES = 1 << 18  # of a file; a body of 64 legs with 16 links each has fewer
 
+# Paths of the creatures that come with the suite, by name.
+EXAMPLES = {path.stem: path for path in sorted(Path(__file__).with_name("examples").glob("*.json"))}
+
 _NUMBERS = re.compile(r"\[\s+([^\[\]{}\"]*?)\s+\]")
 
 
 def load_body(path: str | os.PathLike) -> Body:
     """Read a body from a file.
 
+    Args:
+        path: of the file, or the name of an example, such as "spider".
+
     Raises:
         SpecError: not JSON, or no body; the message names the file and the field by its path,
             `legs[2].links[0].radius`.
+        ValueError: neither a file nor an example.
         OSError: the file cannot be read.
     """
+    if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
+        path = EXAMPLES[checks.name(path, EXAMPLES, "spec", near=("FILE.json",))]
     try:
         with Path(path).open("rb") as file:
             data = file.read(MAX_BYTES + 1)

@@ -4,3 +4,11 @@ A study is a `tables.Study`; each of its runs is a configuration, which goes as 
 `runner` makes the runs on this machine and `cluster` on many, `publication` copies what is committed, `results` reads
 it, and `report` writes the report from it.
 """
+
+from arc_suite import versions
+
+try:
+    import matplotlib  # noqa: F401
+    import minari  # noqa: F401
+except ImportError as error:
+    raise versions.MissingExtra("studies need JAX, Minari and matplotlib", "agents", error) from error

@@ -72,7 +72,7 @@ def test_unknown_algorithms(name, line):
 
 
 def test_without_jax_is_one_line():
-    with pytest.raises(ValueError, match=r"^training needs JAX: pip install 'arc_suite\[agents\]' \(No module named"):
+    with pytest.raises(ValueError, match=r"^training needs JAX: pip install -e '.*\[agents\]' \(No module named"):
         _ = Algorithm("arc_suite.agents.nowhere", SoftActorCritic(), "").module
 
 

@@ -1,13 +1,12 @@
 """The program that writes animation clips."""
 
 import json
-import pathlib
 
 import gltf_reader
 import programs
 import pytest
 
-ROOT = pathlib.Path(__file__).parents[2]
+from arc_suite.robots.spec_files import EXAMPLES
 
 
 def animate(*arguments, cwd=None):
@@ -73,7 +72,7 @@ def test_errors_are_one_line_and_leave_no_file(tmp_path, arguments, message):
 
 def test_the_spec_is_not_written_over(tmp_path):
     spec = tmp_path / "spider.json"
-    spec.write_text((ROOT / "examples" / "spider.json").read_text())
+    spec.write_text(EXAMPLES["spider"].read_text())
     before = spec.read_text()
     done = animate("--spec=spider.json", "--clips=idle", "--output=spider.glb", cwd=tmp_path)
     line = "--output=spider.glb: spider.json, which is written too, is the spec; take another name"

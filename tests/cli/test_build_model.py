@@ -1,7 +1,5 @@
 """`arc-suite build_model` and the bodies it makes to order."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import programs
@@ -10,10 +8,8 @@ from dm_control import mjcf
 
 from arc_suite import models
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec_files import load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 
-ROOT = Path(__file__).parents[2]
-EXAMPLES = ROOT / "examples"
 SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
 
 
@@ -65,7 +61,7 @@ def test_bit_equality_would_notice_one_bit():
         (["--legs=6", "--layout=radial", "--scale=2.5"], generator.scaled(generator.generate(6, 3, "radial"), 2.5)),
         (["--seed=11"], generator.random_body(11)),
         (["--seed=11", "--legs=4", "--links=1"], generator.random_body(11, 4, 1)),
-        (["--spec", EXAMPLES / "spider.json"], load_body(EXAMPLES / "spider.json")),
+        (["--spec", EXAMPLES["spider"]], load_body("spider")),
     ],
 )
 def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):

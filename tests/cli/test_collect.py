@@ -83,7 +83,7 @@ def test_an_unknown_dataset_is_one_line_with_the_nearest(root):
 @pytest.mark.slow
 def test_without_minari_a_line_says_what_to_install(tmp_path):
     done = programs.without("minari", tmp_path, "collect", "--episodes=1")
-    line = "arc-suite collect: datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')\n"
+    line = f"arc-suite collect: datasets need Minari: {programs.install('data')} (No module named 'minari')\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 
 

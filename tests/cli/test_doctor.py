@@ -12,6 +12,7 @@ import pytest
 from arc_suite import versions
 
 ROOT = pathlib.Path(__file__).parents[2]
+COMMAND = f"pip install {'--no-deps ' if sys.version_info >= (3, 13) else ''}'dm-control==1.0.50'"
 
 
 def doctor(*path, **variables):
@@ -120,10 +121,11 @@ def test_import_that_fails_for_a_wrong_package_names_it(tmp_path):
     environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
     done = subprocess.run([sys.executable, "-c", "import arc_suite"], env=environ, capture_output=True, text=True)
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1] == (
-        "ImportError: cannot import arc_suite: dm-control is 1.0.9 and should be ==1.0.50: "
-        "pip install 'dm-control==1.0.50'"
-    )
+    line = f"cannot import arc_suite: dm-control is 1.0.9 and should be ==1.0.50: {COMMAND}"
+    assert done.stderr.splitlines()[-1] == f"ImportError: {line}"
+    code = "import sys; sys.argv[1:] = ['doctor']; import arc_suite_command; arc_suite_command.main()"
+    done = subprocess.run([sys.executable, "-c", code], env=environ, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (1, f"arc-suite: {line}\n")
 
 
 def test_import_that_fails_for_another_reason_says_that(tmp_path):

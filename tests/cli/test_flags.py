@@ -1,7 +1,5 @@
 """Every program takes any body, any task and its settings; every face of the suite takes any body."""
 
-from pathlib import Path
-
 import gymnasium
 import numpy as np
 import pytest
@@ -12,15 +10,14 @@ import arc_suite
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.gym import Env
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec_files import load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 
-ROOT = Path(__file__).parents[2]
-SPIDER = ROOT / "examples" / "spider.json"
+SPIDER = EXAMPLES["spider"]
 
 
 @pytest.mark.slow
 def test_evaluate_takes_a_spec_and_a_body_made_to_order():
-    done = arc_suite_program("evaluate", "--spec", SPIDER, "--episodes=1")
+    done = arc_suite_program("evaluate", "--spec=spider", "--episodes=1")
     fields = done.stdout.splitlines()[-1].split()
     assert fields[0] == "spider"
     assert float(fields[3]) > 2500.0

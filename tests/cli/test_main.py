@@ -1,5 +1,6 @@
 """The command `arc-suite`, and `python -m arc_suite`, which is the same."""
 
+import configparser
 import functools
 import pathlib
 import re
@@ -11,6 +12,7 @@ import pytest
 
 import arc_suite
 from arc_suite.cli import main
+from arc_suite.cli.programs import summary
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
@@ -73,7 +75,27 @@ def test_only_the_program_that_runs_is_imported():
         "finally: print(sorted(name for name in sys.modules if name.startswith('arc_suite.cli.')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == f"{VERSION}{['arc_suite.cli.doctor', 'arc_suite.cli.main', 'arc_suite.cli.program']}\n"
+    names = [f"arc_suite.cli.{name}" for name in ("doctor", "main", "program", "programs")]
+    assert done.stdout == f"{VERSION}{names}\n"
+
+
+@pytest.mark.parametrize("arguments", [[], ["-h"], ["--help"]])
+def test_the_console_script_shows_help_without_heavy_imports(arguments):
+    code = (
+        f"import sys; sys.argv[1:] = {arguments}; import arc_suite_command; arc_suite_command.main()\n"
+        "sys.exit(str([name for name in ('numpy', 'mujoco', 'arc_suite') if name in sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == (run("--help").stdout, "[]\n")
+
+
+def test_the_console_script_runs_programs():
+    config = configparser.ConfigParser()
+    config.read(ROOT / "setup.cfg")
+    assert config["options.entry_points"]["console_scripts"].strip() == "arc-suite = arc_suite_command:main"
+    code = "import sys; sys.argv[1:] = ['rendr']; import arc_suite_command; arc_suite_command.main()"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", run("rendr").stderr)
 
 
 def test_modules_of_the_current_folder_come_last(tmp_path):
@@ -99,7 +121,7 @@ def help_of(program):
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_help_of_a_program(program):
     text = help_of(program)
-    assert text.startswith(f"{main.summary(program)}\n\n")
+    assert text.startswith(f"{summary(program)}\n\n")
     assert f"\n  arc-suite {program}" in text
     names = re.findall(r"^(-\S*?):", text, re.MULTILINE)
     assert "--[no]version" in names

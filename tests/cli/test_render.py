@@ -136,7 +136,7 @@ def test_settings_of_the_task_are_seen(tmp_path):
 def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
     path = tmp_path / "a.mp4"
     done = programs.without("imageio_ffmpeg", tmp_path, "render", "--steps=1", f"--output={path}")
-    message = "MP4 needs imageio-ffmpeg: pip install 'arc_suite[video]' (No module named 'imageio_ffmpeg')"
+    message = f"MP4 needs imageio-ffmpeg: {programs.install('video')} (No module named 'imageio_ffmpeg')"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite render: {message}\n")
 
 

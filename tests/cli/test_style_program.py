@@ -9,10 +9,11 @@ import pytest
 from arc_suite import data, style
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec_files import EXAMPLES
 from arc_suite.style import METRICS
 
 ROOT = pathlib.Path(__file__).parents[2]
-SPIDER = ROOT / "examples" / "spider.json"
+SPIDER = EXAMPLES["spider"]
 FROZEN = """
 import numpy as np
 def frozen(robot): return lambda time_step: np.zeros({"tick": 18, "leaper": 12}[robot])
@@ -105,7 +106,7 @@ def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_datasets_without_minari_say_what_to_install(tmp_path):
     done = programs.without("minari", tmp_path, "style", "--policy=arc_suite/tick/noisy-v0")
-    message = "datasets need Minari: pip install 'arc_suite[data]' (No module named 'minari')"
+    message = f"datasets need Minari: {programs.install('data')} (No module named 'minari')"
     assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 
@@ -174,7 +175,7 @@ def test_all_robots(tmp_path):
 @pytest.mark.slow
 def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
     done = programs.without("matplotlib", tmp_path, "style", f"--output={tmp_path}")
-    message = "pictures need matplotlib: pip install 'arc_suite[plot]' (No module named 'matplotlib')"
+    message = f"pictures need matplotlib: {programs.install('plot')} (No module named 'matplotlib')"
     assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 

@@ -26,8 +26,7 @@ def main(folder: str, few: str = "") -> None:
         old.unlink()
     bodies = dict(ROBOTS)
     if not few:
-        examples = sorted(pathlib.Path("examples").glob("*.json"))
-        bodies |= {path.stem: spec_files.load_body(path) for path in examples}
+        bodies |= {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
         bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(50)}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
         clips = export.clips(Setup(body), FEW if name in ROBOTS else ("walk", "idle"))

@@ -554,3 +554,14 @@ def test_reload_keeps_what_is_registered():
         warnings.simplefilter("error")
         importlib.reload(arc_suite)
     assert gymnasium.spec(IDS[0]) is spec
+
+
+@pytest.mark.slow
+def test_gymnasium_records_films(tmp_path):
+    pytest.importorskip("moviepy", reason="of the extra `video`")
+    env = gymnasium.make("arc_suite/tick-walk-v0", render_mode="rgb_array", width=64, height=48)
+    with gymnasium.wrappers.RecordVideo(env, str(tmp_path / "films"), name_prefix="tick") as recorded:
+        recorded.reset(seed=0)
+        for _ in range(3):
+            recorded.step(recorded.action_space.sample())
+    assert [path.name for path in tmp_path.glob("films/*.mp4")] == ["tick-episode-0.mp4"]

@@ -88,7 +88,7 @@ def test_the_bytes_hold_the_kinematics(robot, rig):
 @pytest.mark.long
 @pytest.mark.parametrize("name", tiers(["crab", "millipede", "starfish"], never, lambda name: name == "crab"))
 def test_of_any_body(name):
-    body = spec_files.load_body(f"examples/{name}.json")
+    body = spec_files.load_body(name)
     clips = export.clips(Setup(body), ["walk", "idle"])
     assert_kinematics(body, gltf_reader.read(export.glb(body, clips)), clips)
 

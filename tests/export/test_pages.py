@@ -118,9 +118,12 @@ def test_marks_end_where_actions_do_not_repeat_the_episode():
     assert len(found["marks"]) < 6
 
 
-def test_a_clone_without_the_viewer_is_told(tmp_path, monkeypatch):
+def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_package(tmp_path, monkeypatch):
     monkeypatch.setattr(pages.resources, "files", lambda package: tmp_path)
-    with pytest.raises(ValueError, match="^no viewer for pages in this clone: `make web` builds it, which needs Node$"):
+    with pytest.raises(ValueError, match="^no viewer for pages: `make web` builds it, which needs Node$"):
+        pages.viewer()
+    monkeypatch.setattr(pages.versions, "clone", lambda: None)
+    with pytest.raises(ValueError, match="^no viewer for pages: install a wheel that `make dist` has built in a clone"):
         pages.viewer()
 
 

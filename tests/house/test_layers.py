@@ -77,7 +77,7 @@ THIRD_PARTY = {
     "agents.on_policy": {"numpy", "jax"},
     "agents.proximal_policy": {"numpy", "jax", "optax"},
     "agents.hyperparameters": set(),
-    "studies": {"numpy"},
+    "studies": {"numpy", "minari", "matplotlib"},
     "studies.cluster": {"submitit"},
     "studies.publication": {"numpy", "gymnasium"},
     "studies.runner": {"numpy", "tqdm"},

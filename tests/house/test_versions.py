@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import programs
 import pytest
 
 from arc_suite import versions
@@ -21,3 +22,12 @@ def test_the_command_that_installs_dm_control(monkeypatch, python, options):
     monkeypatch.setattr(versions, "NEEDS", {"dm-control": "==1.0.50"})
     command = f"pip install {options}'dm-control==1.0.50'"
     assert versions.problems() == [f"dm-control is not installed and should be ==1.0.50: {command}"]
+
+
+def test_an_extra_is_named_for_a_clone_and_for_an_installed_package(monkeypatch, tmp_path):
+    def line():
+        return str(versions.MissingExtra("ONNX needs onnx", "onnx", ImportError("No module named 'onnx'")))
+
+    assert line() == f"ONNX needs onnx: {programs.install('onnx')} (No module named 'onnx')"
+    monkeypatch.setattr(versions, "__file__", str(tmp_path / "site-packages" / "arc_suite" / "versions.py"))
+    assert line() == "ONNX needs onnx: pip install 'arc_suite[onnx]' (No module named 'onnx')"

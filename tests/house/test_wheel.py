@@ -14,6 +14,7 @@ import mujoco
 import pytest
 
 import arc_suite
+from arc_suite.robots import spec_files
 
 ROOT = pathlib.Path(__file__).parents[2]
 NOT_SOURCES = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "out")
@@ -70,6 +71,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
         names = archive.namelist()
     package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
     package |= {"arc_suite/export/page.html", "arc_suite/export/web/viewer.js"}
+    package |= {"arc_suite_command.py"}
+    package |= {f"arc_suite/robots/examples/{name}.json" for name in spec_files.EXAMPLES}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"
     assert {name for name in names if not name.startswith(prefix)} == package
     assert [name for name in names if name.endswith("/LICENSE")]
@@ -77,7 +80,10 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
 
 def test_its_description_has_no_link_that_only_a_repository_has(wheel):
     about = metadata(wheel)
-    assert (about["Version"], about["License"]) == (arc_suite.__version__, "Apache-2.0")
+    assert (about["Version"], about["License-Expression"]) == (arc_suite.__version__, "Apache-2.0")
+    assert about["Author"] == "the arc_suite developers"
+    assert (about["Home-page"], about["Project-URL"]) == (None, None), "there is no site yet"
+    assert "Programming Language :: Python :: 3.13" in about.get_all("Classifier")
     description = about.get_payload()
     links = re.findall(r"\]\(([^)]*)\)", description)
     assert links
@@ -97,6 +103,22 @@ def test_programs(run):
     assert run("arc-suite", "--version") == f"arc_suite {arc_suite.__version__}\n"
     model = mujoco.MjModel.from_xml_string(run("arc-suite", "build_model", "--legs", "6", "--links", "3"))
     assert model.nu == 18
+    assert mujoco.MjModel.from_xml_string(run("arc-suite", "build_model", "--spec", "spider")).nu == 24
+    assert run("arc-suite", "--help") == run("python", "-m", "arc_suite", "--help")
     table = run("arc-suite", "evaluate", "--robot", "tick", "--episodes", "1")
     assert table.splitlines()[-1].startswith("tick ")
     assert "arc-suite doctor" in run("python", "-m", "arc_suite", "doctor", "--help")
+
+
+def test_dist_without_the_viewer_fails(tmp_path):
+    """Other builds go on without it."""
+    shutil.copytree(ROOT / "web", tmp_path / "web")
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "npm").write_text("#!/bin/sh\necho no such registry >&2\nexit 1\n")
+    (tmp_path / "bin" / "npm").chmod(0o755)
+    environ = os.environ | {"PATH": os.pathsep.join([str(tmp_path / "bin"), os.environ["PATH"]])}
+    done = subprocess.run(["make", "dist"], cwd=tmp_path, env=environ, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert done.stderr.splitlines()[0] == "no such registry"
+    assert not (tmp_path / "dist").exists()

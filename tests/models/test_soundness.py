@@ -1,7 +1,5 @@
 """What keeps a body from standing or walking is told in one line, with the value that would fit."""
 
-from pathlib import Path
-
 import pytest
 
 import arc_suite
@@ -9,9 +7,8 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import Motor, Solid
-from arc_suite.robots.spec_files import load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.json"))
 BODY = generator.generate(6, 3)
 CHASSIS = BODY.torso.solids[0]
 ALL = tuple(leg.name for leg in BODY.legs)

@@ -1,7 +1,5 @@
 """The standing pose is measured on the body that is built."""
 
-from pathlib import Path
-
 import mujoco
 import numpy as np
 import pytest
@@ -10,9 +8,8 @@ import arc_suite
 from arc_suite import models
 from arc_suite.models import builder, standing
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec_files import load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.json"))
 BODIES = [*ROBOTS.values(), *map(load_body, EXAMPLES), *map(generator.random_body, range(5))]
 
 # What the mechanics of a pose follow from.

@@ -2,17 +2,16 @@
 
 import json
 import math
+import re
 import tracemalloc
-from pathlib import Path
 
 import pytest
 
 from arc_suite.models.sizing import sized
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import Body, SpecError
-from arc_suite.robots.spec_files import MAX_BYTES, body_from_json, body_to_json, load_body, save_body
+from arc_suite.robots.spec_files import EXAMPLES, MAX_BYTES, body_from_json, body_to_json, load_body, save_body
 
-EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.json"))
 SOUND = json.loads(body_to_json(sized(generator.generate(4, 2))))
 
 
@@ -30,7 +29,7 @@ def test_bodies_survive_the_way_there_and_back(body, tmp_path):
     assert body_from_json(json.dumps(json.loads(path.read_text()))) == body
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", EXAMPLES.values(), ids=EXAMPLES)
 def test_examples_are_written_as_saved(path):
     body = load_body(path)
     assert body.name == path.stem
@@ -38,8 +37,17 @@ def test_examples_are_written_as_saved(path):
 
 
 def test_there_are_examples_of_every_kind():
-    legs = {path.stem: len(load_body(path).legs) for path in EXAMPLES}
+    legs = {name: len(load_body(name).legs) for name in EXAMPLES}
     assert legs == {"crab": 8, "giant": 6, "hound": 4, "millipede": 12, "spider": 8, "starfish": 5}
+
+
+def test_a_name_that_no_example_has_is_one_line_with_the_nearest(tmp_path, monkeypatch):
+    line = f"unknown spec 'spidr'; did you mean 'spider'? (there are: {', '.join(EXAMPLES)}, FILE.json)"
+    with pytest.raises(ValueError, match=f"^{re.escape(line)}$"):
+        load_body("spidr")
+    monkeypatch.chdir(tmp_path)
+    save_body(ROBOTS["tick"], "spider")
+    assert load_body("spider") == ROBOTS["tick"], "a file comes first"
 
 
 def test_a_few_lines_are_a_body():
@@ -58,7 +66,7 @@ def test_a_standing_height_that_is_left_out_puts_the_lowest_foot_on_the_floor():
     torso = {key: value for key, value in SOUND["torso"].items() if key != "standing_height"}
     for derived in (torso, torso | {"standing_height": None}):
         assert body_from_json(json.dumps(SOUND | {"torso": derived})) == body_from_json(json.dumps(SOUND))
-    spider = load_body(EXAMPLES[-2])
+    spider = load_body("spider")
     feet = [leg.foot.radius - leg.foot_position[2] for leg in spider.legs]
     opened = spider.replace(torso=spider.torso.replace(standing_height=None))
     assert opened.torso.standing_height == pytest.approx(max(feet), rel=1e-12)

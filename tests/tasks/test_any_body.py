@@ -3,7 +3,6 @@
 import json
 import math
 import pickle
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,13 +13,12 @@ import arc_suite
 from arc_suite import models, policies, rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.models.standing import standing
-from arc_suite.robots import ROBOTS, gaits, generator
+from arc_suite.robots import ROBOTS, gaits, generator, spec_files
 from arc_suite.robots.spec_files import body_to_json, load_body
 from arc_suite.tasks.fitting import fitted_gait, least_margin
 from arc_suite.tasks.walk import Walk
 
-ROOT = Path(__file__).parents[2]
-EXAMPLES = sorted((ROOT / "examples").glob("*.json"))
+EXAMPLES = list(spec_files.EXAMPLES.values())
 BODY = generator.generate(6, 3)
 
 

@@ -24,7 +24,7 @@ from arc_suite.robots.spec_files import load_body
 from arc_suite.tasks import TASKS, modified, noise
 from arc_suite.tasks.modifiers import NAMES
 
-SPIDER = load_body(pathlib.Path(__file__).parents[2] / "examples" / "spider.json")
+SPIDER = load_body("spider")
 BODIES = {**ROBOTS, "spider": SPIDER}
 EACH = {
     "kicks": {"kicks": 1.5},
