@@ -48,6 +48,7 @@ class Algorithm(NamedTuple):
             ValueError: no such hyperparameter, or a value of another type.
         """
         fields = dataclasses.asdict(self.hyperparameters)
+        changes = {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
         for name, value in changes.items():
             kind = type(fields[checks.name(name, fields, "hyperparameter")])
             kinds = (int, float) if kind is float else kind
@@ -89,6 +90,29 @@ ALGORITHMS = {
         _OFF_POLICY,
         dataclasses.replace(_SAC, dropout=0.01, utd_ratio=20),
         "SAC with 20 updates of critics with dropout in every step",
+    ),
+    # Discount and several steps are what makes it learn: docs/agents.md.
+    "sac_parallel": Algorithm(
+        _OFF_POLICY,
+        SoftActorCritic(
+            learning_rate=5e-4,
+            discount=0.97,
+            n_step=3,
+            tau=0.01,
+            num_envs=32,
+            utd_ratio=0.25,
+            start_steps=0,
+            reward_scale=0.1,
+            initial_std=0.3,
+            last_gain=0.01,
+            initial_temperature=0.003,
+            target_entropy=-0.6,
+            symmetry_augmentation=True,
+            normalize=True,
+            exclude_blocks=("contact_forces",),
+        ),
+        "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
+        steps=100_000,
     ),
     "ppo": Algorithm(
         "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
