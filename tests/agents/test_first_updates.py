@@ -46,8 +46,9 @@ def recorded(monkeypatch):
 
 def begun_by_hand(hp, state):
     """A learner by hand from the state before the first update."""
-    numbers = hp.dropout, hp.learning_rate, hp.discount, hp.tau, hp.target_entropy, hp.initial_temperature
-    return ByHand(of_policy(state.policy), [by_hand(critic) for critic in state.critics], *numbers)
+    numbers = hp.dropout, hp.learning_rate, hp.discount, hp.tau, hp.target_entropy
+    alpha = np.exp(np.asarray(state.log_alpha, float))
+    return ByHand(of_policy(state.policy), [by_hand(critic) for critic in state.critics], *numbers, alpha)
 
 
 def differences(ours, reference):
@@ -69,7 +70,9 @@ def cast(parts, kind):
     return [part if part is None or part.dtype == bool else part.astype(kind) for part in parts]
 
 
-@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name in ("sac", "sope")))
+@pytest.mark.parametrize(
+    "name", tiers(NAMES, lambda name: name in ("sac", "sope"), lambda name: name == "sac_parallel")
+)
 def test_first_three_updates(name, learner, recorded):
     """What it learns, in single precision, and the text of an update in double precision.
 
