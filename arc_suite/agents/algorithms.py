@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 from arc_suite import checks, versions
 from arc_suite.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
+from arc_suite.arenas import FLAT
+from arc_suite.envs.setup import Setup
 
 
 class Algorithm(NamedTuple):
@@ -19,6 +21,7 @@ class Algorithm(NamedTuple):
         summary: a line for people.
         evaluate_every: environment steps between evaluations, by default.
         steps: environment steps of a run, by default.
+        terrain_steps: the same in another arena than the flat one; None for as many.
     """
 
     learner: str
@@ -26,6 +29,7 @@ class Algorithm(NamedTuple):
     summary: str
     evaluate_every: int = 10_000
     steps: int = 1_000_000
+    terrain_steps: int | None = None
 
     @property
     def module(self) -> ModuleType:
@@ -40,6 +44,16 @@ class Algorithm(NamedTuple):
             if not self.learner.startswith("arc_suite."):
                 raise ValueError(f"learner {self.learner}: {error}") from None
             raise versions.MissingExtra("training needs JAX", "agents", error) from None
+
+    def steps_of(self, setup: Setup) -> int:
+        """Return the environment steps of a run, by default.
+
+        Raises:
+            ValueError: a setting of the task that does not fit.
+        """
+        if self.terrain_steps is None or setup.definition.scene.arena == FLAT:
+            return self.steps
+        return self.terrain_steps
 
     def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Algorithm":
         """Return the algorithm with some hyperparameters changed.
@@ -114,8 +128,13 @@ ALGORITHMS = {
         "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
         steps=100_000,
     ),
+    # Noise falls over the length of a run: on rough ground a million steps end below standing still.
     "ppo": Algorithm(
-        "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
+        "arc_suite.agents.on_policy",
+        ProximalPolicy(),
+        "proximal policy optimisation",
+        evaluate_every=100_000,
+        terrain_steps=3_000_000,
     ),
     # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": Algorithm(

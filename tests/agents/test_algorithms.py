@@ -8,7 +8,9 @@ import pytest
 
 from arc_suite.agents import algorithms
 from arc_suite.agents.algorithms import ALGORITHMS, Algorithm, algorithm
+from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.hyperparameters import SoftActorCritic
+from arc_suite.envs.setup import Setup
 
 PAPER = {
     # prior data, transitions of an update, the most updates of a phase, early stop, dropout
@@ -39,6 +41,21 @@ def test_hyperparameters_can_be_changed():
     assert ALGORITHMS["sope"].hyperparameters is before
     with pytest.raises(dataclasses.FrozenInstanceError):
         before.batch = 3
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "steps"),
+    [
+        ("ppo", "walk", 1_000_000),
+        ("ppo", "steer", 1_000_000),
+        ("ppo", "rough", 3_000_000),
+        ("ppo", "navigate", 3_000_000),
+        ("sac_parallel", "rough", 100_000),
+    ],
+)
+def test_the_default_length_of_a_run_follows_from_its_task(name, task, steps):
+    assert Configuration.of(Setup.of("tick", task), name).steps == steps
+    assert Configuration.of(Setup.of("tick", task), name, steps=5000).steps == 5000
 
 
 @pytest.mark.parametrize(
