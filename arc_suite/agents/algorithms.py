@@ -22,6 +22,7 @@ class Algorithm(NamedTuple):
         evaluate_every: environment steps between evaluations, by default.
         steps: environment steps of a run, by default.
         terrain_steps: the same in another arena than the flat one; None for as many.
+        extends: whether a run can be extended to more steps, as no schedule hangs on them.
     """
 
     learner: str
@@ -30,6 +31,7 @@ class Algorithm(NamedTuple):
     evaluate_every: int = 10_000
     steps: int = 1_000_000
     terrain_steps: int | None = None
+    extends: bool = False
 
     @property
     def module(self) -> ModuleType:
@@ -75,39 +77,36 @@ class Algorithm(NamedTuple):
 
 _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
-_OFF_POLICY = "arc_suite.agents.off_policy"
+
+
+def _off_policy(hyperparameters: SoftActorCritic, summary: str, steps: int = 1_000_000) -> Algorithm:
+    return Algorithm("arc_suite.agents.off_policy", hyperparameters, summary, steps=steps, extends=True)
+
 
 # The paper's six, as in its published code, and others: docs/agents.md.
 ALGORITHMS = {
-    "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
-    "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
-    "sope_eo": Algorithm(
-        _OFF_POLICY, dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"
-    ),
-    "sacfd": Algorithm(
-        _OFF_POLICY,
+    "sac": _off_policy(_SAC, "soft actor-critic"),
+    "speq": _off_policy(_SPEQ, "SAC with phases in which the critics alone learn"),
+    "sope_eo": _off_policy(dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"),
+    "sacfd": _off_policy(
         dataclasses.replace(_SAC, prior="protected"),
         "SAC with prior data in its buffer, never overwritten",
     ),
-    "speq_o2o": Algorithm(
-        _OFF_POLICY,
+    "speq_o2o": _off_policy(
         dataclasses.replace(_SPEQ, prior="symmetric_sampling"),
         "SPEQ with a batch of prior data in every update",
     ),
-    "sope": Algorithm(
-        _OFF_POLICY,
+    "sope": _off_policy(
         dataclasses.replace(_SPEQ, prior="symmetric_sampling", early_stop="published"),
         "SPEQ-O2O with phases that stop early",
     ),
     # Beyond the paper: DroQ (Hiraoka et al., "Dropout Q-functions for doubly efficient reinforcement learning", 2022).
-    "droq": Algorithm(
-        _OFF_POLICY,
+    "droq": _off_policy(
         dataclasses.replace(_SAC, dropout=0.01, utd_ratio=20),
         "SAC with 20 updates of critics with dropout in every step",
     ),
     # Discount and several steps are what makes it learn: docs/agents.md.
-    "sac_parallel": Algorithm(
-        _OFF_POLICY,
+    "sac_parallel": _off_policy(
         SoftActorCritic(
             learning_rate=5e-4,
             discount=0.97,

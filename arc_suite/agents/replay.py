@@ -72,10 +72,11 @@ class Replay:
             joints: of an action.
             slack: further transitions that are kept.
             mode: "w+" to make the files where they are missing, "r+" to resume from them, "r" to read them alone.
+                Files to resume from may be shorter, of a smaller capacity at which no transition was overwritten.
             num_envs: environments, whose transitions are added in turn.
 
         Raises:
-            Damaged: a file to resume from or to read is missing or too short.
+            Damaged: a file to resume from is missing, or one to read is missing or too short.
             OSError: the disk is full, or the like.
         """
         self._folder, self._capacity, self._size, self._mode = files.folder(folder), capacity, size, mode
@@ -170,7 +171,7 @@ class Replay:
 
     def _mapped(self, name: str, dtype, shape: tuple[int, ...], make: bool) -> np.ndarray:
         path, size = self._folder / name, int(np.prod(shape)) * np.dtype(dtype).itemsize
-        if make:
+        if make or (self._mode == "r+" and path.is_file()):
             _allocate(path, size)
         elif not (path.is_file() and path.stat().st_size >= size):
             raise Damaged(f"{path} is missing or too short")

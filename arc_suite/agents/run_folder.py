@@ -90,12 +90,13 @@ class RunFolder:
 
 
 @contextlib.contextmanager
-def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFolder]:
+def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence[str] = ()) -> Iterator[RunFolder]:
     """Open the folder of a run, or make one.
 
     Args:
         path: of the folder.
         config: record of the configuration, plain values.
+        growing: names in it whose integers may be larger than in the folder.
 
     Raises:
         ValueError: the folder is of another run or of none, or damaged, or another process writes to it.
@@ -104,7 +105,7 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFo
     path = files.folder(path)
     with contextlib.ExitStack() as stack:
         stack.enter_context(files.locked(path / LOCK, f"{path}: another process goes on with this run"))
-        _configure(path, config)
+        _configure(path, config, growing)
         files.delete_unfinished(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
@@ -184,13 +185,17 @@ def is_begun(path: str | os.PathLike) -> bool:
     return (Path(path) / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)
 
 
-def _configure(path: Path, config: Mapping[str, Any]) -> None:
-    """Compare the record with the folder's, or write it if no run has begun."""
+def _configure(path: Path, config: Mapping[str, Any], growing: Sequence[str]) -> None:
+    """Compare the record with the folder's, and write it if no run has begun or some of its integers have grown."""
     others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
     if others and CONFIG not in others:
         raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
     if is_begun(path):
-        return check(path, config)
+        there = config_of(path)
+        grown = [name for name in growing if isinstance(there.get(name), int) and there[name] < config[name]]
+        check(path, config, grown)
+        if not grown:
+            return
     with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused
         file.update(config)
 

@@ -72,13 +72,24 @@ def test_a_file_that_is_gone_cut_or_overwritten(tmp_path, name):
     (tmp_path / name).write_bytes(bytes(len(content)))
     with pytest.raises(Damaged, match=rf"^{tmp_path} holds other transitions$"):
         Replay(tmp_path, 10, SIZE, JOINTS, 0, "r+").restore(*counters)
-    (tmp_path / name).write_bytes(content[:-1])
+    (tmp_path / name).write_bytes(content[:1])
     with pytest.raises(Damaged, match=rf"^{tmp_path / name} is missing or too short$"):
-        Replay(tmp_path, 10, SIZE, JOINTS, 0, "r+")
+        Replay(tmp_path, 10, SIZE, JOINTS, 0, "r")
+    with pytest.raises(Damaged, match=rf"^{tmp_path} holds other transitions$"):
+        Replay(tmp_path, 10, SIZE, JOINTS, 0, "r+").restore(*counters)
     (tmp_path / name).unlink()
     with pytest.raises(Damaged, match=rf"^{tmp_path / name} is missing or too short$"):
         Replay(tmp_path, 10, SIZE, JOINTS, 0, "r")
     assert not (tmp_path / name).exists()
+
+
+def test_a_buffer_that_never_came_round_can_grow(tmp_path):
+    replay = Replay(tmp_path, 18, SIZE, JOINTS, slack=1)
+    added = fill(replay, EPISODES)
+    larger = Replay(tmp_path, 40, SIZE, JOINTS, 1, "r+")
+    larger.restore(replay.total, replay.ends, replay.checksum)
+    check(larger, added + fill(larger, EPISODES, start=500))
+    assert len(larger) == 36
 
 
 def interleave(replay, streams, start=0):

@@ -1,5 +1,6 @@
 """Folders of runs: whole whatever happens, and refused in one line where they do not fit."""
 
+import json
 import os
 
 import numpy as np
@@ -86,6 +87,17 @@ def test_tables_are_read_also_while_a_line_is_written(path):
 )
 def test_another_run(path, changed, named):
     one_line(path, named, CONFIG | changed)
+
+
+def test_steps_may_grow(path):
+    (path / "config.json").write_text(json.dumps(CONFIG | {"steps": 5}))
+    with opened(path, CONFIG | {"steps": 9}, growing=["steps"]) as folder:
+        assert folder.progress["evaluated"] == 2
+    assert run_folder.config_of(path)["steps"] == 9
+    for config, growing in (({"steps": 8}, ["steps"]), ({"steps": 10}, []), ({"steps": 10, "seed": 1}, ["steps"])):
+        with pytest.raises(ValueError, match="of another run, whose"), opened(path, CONFIG | config, growing):
+            pass
+    assert run_folder.config_of(path)["steps"] == 9
 
 
 def test_a_folder_of_something_else(tmp_path):

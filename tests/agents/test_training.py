@@ -140,6 +140,30 @@ def test_stops_after_minutes_and_goes_on(tiny, tmp_path):
     assert train(run, tmp_path / "run", minutes=0.0, progress=silent), "nothing is left to do"
 
 
+@pytest.mark.parametrize("name", tiers(["sac_parallel", "sope_eo"], lambda name: name == "sac_parallel"))
+def test_a_run_is_extended_to_what_a_longer_one_is(name, tiny, tmp_path):
+    assert train(tiny(name, steps=300), tmp_path / "long", progress=silent)
+    for steps in (100, 300):
+        assert train(tiny(name, steps=steps), tmp_path / "extended", progress=silent)
+    long, extended = (contents(tmp_path / each) for each in ("long", "extended"))
+    own = ("training.csv", "checkpoint.npz/count", "checkpoint.npz/sums")  # a line of metrics more, at 100
+    assert [key for key in long if long[key] != extended[key] and not key.startswith(own)] == []
+    with pytest.raises(ValueError, match=r"of another run, whose steps is 300, and not 200; write to another folder$"):
+        train(tiny(name, steps=200), tmp_path / "extended", progress=silent)
+
+
+def test_a_run_with_a_schedule_is_not_extended(tmp_path):
+    """`ppo`: noise falls over the length of a run."""
+    hyperparameters = {"num_envs": 4, "horizon": 5, "minibatch": 10, "epochs": 1, "hidden": 16}
+    for steps in (20, 40):
+        run = Configuration.of(Setup.of("tick", "walk", SHORT), "ppo", hyperparameters, steps=steps, evaluate_every=20)
+        if steps == 20:
+            assert train(run, tmp_path / "run", progress=silent)
+        else:
+            with pytest.raises(ValueError, match=r"of another run, whose steps is 20, and not 40;"):
+                train(run, tmp_path / "run", progress=silent)
+
+
 def test_another_seed_is_another_run(tiny, tmp_path):
     train(tiny("sac", steps=50), tmp_path / "run", progress=silent)
     with pytest.raises(ValueError, match=r"run: of another run, whose seed is 0, and not 1; write to another folder$"):
