@@ -80,7 +80,8 @@ class SoftActorCritic:
         least = {"hidden": 1, "batch": 1, "buffer_size": 1, "num_envs": 1, "n_step": 1, "start_steps": 0}
         least |= {"phase_every": 1, "phase_updates": 0, "scored_batches": 1, "check_every": 1, "patience": 1}
         _check(self, least)
-        _check_shares(self, "learning_rate", "discount", "tau", "held_out", "improvement")
+        _check_shares(self, "learning_rate", "discount", "held_out", "improvement")
+        checks.number("tau", self.tau, 1e-6, 1.0)
         checks.number("dropout", self.dropout, 0.0, 0.9)
         for name in ("reward_scale", "initial_std", "initial_temperature"):
             checks.number(name, getattr(self, name), 1e-6, 1e3)
@@ -216,7 +217,9 @@ class ProximalPolicy:
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
         _check(self, {"num_envs": 1, "horizon": 1, "epochs": 1, "minibatch": 1, "hidden": 1, "value_warm_up": 0})
-        _check_shares(self, "discount", "gae_lambda", "clip", "normalize_until", "policy_rate", "value_rate")
+        _check_shares(self, "discount", "clip", "policy_rate", "value_rate")
+        for name in ("gae_lambda", "normalize_until"):
+            checks.number(name, getattr(self, name), 0.0, 1.0)
         for name in ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm"):
             checks.number(name, getattr(self, name), 1e-6, 1e3)
         if self.minibatch > self.num_envs * self.horizon * (2 if self.symmetry_augmentation else 1):
@@ -229,5 +232,8 @@ def _check(hp, least: Mapping[str, int]) -> None:
 
 
 def _check_shares(hp, *names: str) -> None:
+    """Check that 0 and 1 are no values, as with them nothing is learned or nothing else counts."""
     for name in names:
-        checks.number(name, getattr(hp, name), 0.0, 1.0)
+        value = getattr(hp, name)
+        if not 0.0 < checks.number(name, value) < 1.0:
+            raise ValueError(f"{name}: expected a number between 0 and 1, got {value!r}")

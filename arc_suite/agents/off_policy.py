@@ -136,11 +136,12 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
                     state, critic_sums = update(core, state, critic_sums, *drawn)
                 updates += 1
 
-            # Begin a stabilisation phase.
-            if hp.phase_updates and steps // hp.phase_every > (steps - hp.num_envs) // hp.phase_every:
-                held_out = _held_out(hp, buffer, sources)
+            # Begin a stabilisation phase, unless it lacks transitions for its validation set.
+            begins = hp.phase_updates and steps // hp.phase_every > (steps - hp.num_envs) // hp.phase_every
+            held_out = _held_out(hp, buffer, sources)
+            if begins and (held_out or hp.early_stop == "none"):
                 phase = _phase(hp, seed, steps, sources, state.policy, inputs, held_out)
-                if phase.held_out:
+                if held_out:
                     loss = validation_loss(hp, seed, updates, state, sources, inputs, phase)
                     phase = phase._replace(patience=Patience(loss))
         else:
@@ -216,7 +217,7 @@ def _draw(
 
 
 def _held_out(hp: SoftActorCritic, buffer: Replay, sources) -> int:
-    """Return the size of the validation set in each source: at least a batch, and a batch must be left."""
+    """Return the size of the validation set in each source: at least a batch, and a batch must be left; else 0."""
     if hp.early_stop == "none":
         return 0
     held_out = min(max(hp.batch, int(hp.held_out * len(buffer))), min(map(len, sources)) - hp.batch)
