@@ -13,6 +13,7 @@ Tables only grow; a run that resumes cuts them back to their lengths at the chec
 import contextlib
 import json
 import os
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,7 @@ class RunFolder:
 
 @contextlib.contextmanager
 def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence[str] = ()) -> Iterator[RunFolder]:
-    """Open the folder of a run, or make one.
+    """Open the folder of a run, or make one, which is deleted if an error comes before the run has begun.
 
     Args:
         path: of the folder.
@@ -102,8 +103,9 @@ def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence
         ValueError: the folder is of another run or of none, or damaged, or another process writes to it.
         OSError: it cannot be read or written.
     """
-    path = files.folder(path)
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_made(Path(path)))
+        path = files.folder(path)
         stack.enter_context(files.locked(path / LOCK, f"{path}: another process goes on with this run"))
         _configure(path, config, growing)
         files.delete_unfinished(path / CHECKPOINT)  # megabytes
@@ -183,6 +185,21 @@ def is_begun(path: str | os.PathLike) -> bool:
     """Return whether the run of a folder has begun: it has a checkpoint, or a line in a table."""
     tables = [Path(path) / f"{name}.csv" for name in TABLES]
     return (Path(path) / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)
+
+
+@contextlib.contextmanager
+def _made(path: Path) -> Iterator[None]:
+    """Delete a folder that was missing before, and parents that it needed, if an error comes before its run begins."""
+    missing = [each for each in (path, *path.parents) if not each.exists()]
+    try:
+        yield
+    except Exception:
+        if missing and not is_begun(path):
+            shutil.rmtree(path, ignore_errors=True)
+            for parent in missing[1:]:
+                with contextlib.suppress(OSError):  # another run may be in it by now
+                    parent.rmdir()
+        raise
 
 
 def _configure(path: Path, config: Mapping[str, Any], growing: Sequence[str]) -> None:

@@ -164,6 +164,13 @@ def test_a_run_with_a_schedule_is_not_extended(tmp_path):
                 train(run, tmp_path / "run", progress=silent)
 
 
+def test_a_run_that_the_learner_refuses_leaves_no_folder(tmp_path):
+    run = Configuration.of(Setup.of("tick"), "finetune")
+    with pytest.raises(ValueError, match=r"^start: expected the folder of a run"):
+        train(run, tmp_path / "runs" / "run", progress=silent)
+    assert not list(tmp_path.iterdir())
+
+
 def test_another_seed_is_another_run(tiny, tmp_path):
     train(tiny("sac", steps=50), tmp_path / "run", progress=silent)
     with pytest.raises(ValueError, match=r"run: of another run, whose seed is 0, and not 1; write to another folder$"):
