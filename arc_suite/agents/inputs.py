@@ -10,7 +10,7 @@ from arc_suite.agents.replay import Transitions
 from arc_suite.policies import network
 from arc_suite.policies.network import Layer
 from arc_suite.tasks import Task
-from arc_suite.tasks.mirrors import Symmetry
+from arc_suite.tasks.mirrors import Mirror, Symmetry
 
 
 def symmetry(task: Task) -> Symmetry | None:
@@ -72,14 +72,17 @@ class Inputs(NamedTuple):
 
     def of_batch(self, batch: Transitions) -> Transitions:
         """Return a batch of transitions with inputs in place of observations, every other transition mirrored."""
-        batch = Transitions(*(array.copy() for array in batch))
+        observations, actions, next_observations = batch.observations, batch.actions, batch.next_observations
         if self.symmetry is not None:
             mirror, mirror_action = self.symmetry
-            odd = slice(1, None, 2)
-            batch.observations[odd] = mirror(batch.observations[odd])
-            batch.actions[odd] = mirror_action(batch.actions[odd])
-            batch.next_observations[odd] = mirror(batch.next_observations[odd])
-        return batch._replace(observations=self(batch.observations), next_observations=self(batch.next_observations))
+            observations, next_observations = (
+                _every_other(mirror, observations),
+                _every_other(mirror, next_observations),
+            )
+            actions = _every_other(mirror_action, actions)
+        return batch._replace(
+            observations=self(observations), actions=actions, next_observations=self(next_observations)
+        )
 
     def exported(self, layers: Sequence[Layer]) -> tuple[Layer, ...]:
         """Return the layers of a policy that takes whole observations, from those of one that takes inputs."""
@@ -96,3 +99,10 @@ class Inputs(NamedTuple):
         whole = np.zeros((self.size, *array.shape[1:]), array.dtype)
         whole[self.columns] = array
         return whole
+
+
+def _every_other(mirror: Mirror, vectors: np.ndarray) -> np.ndarray:
+    """Return a copy of vectors (batch, ...), every other one mirrored."""
+    vectors = vectors.copy()
+    vectors[1::2] = mirror(vectors[1::2])
+    return vectors

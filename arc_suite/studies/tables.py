@@ -204,6 +204,14 @@ STUDIES = {
             *(run("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
         ),
     ),
+    # Four to six minutes of a core a run.
+    "parallel": Study(
+        "SAC from nothing in parallel environments, 100,000 steps",
+        tuple(
+            run(robot, "sac_parallel", 100_000, seed, evaluate_every=20_000)
+            for seed, robot in itertools.product(range(3), ("tick", "leaper", "queen", "bastion"))
+        ),
+    ),
     "beyond": Study(
         "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
         (
