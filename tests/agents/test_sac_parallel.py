@@ -30,12 +30,12 @@ def drawn(monkeypatch):
 
 def test_its_hyperparameters():
     hp = algorithms.ALGORITHMS[NAME].hyperparameters
-    expected = {"num_envs": 32, "utd_ratio": 0.25, "batch": 256, "learning_rate": 5e-4, "tau": 0.01, "n_step": 3}
+    expected = {"num_envs": 32, "utd_ratio": 0.375, "batch": 256, "learning_rate": 5e-4, "tau": 0.01, "n_step": 3}
     expected |= {"discount": 0.97, "reward_scale": 0.1, "initial_std": 0.3, "initial_temperature": 0.003}
     expected |= {"target_entropy": -0.6, "start_steps": 0, "prior": "none", "dropout": 0.0, "phase_updates": 0}
     expected |= {"symmetry_augmentation": True, "normalize": True, "exclude_blocks": ("contact_forces",)}
     assert {name: getattr(hp, name) for name in expected} == expected
-    assert hp.updates_of_a_step == 8
+    assert hp.updates_of_a_step == 12
 
 
 def test_learning_begins_with_little_noise_around_zero():
@@ -48,10 +48,10 @@ def test_learning_begins_with_little_noise_around_zero():
     assert float(np.exp(state.log_alpha)) == pytest.approx(0.003)
 
 
-def test_the_policy_acts_from_the_first_step_and_updates_are_a_quarter_of_the_steps(learner, drawn):
+def test_the_policy_acts_from_the_first_step_and_updates_are_rarer_than_steps(learner, drawn):
     agent = learner(NAME, {"hidden": 16, "batch": 8})
     agent.until(64)
-    assert agent.steps == 64 and agent.updates == len(drawn) == 16
+    assert agent.steps == 64 and agent.updates == len(drawn) == 24
     assert all(with_policy for _, with_policy in drawn)
     assert 0.2 < np.arctanh(agent.buffer.at(np.arange(32)).actions).std() < 0.4
 
