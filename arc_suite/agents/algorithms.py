@@ -79,8 +79,8 @@ _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 
 
-def _off_policy(hyperparameters: SoftActorCritic, summary: str, steps: int = 1_000_000) -> Algorithm:
-    return Algorithm("arc_suite.agents.off_policy", hyperparameters, summary, steps=steps, extends=True)
+def _off_policy(hyperparameters: SoftActorCritic, summary: str, **defaults) -> Algorithm:
+    return Algorithm("arc_suite.agents.off_policy", hyperparameters, summary, extends=True, **defaults)
 
 
 # The paper's six, as in its published code, and others: docs/agents.md.
@@ -125,6 +125,7 @@ ALGORITHMS = {
             exclude_blocks=("contact_forces",),
         ),
         "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
+        evaluate_every=20_000,
         steps=100_000,
     ),
     # Noise falls over the length of a run: on rough ground a million steps end below standing still.

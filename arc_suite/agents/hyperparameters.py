@@ -88,10 +88,11 @@ class SoftActorCritic:
         checks.number("last_gain", self.last_gain, 0.0, 1e3)
         checks.number("target_entropy", self.target_entropy, -100.0, 100.0)
         checks.number("utd_ratio", self.utd_ratio, 0.0, 1e3)
-        if not self.updates_of_a_step or self.updates_of_a_step != self.num_envs * self.utd_ratio:
+        whole = self.utd_ratio if self.utd_ratio > 1.0 else self.num_envs * self.utd_ratio
+        if not whole or whole != round(whole):
             raise ValueError(
-                f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, "
-                f"got {self.utd_ratio!r} of each"
+                f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
+                f"it is above 1, got {self.utd_ratio!r}"
             )
         checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")

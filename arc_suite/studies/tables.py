@@ -208,7 +208,7 @@ STUDIES = {
     "parallel": Study(
         "SAC from nothing in parallel environments, 100,000 steps",
         tuple(
-            run(robot, "sac_parallel", 100_000, seed, evaluate_every=20_000)
+            run(robot, "sac_parallel", 100_000, seed)
             for seed, robot in itertools.product(range(3), ("tick", "leaper", "queen", "bastion"))
         ),
     ),

@@ -99,7 +99,8 @@ def test_phases_and_prior_data_go_with_it(learner, prior, drawn):
 @pytest.mark.parametrize(
     ("changes", "line"),
     [
-        ({"utd_ratio": 0.3}, r"^utd_ratio: expected a whole number of updates when 32 environments step, got 0\.3 of"),
+        ({"utd_ratio": 0.3}, r"^utd_ratio: expected a whole number of updates when 32 environments step, of each "),
+        ({"utd_ratio": 1.5}, r"^utd_ratio: .* of each if it is above 1, got 1\.5$"),
         ({"utd_ratio": 0.0}, r"^utd_ratio: expected a whole number of updates"),
         ({"exclude_blocks": "contact_forces"}, r"^hyperparameter exclude_blocks: expected tuple like \('contact_fo"),
         ({"exclude_blocks": [3]}, r"^exclude_blocks: expected names of blocks, got \(3,\)$"),
