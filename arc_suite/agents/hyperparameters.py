@@ -30,7 +30,7 @@ class SoftActorCritic:
             updates do not wait.
         reward_scale: factor of rewards.
         initial_std: standard deviation of actions at the start, before the tanh.
-        last_gain: factor of the first weights of the policy's last layers.
+        last_gain: factor of the initial weights of the policy's last layers.
         initial_temperature: weight of the entropy at the start.
         target_entropy: of a joint, which the temperature follows.
         symmetry_augmentation: whether every other transition of a batch is mirrored, for symmetric bodies.
