@@ -59,6 +59,8 @@ check: lint $(INSTALLED)
 lint: $(VENV)/linter
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(VENV)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 
 $(VENV)/demo: setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)
