@@ -145,7 +145,7 @@ def lock(file: IO) -> bool:
             here = file.tell()
             file.seek(_FAR)
             try:
-                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]  # of Windows
             finally:
                 file.seek(here)
     except (BlockingIOError, PermissionError):

@@ -11,7 +11,7 @@ from arc_suite.tasks import Task
 _NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
 
 
-class Lock(type(threading.RLock())):
+class Lock(type(threading.RLock())):  # type: ignore[misc]  # the class has no name
     """The lock of one environment, as MuJoCo crashes where two threads step one simulation.
 
     Its pickles and copies are new locks, which nobody holds.

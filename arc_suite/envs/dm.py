@@ -2,6 +2,7 @@
 
 import collections
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,6 +17,7 @@ from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thre
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
 
@@ -30,7 +32,13 @@ _FIXED = {
 }
 
 
-def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
+def load(
+    domain_name: str | os.PathLike | Body,
+    task_name: str,
+    task_kwargs: Mapping[str, Any] | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
+    visualize_reward: bool = False,
+) -> "Environment":
     """Open an environment, as `dm_control.suite.load` does.
 
     Args:

@@ -16,6 +16,7 @@ from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thre
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
 from arc_suite.tasks import Task, terms
@@ -79,7 +80,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def __init__(
         self,
-        domain_name: str,
+        domain_name: str | os.PathLike | Body,
         task_name: str,
         num_envs: int = 1,
         num_threads: int | None = None,
@@ -94,7 +95,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Load the task and allocate the environments.
 
         Args:
-            domain_name: a robot; see `arc_suite.load`.
+            domain_name: a robot or another body; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
             num_envs: number of environments.
             num_threads: on which to simulate; None for as many as this process has cores.
@@ -152,7 +153,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
-        self._picture = {
+        self._picture: dict[str, Any] = {
             "width": width,
             "height": height,
             "camera_id": camera_id,
@@ -346,7 +347,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Free the simulations; `close` calls it."""
         self.batch = None
 
-    @property
+    @property  # type: ignore[misc]  # of Gymnasium, which can be set and is of one environment
     def np_random(self) -> tuple[np.random.Generator, ...]:
         """Draw, for each environment, from the stream that its resets draw from."""
         return tuple(np.random.Generator(random._bit_generator) for random in self._randoms)
@@ -411,7 +412,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     def _begin(self, mask: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""
         task, starts = self._task, []
-        for index in np.flatnonzero(mask):
+        for index in np.flatnonzero(mask).tolist():
             if not self._streams_begin[index]:
                 self._streams[index] = task.stream_state(trees.at(self._memory, index))
             starts.append(task.start(self._randoms[index], self._streams[index]))
@@ -454,7 +455,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments, except those whose seed is None."""
-        for index in np.flatnonzero(mask):
+        for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
                 self._randoms[index], self._streams[index] = np.random.RandomState(seeds[index]), self._task.first()
                 self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
@@ -500,6 +501,6 @@ def _marked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
 def _by_environment(observations: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Observations of some environments in an array of objects, with None for the others."""
     objects = np.full(len(observations), None, dtype=object)
-    for index in np.flatnonzero(mask):
+    for index in np.flatnonzero(mask).tolist():
         objects[index] = observations[index].copy()
     return objects

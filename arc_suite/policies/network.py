@@ -13,7 +13,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -137,7 +137,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
     """
     kinds = [layer.kind for layer in network.layers]
     known = network.setup.to_dict() | {"blocks": dict(network.blocks), "layers": kinds}
-    arrays = {
+    arrays: dict[str, Any] = {
         f"{index}.{place}": array
         for index, layer in enumerate(network.layers)
         for place, array in enumerate(layer.arrays)
