@@ -23,7 +23,7 @@ def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
         compliance += environment.task.terms["gait_bonus"]
     assert third.length == 40
     assert third.total == pytest.approx(total)
-    assert third.progress.keys() == {"speed", "gait_compliance"}
+    assert third.progress.keys() == {"speed", "gait_compliance", "cost_of_transport"}
     assert third.progress["gait_compliance"] == pytest.approx(compliance / 40)
     assert third.progress["speed"] == pytest.approx((environment.physics.data.xpos[1, 0] - start) / 2.0)
 
@@ -48,7 +48,7 @@ def test_policies_get_named_rows_and_the_reward_of_the_step_before():
     assert policy.begun == [([0], [4])]
     np.testing.assert_array_equal(policy.rewards, [[0.0], *([step.reward] for step in steps[1:-1])])
     episode = evaluation.run(environment, policy, seed=4)
-    assert episode.progress.keys() == {"tracking", "fell", "gait_compliance"}
+    assert episode.progress.keys() == {"tracking", "fell", "gait_compliance", "cost_of_transport"}
     assert episode.total == sum(step.reward for step in steps[1:])
 
 
