@@ -20,6 +20,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
 _CHUNK = 256  # control steps that are drawn at once
+_PACKAGED = Path(__file__).with_name("packaged")
 
 
 def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -45,8 +46,17 @@ def _random(body: Body, presets: Sequence[str], num_envs: int, task: Task | None
     return Script(draw, num_envs, joints)
 
 
+def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
+    """A trained policy that comes with the package; `policies.json` holds its command, hash and return."""
+    path = _PACKAGED / f"{body.name}-{task.name if task else 'walk'}{network.EXTENSION}"
+    if not (is_robot(body) and path.is_file()):
+        there = ", ".join(sorted(each.stem for each in _PACKAGED.glob(f"*{network.EXTENSION}")))
+        raise ValueError(f"policy ppo: none for {path.stem} (there are: {there}); arc-suite train makes others")
+    return _from_file(path, body, task)
+
+
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
-POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
+POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
@@ -68,10 +78,11 @@ def policy(
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
-            episode's seed; the path of a run's folder, of a policy file (.npz), see `network`, or of a
-            folder of checkpoints, which take turns from seed to seed, see `checkpoints`; that of a zip of
-            stable-baselines3, see `zips`; or `module:attribute`, a function on Python's path that makes
-            a function from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
+            episode's seed; ppo, a trained policy that comes with the package; the path of a run's folder, of a
+            policy file (.npz), see `network`, or of a folder of checkpoints, which take turns from seed to seed,
+            see `checkpoints`; that of a zip of stable-baselines3, see `zips`; or `module:attribute`, a function on
+            Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a
+            body that is none.
         robot: queen, bastion, tick or leaper, or any body.
         presets: of the demonstrator, a name or several that take turns from seed to seed; see `cpg.Demonstrator`.
         num_envs: number of environments.
