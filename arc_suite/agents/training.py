@@ -52,6 +52,7 @@ def train(
     record, definition, setup = configuration.record(), configuration.definition, configuration.setup
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.digest(configuration.prior)
+    evaluation.check_ends(setup.definition.step_limit)
     module = definition.module
     with run_folder.opened(folder, record) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress

@@ -7,6 +7,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.tasks import Task
+from arc_suite.tasks.parameters import LARGEST
 
 _NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
 
@@ -71,14 +72,14 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
     """Return the value of a live command as floats, (*leading, size); None stands for what the task itself would do.
 
     Raises:
-        ValueError: the task has no such command, or the value has another size.
+        ValueError: the task has no such command, or the value has another size or is out of range.
     """
     if not task.commands:
         raise ValueError(f"command {name!r}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     numbers = np.full(size, np.nan) if value is None else _real(value)
-    if numbers is None or numbers.shape not in ((size,), (*leading, size)) or np.isinf(numbers).any():
-        raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
+    if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
+        raise ValueError(f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {value!r}")
     return np.broadcast_to(numbers, (*leading, size)).copy()
 
 

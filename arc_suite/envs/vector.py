@@ -74,6 +74,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         arguments: robot, task and its settings, as `Setup.of` takes them.
         autoreset_mode: what happens to an environment whose episode has ended.
         batch: the simulations. Writing their state is for experiments.
+        step_limit: control steps after which every episode is over, may be infinite.
         task: what the environments do; its `split` gives an observation's blocks by name.
     """
 
@@ -128,9 +129,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.arguments = domain_name, task_name, task_kwargs
         self._task, model = prepared(*self.arguments)
         pictures.check_camera(model, camera_id)
-        self._step_limit = (
-            np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
-        )
+        self.step_limit = self._task.step_limit
+        if max_episode_steps is not None:
+            self.step_limit = min(self.step_limit, checks.integer("max_episode_steps", max_episode_steps, 1))
 
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
@@ -231,7 +232,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         failed, cut = task.ended(memory, readings)
         time_is_up = self._steps >= task.step_limit
         terminated = stepping & (diverged | failed) & ~time_is_up
-        truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self._step_limit))
+        truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self.step_limit))
         self._ended = waiting | terminated | truncated
 
         info = {}

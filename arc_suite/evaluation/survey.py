@@ -14,6 +14,7 @@ from tqdm import tqdm
 from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import protocol
 from arc_suite.models.sizing import GRAVITY
 
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
@@ -84,8 +85,12 @@ def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
 
     Returns:
         The environment as the walk left it, and the walk.
+
+    Raises:
+        ValueError: a walk that need not end, or a setting that does not fit.
     """
     environment = trial.setup.load(trial.seed)
+    protocol.check_ends(environment.task.definition.step_limit)
     demonstrator = Demonstrator(environment, "medium" if trial.froude is None else trial.froude)
     data = environment.physics.data.ptr
     shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in trial.setup.body.torso.solids]

@@ -88,6 +88,7 @@ def test_json_is_refused_before_the_work_starts():
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
         (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
         (["--episode=3"], "Unknown command line flag 'episode'. Did you mean: episodes ?"),
+        (["--set=time_limit=Infinity"], "time_limit: expected a finite number, as every episode must end, got inf"),
         (["queen"], "unexpected argument 'queen'; see --help"),
     ],
 )

@@ -28,6 +28,7 @@ BLOCKS = "observation: expected blocks posture and velocities by name, as `split
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
 FINITE = "expected a finite number from"
+COMMAND = "command 'command': expected 3 numbers from -1e+06 to 1e+06, got"
 
 
 class World:
@@ -107,15 +108,10 @@ CASES = [
         lambda w: w.steer.command("comand", None),
         "unknown command 'comand'; did you mean 'command'? (there are: command)",
     ),
-    (lambda w: w.steer.command("command", [0.5]), "command 'command': expected 3 finite numbers, got [0.5]"),
-    (
-        lambda w: w.steer.command("command", [0, 0, np.inf]),
-        "command 'command': expected 3 finite numbers, got [0, 0, inf]",
-    ),
-    (
-        lambda w: w.steer.command("command", ["1", "0", "0"]),
-        "command 'command': expected 3 finite numbers, got ['1', '0', '0']",
-    ),
+    (lambda w: w.steer.command("command", [0.5]), f"{COMMAND} [0.5]"),
+    (lambda w: w.steer.command("command", [0, 0, np.inf]), f"{COMMAND} [0, 0, inf]"),
+    (lambda w: w.steer.command("command", [1e308, 0, 0]), f"{COMMAND} [1e+308, 0, 0]"),
+    (lambda w: w.steer.command("command", ["1", "0", "0"]), f"{COMMAND} ['1', '0', '0']"),
     # Seeds.
     (lambda w: w.env.reset(seed=[1]), f"{SEED} [1]"),
     (lambda w: w.env.reset(seed=np.array([1, 2])), f"{SEED} array([1, 2])"),
