@@ -20,6 +20,7 @@ from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
 from arc_suite.tasks import Task, terms
 
+_MOST_ENVS, _MOST_THREADS = 1 << 20, 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
 _OF_EACH = ("np_random", "np_random_seed", "render")  # attributes that have a value for each environment
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
@@ -114,7 +115,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ValueError: an unknown name, or a value that does not fit.
         """
         self._lock, self.batch = Lock(), None  # first, as Gymnasium closes also what could not be made
-        task_kwargs = dict(task_kwargs or {})
+        task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of many environments")
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
@@ -122,9 +123,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.autoreset_mode = AutoresetMode(checks.name(mode, modes, "autoreset_mode"))
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
-        self.num_envs = checks.integer("num_envs", num_envs, 1)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         pictures.check_size(height, width)
-        threads = usable_cores() if num_threads is None else checks.integer("num_threads", num_threads, 1)
+        threads = usable_cores() if num_threads is None else num_threads
+        threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
         self._task, model = prepared(*self.arguments)
@@ -183,7 +185,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
-        mask = self._mask((options or {}).get("reset_mask"))
+        mask = self._mask(checks.mapping("options", options).get("reset_mask"))
         if self._memory is None and not mask.all():
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:

@@ -409,8 +409,8 @@ def test_calls_at_the_wrong_time():
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        ({"num_envs": 0}, "num_envs: expected an integer from 1, got 0"),
-        ({"num_threads": 1.5}, "num_threads: expected an integer from 1, got 1.5"),
+        ({"num_envs": 0}, "num_envs: expected an integer from 1 to 1048576, got 0"),
+        ({"num_threads": 1.5}, "num_threads: expected an integer from 1 to 1024, got 1.5"),
         (
             {"autoreset_mode": "samestep"},
             "unknown autoreset_mode 'samestep'; did you mean 'SameStep'? (there are: NextStep, SameStep, Disabled)",
