@@ -19,7 +19,16 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, made_body, policy_name, setups
+from arc_suite.cli.flags import (
+    MOST,
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_task,
+    made_body,
+    policy_name,
+    setups,
+)
 from arc_suite.cli.program import progress
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
@@ -39,7 +48,7 @@ flags.DEFINE_enum(
 )
 flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
-flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1)
+flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", 1, MOST)
 flags.DEFINE_integer(
     "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
 )
@@ -74,7 +83,7 @@ def main() -> None:
     policy, label = chosen()
     for setup in asked.values():
         settings = data.Settings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
-        dataset_id = FLAGS.id or settings.dataset_id(label)
+        dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id
         missing = data.collect(
             dataset_id,
             settings,

@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from absl import flags
 
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, policy_name, setups
+from arc_suite.cli.flags import MOST, ROBOT_HELP, define_body, define_policy, define_task, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.evaluation import entries
 
@@ -25,7 +25,7 @@ define_task()
 _ROBOT = flags.DEFINE_string("robot", "all", f"{ROBOT_HELP}, or all.")
 define_policy()
 flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", 1, MOST)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 

@@ -15,6 +15,7 @@ from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
 
+MOST = 100_000  # episodes, or bodies: more than anyone waits for
 ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
 
 

@@ -57,7 +57,8 @@ def main() -> None:
     """Play the episodes, write the file and print the returns."""
     walkers = bodies(_ROBOT)
     task_name, task_kwargs = task()
-    camera = checks.name(FLAGS.camera or ("profile" if len(walkers) == 1 else "portrait"), CAMERAS, "camera")
+    usual = "profile" if len(walkers) == 1 else "portrait"
+    camera = checks.name(usual if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
     environments = {
         name: arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed}) for name, body in walkers.items()
     }

@@ -36,13 +36,13 @@ def expert_return(setup: Setup) -> float | None:
     return DEMONSTRATORS.get(setup.body.name) if published else None
 
 
-def check_ends(step_limit: float) -> None:
-    """Check that episodes end, given the control steps of the longest.
+def check_ends(limit: float) -> None:
+    """Check that episodes end, given the longest duration, in control steps or s.
 
     Raises:
         ValueError: they need not.
     """
-    if step_limit == math.inf:
+    if limit == math.inf:
         raise ValueError("time_limit: expected a finite number, as every episode must end, got inf")
 
 

@@ -64,6 +64,15 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
             "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between and a "
             "version at the end alone, such as 'arc_suite/queen/mine-v0'",
         ),
+        (
+            ["--episodes=4294967296"],
+            "flag --episodes=4294967296: 4294967296 is not an integer in the range [1, 100000]",
+        ),
+        (
+            ["--id="],
+            "dataset id '': expected names of letters, digits, '-' and '_' with '/' between and a version at the end "
+            "alone, such as 'arc_suite/queen/walk/cpg-medium-v0'",
+        ),
         (["--noise=-1"], "flag --noise=-1: -1.0 is not a non-negative number"),
         (["queen"], "unexpected argument 'queen'; see --help"),
     ],

@@ -198,7 +198,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
         ([f"--output={SPIDER}"], f"cannot make folder {SPIDER}: file exists"),
-        (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
+        (["--episodes=0"], "flag --episodes=0: 0 is not an integer in the range [1, 100000]"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):
