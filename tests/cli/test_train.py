@@ -46,6 +46,7 @@ def one_line(done, line):
             ["--set=time_limit=Infinity"],
             "arc-suite train: time_limit: expected a finite number, as every",
         ),
+        (["--minutes=nan"], "arc-suite train: minutes: expected a finite number of at least 0, got nan"),
         (["--task=wlak"], "arc-suite train: unknown task 'wlak'; did you mean 'walk'?"),
     ],
 )
