@@ -62,7 +62,8 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         (
             ["--id=arc_suite/queen/mine"],
             "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between, two "
-            "characters at least before the last '/', and a version at the end alone, such as 'arc_suite/queen/mine-v0'",
+            "characters at least before the last '/', and a version at the end alone, such as "
+            "'arc_suite/queen/mine-v0'",
         ),
         (
             ["--episodes=4294967296"],
