@@ -1,11 +1,13 @@
-"""Checks of calls of an environment: one thread at a time, actions and live commands that fit."""
+"""Calls of an environment: one thread at a time, actions and live commands that fit, and commands of any thread."""
 
 import functools
 import threading
+from typing import Any
 
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.envs import trees
 from arc_suite.tasks import Task
 from arc_suite.tasks.parameters import LARGEST
 
@@ -42,6 +44,42 @@ def one_thread_at_a_time(method):
             lock.release()
 
     return alone
+
+
+class LiveCommands:
+    """The latest value of each live command that no step has taken yet; any thread may put one at any time.
+
+    Pickles and copies hold the same values.
+    """
+
+    def __init__(self, task: Task):
+        """Start without any."""
+        self._task = task
+        self._lock, self._latest = Lock(), {}  # the latter is replaced, never changed
+
+    def put(self, name: str, value: np.ndarray, mask: np.ndarray | None = None) -> None:
+        """Add a checked value, in a batch for the environments of a mask (num_envs,)."""
+        with self._lock:
+            if mask is not None and name in self._latest:
+                before, others = self._latest[name]
+                value, mask = np.where(mask[:, None], value, before), mask | others
+            self._latest = {**self._latest, name: (value, mask)}
+
+    def seen(self, memory) -> Any:
+        """Return the memory of an episode as the next step will find it."""
+        return self._commanded(memory, self._latest)
+
+    def taken(self, memory) -> Any:
+        """Return the memory of an episode after the commands, which are gone then."""
+        with self._lock:
+            latest, self._latest = self._latest, {}
+        return self._commanded(memory, latest)
+
+    def _commanded(self, memory, latest) -> Any:
+        for name, (value, mask) in latest.items():
+            changed = self._task.commanded(memory, name, value)
+            memory = changed if mask is None else trees.chosen(mask, changed, memory)
+        return memory
 
 
 def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:

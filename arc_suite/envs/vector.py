@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
 from arc_suite.envs import snapshots, trees
-from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.calls import LiveCommands, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
@@ -66,7 +66,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     well the episodes have gone so far, such as `progress_speed`: (num_envs,) floats, with
     the mask of the environments that have them under the same name after an underscore.
 
-    Pickles and copies carry on bit for bit. While one thread is in a call, another's is refused.
+    Pickles and copies carry on bit for bit. While one thread is in a call, another's is refused, except `command`.
 
     Where the physics of an environment diverges, its episode is terminated with reward 0 and `info` has
     `diverged`; the others notice nothing.
@@ -139,6 +139,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.task = VectorTask(self)
         self._terms = {}  # of the latest step
         self._memory = None  # of all environments, with a leading axis
+        self._commands = LiveCommands(self._task)
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
         self._streams = [self._task.first() for _ in range(self.num_envs)]
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
@@ -190,6 +191,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:
             self._seed(self._seeds(seed), mask)
+        self._take_commands()
         self._begin(mask, self._observation)
         return self._observation.copy(), {}
 
@@ -214,6 +216,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("step")
         if self._memory is None:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
+        self._take_commands()
         task, before, data = self._task, self._memory, self.batch.data
         waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
         stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
@@ -223,7 +226,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             data.qvel[stepping] += inputs.kick[stepping]
         diverged = self.batch.step(SUBSTEPS, stepping)
         readings = task.read(data)
-        self._memory = memory = _chosen(stepping, task.after(memory, readings), before)
+        self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)
         self._steps += 1
 
         self._terms = earned = task.terms(memory, readings)
@@ -249,9 +252,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
-    @one_thread_at_a_time
     def command(self, name: str, value, mask=None) -> None:
-        """Set a command of the task in some environments from now on, until their next episodes.
+        """Set a command of the task in some environments from the next step on, until their next episodes.
+
+        Any thread may call it while another is in a step, which goes on with the command before.
 
         Args:
             name: one of the task's `commands`.
@@ -268,7 +272,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         mask, value = self._mask(mask, "mask"), checked_command(self._task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
-        self._memory = _chosen(mask, self._task.commanded(self._memory, name, value), self._memory)
+        self._commands.put(name, value, mask)
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:
@@ -295,6 +299,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("take a snapshot")
         if self._memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
+        self._take_commands()
         return snapshots.taken(self)
 
     @one_thread_at_a_time
@@ -308,6 +313,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("restore")
         if self._memory is None:
             self._begin(np.ones(self.num_envs, bool), self._observation)
+        self._take_commands()
         snapshots.put(self, arrays)
 
     @one_thread_at_a_time
@@ -329,6 +335,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("render")
         if self.render_mode is None:
             return None
+        self._take_commands()
         every = range(self.num_envs)
         indices = every if indices is None else list(indices)
         for index in indices:
@@ -399,6 +406,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
             raise ValueError(f"set_attr {name!r}: environments share it; expected one value for all, got {values!r}")
         setattr(self, name, values[0])
+
+    def _take_commands(self) -> None:
+        self._memory = self._commands.taken(self._memory)
 
     def _check_open(self, call: str) -> None:
         if self.closed:
@@ -475,13 +485,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 def usable_cores() -> int:
     """Return how many cores this process may use, where the system tells; else how many there are."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-
-
-def _chosen(mask: np.ndarray, there, elsewhere):
-    """A memory that is one in some environments, (num_envs,) booleans, and another in the others."""
-    if mask.all():
-        return there
-    return trees.mapped(lambda new, old: np.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
 
 
 def _scattered(mask: np.ndarray, some, memory):

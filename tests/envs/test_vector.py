@@ -230,6 +230,7 @@ def test_calls_and_attributes_of_rows_are_those_of_single_environments():
     steer = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=2)
     steer.reset(seed=0)
     assert steer.call("command", "command", [1.0, 0.0, 0.5]) == (None, None)
+    steer.step(np.zeros((2, 18)))
     assert_array_equal(steer._memory.command.live, [[1.0, 0.0, 0.5]] * 2)
 
 

@@ -127,6 +127,16 @@ def test_live_commands_of_rows_are_those_of_single_environments():
     envs.close()
 
 
+def test_live_commands_of_rows_add_up_between_two_steps():
+    envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
+    envs.reset(seed=5)
+    for value, mask in ((0.25, [True, True, False]), (0.5, [False, True, True])):
+        envs.command("command", (value, 0.0, 0.0), mask=np.array(mask))
+    blocks = envs.task.split(envs.step(np.zeros(envs.action_space.shape))[0])
+    assert_array_equal(blocks["command"][:, :3], [[0.25, 0, 0], [0.5, 0, 0], [0.5, 0, 0]])
+    envs.close()
+
+
 @pytest.mark.parametrize(
     ("task", "name", "value", "message"),
     [
