@@ -30,6 +30,7 @@ from arc_suite.cli.flags import (
     setups,
 )
 from arc_suite.cli.program import progress
+from arc_suite.cpg import suited_preset
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
@@ -46,7 +47,11 @@ flags.DEFINE_enum(
     "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of the "
     "best one's return; expert, the latest; replay, all checkpoints in turn.",
 )
-flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
+flags.DEFINE_list(
+    "preset",
+    None,
+    f"{policies.PRESET_HELP} Several with commas take turns. [default: the one that suits the task and the body]",
+)
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
 flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", 1, MOST)
 flags.DEFINE_integer(
@@ -78,11 +83,14 @@ def main() -> None:
         return
     if FLAGS.id is not None and len(asked) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(asked)}")
-    presets = tuple(checks.name(preset, policies.preset_names(), "preset") for preset in FLAGS.preset)
-    presets = presets if FLAGS.policy == "cpg" else ()
+    for name in FLAGS.preset or ():
+        checks.name(name, policies.preset_names(), "preset")
     policy, label = chosen()
     for setup in asked.values():
-        settings = data.Settings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
+        presets = FLAGS.preset if FLAGS.policy == "cpg" else ()
+        if presets is None:
+            presets = [suited_preset(setup.definition)]
+        settings = data.Settings(setup, policy, tuple(presets), FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id
         missing = data.collect(
             dataset_id,

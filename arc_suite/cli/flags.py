@@ -50,6 +50,11 @@ def define_policy(text: str = policies.HELP) -> None:
     define_vecnormalize()
 
 
+def define_preset() -> None:
+    """Define --preset, for programs that take the demonstrator."""
+    flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: the one that suits the task and the body]")
+
+
 def define_vecnormalize() -> None:
     """Define --vecnormalize, for programs that take a zip of stable-baselines3."""
     flags.DEFINE_string(

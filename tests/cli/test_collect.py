@@ -10,7 +10,7 @@ import pytest
 from arc_suite import data
 from arc_suite.robots import ROBOTS
 
-ID = "arc_suite/queen/walk/cpg-medium-20steps-v0"
+ID = "arc_suite/queen/walk/cpg-refined-20steps-v0"
 
 
 @pytest.fixture(autouse=True)
