@@ -21,7 +21,6 @@ from absl import flags
 
 import arc_suite
 from arc_suite import checks, files, style
-from arc_suite.cli import films
 from arc_suite.cli.flags import (
     ROBOT_HELP,
     bodies,
@@ -33,7 +32,7 @@ from arc_suite.cli.flags import (
     task,
 )
 from arc_suite.cli.program import progress
-from arc_suite.export import pages
+from arc_suite.export import films, pages
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.policies import Policy, alone, policy

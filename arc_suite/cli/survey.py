@@ -15,11 +15,11 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.cli import films
 from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import survey
+from arc_suite.export import films
 from arc_suite.robots import generator
 
 FLAGS = flags.FLAGS

@@ -11,7 +11,7 @@ from PIL import Image
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite.cli import films
+from arc_suite.export import films
 from arc_suite.models.sizing import control_timestep
 from arc_suite.policies import alone, policy
 from arc_suite.robots import ROBOTS, generator
