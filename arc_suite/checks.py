@@ -95,9 +95,13 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
         ValueError: it is no finite number, or out of range.
     """
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not real or not math.isfinite(value) or not low <= value <= high:
+    try:
+        found = float(value) if real else math.nan
+    except OverflowError:  # of a large integer
+        found = math.inf
+    if not math.isfinite(found) or not low <= found <= high:
         raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {value!r}")
-    return float(value)
+    return found
 
 
 def boolean(what: str, value: Any) -> bool:

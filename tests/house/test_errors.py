@@ -28,6 +28,7 @@ BLOCKS = "observation: expected blocks posture and velocities by name, as `split
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
 FINITE = "expected a finite number"
+POSITIVE = "expected a number above 0, at most 1e+06"
 COMMAND = "command 'command': expected 3 numbers from -1e+06 to 1e+06, got"
 
 
@@ -209,8 +210,14 @@ CASES = [
     ),
     (lambda w: arc_suite.load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
     # Keyword arguments.
-    (walk(time_limit=0), f"time_limit: {FINITE} above 0, got 0"),
-    (walk(time_limit=float("nan")), f"time_limit: {FINITE} above 0, got nan"),
+    (walk(time_limit=0), f"time_limit: {POSITIVE}, got 0"),
+    (walk(time_limit=1e308), f"time_limit: {POSITIVE}, got 1e+308"),
+    (walk(target_velocity=10**400), f"target_velocity: expected a number from -1e+06 to 1e+06, got {10**400}"),
+    (
+        lambda w: policies.policy("zero", "queen", noise=10**400),
+        f"noise: expected a finite number of at least 0, got {10**400}",
+    ),
+    (walk(time_limit=float("nan")), f"time_limit: {POSITIVE}, got nan"),
     (walk(target_velocity=True), "target_velocity: expected a number from -1e+06 to 1e+06, got True"),
     (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),
     (walk(phase_offsets=None), "phase_offsets: expected one finite number or 6 of them, got None"),
