@@ -125,7 +125,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             checks.name(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         pictures.check_size(height, width)
-        threads = usable_cores() if num_threads is None else num_threads
+        threads = min(usable_cores(), _MOST_THREADS) if num_threads is None else num_threads
         threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
