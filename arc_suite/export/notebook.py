@@ -3,9 +3,9 @@
 import base64
 import contextlib
 import dataclasses
-import html
 import io
 from collections.abc import Callable
+from xml.etree import ElementTree
 
 from arc_suite import checks, policies, style
 from arc_suite.envs.dm import Environment
@@ -67,8 +67,8 @@ def show(
         return Inline(_film(played, actor, seed, steps))
     pages.viewer()  # finds out at once whether there is one
     track = style.record(played, actor, seed, steps)
-    page = html.escape(pages.page({f"{setup.body.name}, {name}": track}))
-    return Inline(f'<iframe srcdoc="{page}" width="100%" height="{_HEIGHT}" style="border: 0"></iframe>')
+    page = pages.page({f"{setup.body.name}, {name}": track})
+    return Inline(_element("iframe", srcdoc=page, width="100%", height=str(_HEIGHT), style="border: 0"))
 
 
 def _setup(environment) -> Setup:
@@ -104,4 +104,8 @@ def _film(environment: Environment, policy: Policy, seed: int, steps: int) -> st
             frames.append(footage.view())
         films.write_gif(file, frames, stride * footage.control_timestep)
     source = f"data:image/gif;base64,{base64.b64encode(file.getvalue()).decode()}"
-    return f'<img src="{source}" width="{_SIZE[0]}" height="{_SIZE[1]}" alt="{body}">'
+    return _element("img", src=source, width=str(_SIZE[0]), height=str(_SIZE[1]), alt=body)
+
+
+def _element(tag: str, **attributes: str) -> str:
+    return ElementTree.tostring(ElementTree.Element(tag, attributes), encoding="unicode", method="html")
