@@ -178,6 +178,10 @@ class TaskRun(TaskView, control.Task):
         """The memory of the present episode."""
         return self._commands.seen(self._memory)
 
+    @memory.setter
+    def memory(self, value: Any):
+        self._memory = value
+
     @property
     def progress(self) -> dict[str, float]:
         """How well the episode has gone so far, figures by name."""
