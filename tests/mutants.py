@@ -175,8 +175,14 @@ MUTANTS = (
     ),
     Mutant(
         "a command for all rows",
-        "_chosen(mask, self._task.commanded(self._memory, name, value), self._memory)",
-        "self.task.commanded(self._memory, name, value)",
+        "memory = changed if mask is None else trees.chosen(mask, changed, memory)",
+        "memory = changed",
+    ),
+    Mutant("commands of rows replace one another", "value, mask = np.where(mask[:, None], value, before)", "mask"),
+    Mutant(
+        "a copy resets the shared model",
+        "        if share_model:\n            self._shared",
+        "        if False:\n            self._shared",
     ),
     Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
     Mutant("two threads in one environment", "not lock.acquire(False)", "False"),

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import checks, versions
-from arc_suite.cpg import Demonstrator
+from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, zips
 from arc_suite.policies.network import Network
@@ -69,7 +70,7 @@ PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the rob
 def policy(
     name: str,
     robot: str | Body,
-    presets: str | Sequence[str] = "medium",
+    presets: str | Sequence[str] | None = "medium",
     num_envs: int = 1,
     noise: float = 0.0,
     task: Task | None = None,
@@ -84,7 +85,8 @@ def policy(
             Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a
             body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        presets: of the demonstrator, a name or several that take turns from seed to seed; see `cpg.Demonstrator`.
+        presets: of the demonstrator, a name or several that take turns from seed to seed, see `cpg.Demonstrator`; None
+            for the one that suits the task and the body.
         num_envs: number of environments.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
         task: that it is to act in. The demonstrator is fitted to it, and gives positions in place of torques
@@ -94,11 +96,13 @@ def policy(
         ValueError: an unknown name, or a value out of range.
         OSError: a file that cannot be read.
     """
+    body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
+    if presets is None:
+        presets = suited_preset(task or prepared(body, "walk")[0]) if name == "cpg" else ()
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
         checks.name(preset, preset_names(), "preset")
     checks.number("noise", noise, 0.0)
-    body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
         turns = network.checkpoint_files(Path(name))
         several = [_from_file(path, body, task) for path in turns or [Path(name)]]

@@ -1,11 +1,13 @@
 """The evaluation protocol: seeded episodes and their figures."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from returns import RETURNS
 
 import arc_suite
-from arc_suite import evaluation
+from arc_suite import evaluation, policies
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import generator
@@ -63,6 +65,22 @@ def test_returns_of_the_papers_demonstrators():
 def test_the_protocol_is_ten_episodes():
     environment = arc_suite.load("tick", "walk", {"time_limit": 0.1})
     assert len(evaluation.episodes(environment, Demonstrator("tick"))) == 10
+
+
+def test_episodes_that_need_not_end_are_one_line():
+    setup, line = (
+        Setup.of("tick", "walk", {"time_limit": np.inf}),
+        r"^time_limit: expected a finite number, ",
+    )
+    environment = setup.load()
+    with pytest.raises(ValueError, match=line):
+        evaluation.episodes(environment, Demonstrator("tick"))
+    assert len(list(evaluation.rollout(environment, Demonstrator("tick"), seed=0, max_steps=3))) == 4
+    zero = policies.policy("zero", "tick", num_envs=2)
+    with contextlib.closing(setup.make_vec(2)) as endless, pytest.raises(ValueError, match=line):
+        evaluation.episodes_in_batch(endless, zero, range(2))
+    with contextlib.closing(setup.make_vec(2, max_episode_steps=3, autoreset_mode="Disabled")) as cut:
+        assert [episode.length for episode in evaluation.episodes_in_batch(cut, zero, range(2))] == [3, 3]
 
 
 def test_rollouts_stop_early():

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import IO
 
 import imageio.v2 as imageio
 import numpy as np
@@ -149,11 +150,11 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
             writer.append_data(frame)
 
 
-def write_gif(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
+def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:
     """Write a film that plays forever; one palette for all frames, undithered, keeps it small and calm.
 
     Args:
-        path: of the file.
+        path: of the file, or an open one.
         frames: (height, width, 3) uint8.
         seconds: that a frame lasts; the format counts in hundredths, so single frames are off by less than one.
     """
@@ -164,7 +165,7 @@ def write_gif(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     first, *others = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     ends = [round(100.0 * seconds * count) for count in range(len(frames) + 1)]
     durations = [10 * (end - start) for start, end in zip(ends, ends[1:], strict=False)]  # ms
-    first.save(path, save_all=True, append_images=others, duration=durations, loop=0)
+    first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
 
 
 _GIF_COLOURS = 128
