@@ -48,6 +48,11 @@ flags.DEFINE_integer("threads", None, "To simulate on. [default: as many as ther
 flags.DEFINE_boolean("write", False, "Write the tables into docs/results.md.")
 
 
+def cell(task: str, robot: str, preset: str, settings: dict) -> str:
+    """Return what a table says of a preset; "-" where the robot has none of that name."""
+    return summary(played(task, robot, preset, settings)) if preset in ("zero", *presets_of(ROBOTS[robot])) else "-"
+
+
 def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.Episode]:
     """Play the episodes of one cell, all at once."""
     environment = VectorEnv(robot, task, FLAGS.episodes, FLAGS.threads, "Disabled", task_kwargs=settings)
@@ -57,8 +62,8 @@ def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluatio
         return evaluation.episodes_in_batch(environment, policy, range(FLAGS.episodes))
 
 
-def cell(episodes: list[evaluation.Episode]) -> str:
-    """Return what a table says of episodes."""
+def summary(episodes: list[evaluation.Episode]) -> str:
+    """Return the return, the metric and the failures of episodes as text."""
     means = {name: np.mean([e.progress[name] for e in episodes]) for name in episodes[0].progress}
     metric = next(means[name] for name in METRICS if name in means)
     total = np.mean([episode.total for episode in episodes])
@@ -84,7 +89,7 @@ def table(task: str) -> Iterator[str]:
     yield "|---" * (1 + len(presets)) + "|"
     for robot, difficulty, settings in rows(task):
         bar = program.progress(presets, desc=f"{task} {robot}{difficulty}", leave=False)
-        yield f"| {robot}{difficulty} | {' | '.join(cell(played(task, robot, preset, settings)) for preset in bar)} |"
+        yield f"| {robot}{difficulty} | {' | '.join(cell(task, robot, preset, settings) for preset in bar)} |"
 
 
 def written(page: str, task: str, lines: list[str]) -> str:
