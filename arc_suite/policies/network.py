@@ -117,10 +117,13 @@ class Network(NamedTuple):
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
+        Blocks that its task excluded are left out.
+
         Raises:
-            ValueError: other blocks than those it was trained with.
+            ValueError: other blocks than those.
         """
-        sizes = {name: block.shape[-1] for name, block in observation.items()}
+        excluded = self.setup.task_kwargs.get("exclude_blocks", ())
+        sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             raise ValueError(
                 f"policy of {self.setup.kind.name}: expected observation blocks {dict(self.blocks)}, got {sizes}"
@@ -186,6 +189,7 @@ def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray], width: int) 
     sizes, found = {"i": width}, []
     for place, letters in enumerate(KINDS[checks.name(kind, KINDS, "layer")].shapes):
         array = arrays[f"{index}.{place}"]
+        array = array.astype(np.float32) if array.dtype == np.float16 else array  # as packaged ones are stored
         sizes = dict(zip(letters, array.shape, strict=False)) | sizes  # the first array tells an axis' size
         if array.dtype != np.float32 or array.shape != tuple(map(sizes.get, letters)):
             given = f"{array.dtype} {array.shape}"

@@ -57,7 +57,7 @@ def test_programs_find_the_robot_in_the_current_folder(package, tmp_path):
     done = programs.arc_suite(
         "evaluate", "--robot=hopper:hopper", "--preset=slow", "--episodes=1", "--set=time_limit=1", cwd=tmp_path
     )
-    assert (done.returncode, done.stderr) == (0, "") and "\nhopper  " in done.stdout
+    assert (done.returncode, done.stderr) == (0, "") and "\nhopper, slow  " in done.stdout
 
 
 @pytest.mark.long
