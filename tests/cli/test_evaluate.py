@@ -24,6 +24,7 @@ def test_table_of_all_robots(tmp_path):
         "robot",
         "speed",
         "gait_compliance",
+        "cost_of_transport",
         "return",
         "zero",
         "IQM",
@@ -35,7 +36,7 @@ def test_table_of_all_robots(tmp_path):
     assert [row.split()[0] for row in rows] == list(ROBOTS)
     reports = json.loads(path.read_text())["robots"]
     for row in rows:  # standing earns more than a fall
-        total, zero = float(row.split()[3]), float(row.split()[6])
+        total, zero = float(row.split()[4]), float(row.split()[7])
         assert zero == pytest.approx(reports[row.split()[0]]["zero_return"], abs=0.05)
         assert total < zero == pytest.approx(163.0, abs=20.0)
 
@@ -76,12 +77,13 @@ def test_figures_of_a_demonstrator():
     assert result.returncode == 0, result.stderr
     fields = result.stdout.splitlines()[-1].split()
     assert fields[:2] == ["queen,", "medium"]
-    assert result.stdout.splitlines()[0].split()[:5] == ["robot", "speed", "gait_compliance", "return", "zero"]
+    head = ["robot", "speed", "gait_compliance", "cost_of_transport", "return", "zero"]
+    assert result.stdout.splitlines()[0].split()[:6] == head
     assert float(fields[2]) == pytest.approx(0.5, abs=0.05)
     assert 0 < float(fields[3]) < 1
-    assert float(fields[4]) == pytest.approx(RETURNS["queen"].medium, rel=0.015)
-    assert float(fields[7]) == pytest.approx(1635.0, rel=0.015)
-    iqm, low, high = (float(field.strip("[],")) for field in fields[8:11])
+    assert float(fields[5]) == pytest.approx(RETURNS["queen"].medium, rel=0.015)
+    assert float(fields[8]) == pytest.approx(1635.0, rel=0.015)
+    iqm, low, high = (float(field.strip("[],")) for field in fields[9:12])
     assert low <= iqm <= high
     assert iqm == pytest.approx(RETURNS["queen"].medium, rel=0.015)
     assert fields[11:] == ["1000.0", f"{RETURNS['queen'].paper:.0f}"]
@@ -133,7 +135,7 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
         .stdout.splitlines()[2]
         .split()
     )
-    assert plain[3] != rows[0][3]
+    assert plain[4] != rows[0][4]
 
 
 def test_json_is_refused_before_the_work_starts():
