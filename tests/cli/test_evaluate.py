@@ -86,7 +86,7 @@ def test_figures_of_a_demonstrator():
     iqm, low, high = (float(field.strip("[],")) for field in fields[9:12])
     assert low <= iqm <= high
     assert iqm == pytest.approx(RETURNS["queen"].medium, rel=0.015)
-    assert fields[11:] == ["1000.0", f"{RETURNS['queen'].paper:.0f}"]
+    assert fields[12:] == ["1000.0", f"{RETURNS['queen'].paper:.0f}"]
 
 
 def test_json_holds_every_episode_and_the_versions(tmp_path):
