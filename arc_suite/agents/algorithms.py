@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 
 from arc_suite import checks, versions
 from arc_suite.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
+from arc_suite.arenas import FLAT
+from arc_suite.envs.setup import Setup
 
 
 class Algorithm(NamedTuple):
@@ -19,6 +21,8 @@ class Algorithm(NamedTuple):
         summary: a line for people.
         evaluate_every: environment steps between evaluations, by default.
         steps: environment steps of a run, by default.
+        terrain_steps: the same in another arena than the flat one; None for as many.
+        extends: whether a run can be extended to more steps, as no schedule hangs on them.
     """
 
     learner: str
@@ -26,6 +30,8 @@ class Algorithm(NamedTuple):
     summary: str
     evaluate_every: int = 10_000
     steps: int = 1_000_000
+    terrain_steps: int | None = None
+    extends: bool = False
 
     @property
     def module(self) -> ModuleType:
@@ -41,6 +47,16 @@ class Algorithm(NamedTuple):
                 raise ValueError(f"learner {self.learner}: {error}") from None
             raise versions.MissingExtra("training needs JAX", "agents", error) from None
 
+    def steps_of(self, setup: Setup) -> int:
+        """Return the environment steps of a run, by default.
+
+        Raises:
+            ValueError: a setting of the task that does not fit.
+        """
+        if self.terrain_steps is None or setup.definition.scene.arena == FLAT:
+            return self.steps
+        return self.terrain_steps
+
     def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Algorithm":
         """Return the algorithm with some hyperparameters changed.
 
@@ -48,6 +64,7 @@ class Algorithm(NamedTuple):
             ValueError: no such hyperparameter, or a value of another type.
         """
         fields = dataclasses.asdict(self.hyperparameters)
+        changes = {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
         for name, value in changes.items():
             kind = type(fields[checks.name(name, fields, "hyperparameter")])
             kinds = (int, float) if kind is float else kind
@@ -60,38 +77,64 @@ class Algorithm(NamedTuple):
 
 _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
-_OFF_POLICY = "arc_suite.agents.off_policy"
+
+
+def _off_policy(hyperparameters: SoftActorCritic, summary: str, **defaults) -> Algorithm:
+    return Algorithm("arc_suite.agents.off_policy", hyperparameters, summary, extends=True, **defaults)
+
 
 # The paper's six, as in its published code, and others: docs/agents.md.
 ALGORITHMS = {
-    "sac": Algorithm(_OFF_POLICY, _SAC, "soft actor-critic"),
-    "speq": Algorithm(_OFF_POLICY, _SPEQ, "SAC with phases in which the critics alone learn"),
-    "sope_eo": Algorithm(
-        _OFF_POLICY, dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"
-    ),
-    "sacfd": Algorithm(
-        _OFF_POLICY,
+    "sac": _off_policy(_SAC, "soft actor-critic"),
+    "speq": _off_policy(_SPEQ, "SAC with phases in which the critics alone learn"),
+    "sope_eo": _off_policy(dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"),
+    "sacfd": _off_policy(
         dataclasses.replace(_SAC, prior="protected"),
         "SAC with prior data in its buffer, never overwritten",
     ),
-    "speq_o2o": Algorithm(
-        _OFF_POLICY,
+    "speq_o2o": _off_policy(
         dataclasses.replace(_SPEQ, prior="symmetric_sampling"),
         "SPEQ with a batch of prior data in every update",
     ),
-    "sope": Algorithm(
-        _OFF_POLICY,
+    "sope": _off_policy(
         dataclasses.replace(_SPEQ, prior="symmetric_sampling", early_stop="published"),
         "SPEQ-O2O with phases that stop early",
     ),
     # Beyond the paper: DroQ (Hiraoka et al., "Dropout Q-functions for doubly efficient reinforcement learning", 2022).
-    "droq": Algorithm(
-        _OFF_POLICY,
+    "droq": _off_policy(
         dataclasses.replace(_SAC, dropout=0.01, utd_ratio=20),
         "SAC with 20 updates of critics with dropout in every step",
     ),
+    # Discount and several steps are what makes it learn: docs/agents.md.
+    "sac_parallel": _off_policy(
+        SoftActorCritic(
+            learning_rate=5e-4,
+            discount=0.97,
+            n_step=3,
+            tau=0.01,
+            num_envs=32,
+            utd_ratio=0.375,
+            start_steps=0,
+            reward_scale=0.1,
+            initial_std=0.3,
+            last_gain=0.01,
+            initial_temperature=0.003,
+            target_entropy=-0.6,
+            symmetry_augmentation=True,
+            normalize=True,
+            exclude_blocks=("contact_forces",),
+        ),
+        "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
+        evaluate_every=20_000,
+        steps=100_000,
+    ),
+    # Noise falls over the length of a run: on rough ground a million steps end below standing still.
     "ppo": Algorithm(
-        "arc_suite.agents.on_policy", ProximalPolicy(), "proximal policy optimisation", evaluate_every=100_000
+        "arc_suite.agents.on_policy",
+        ProximalPolicy(),
+        "proximal policy optimisation",
+        evaluate_every=100_000,
+        terrain_steps=3_000_000,
     ),
     # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": Algorithm(

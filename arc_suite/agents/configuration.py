@@ -54,7 +54,7 @@ class Configuration:
             ValueError: an unknown algorithm or hyperparameter, or a value out of its range.
         """
         definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters or {})
-        steps = definition.steps if steps is None else steps
+        steps = definition.steps_of(setup) if steps is None else steps
         evaluate_every = definition.evaluate_every if evaluate_every is None else evaluate_every
         checks.integer("seed", seed, 0, MOST_SEEDS)
         checks.integer("steps", steps, 1)

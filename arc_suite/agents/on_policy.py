@@ -13,7 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.agents import learner, networks
+from arc_suite.agents import inputs, learner, networks
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.learner import Diverged, RunContext, Slice, generator
@@ -35,7 +35,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     seed, environment = context.seed, context.environment(hp.num_envs)
     task, joints = environment.task.definition, environment.single_action_space.shape[0]
-    symmetry = _symmetry(task) if hp.symmetry_augmentation else None
+    symmetry = inputs.symmetry(task) if hp.symmetry_augmentation else None
     moments, policy = Moments.none(task.size), None
     normalise = moments.layer()
     if hp.start and context.checkpoint is None:
@@ -155,14 +155,6 @@ def batch_of(hp: ProximalPolicy, rollout: Mapping[str, np.ndarray], values, norm
         advantages, returns = np.tile(advantages, 2), np.tile(returns, 2)
     arrays = (observations, actions, means, advantages, returns)
     return ppo.Batch(*(jnp.asarray(array, jnp.float32) for array in arrays))
-
-
-def _symmetry(task):
-    """The mirror maps of a task; None where there are none."""
-    try:
-        return task.symmetry
-    except ValueError:
-        return None
 
 
 def _read(hp: ProximalPolicy, context: RunContext, task) -> tuple[Layer, tuple]:

@@ -4,6 +4,8 @@ An observation is stored once, as the next one of a transition is the observatio
 observations of episodes are in a file of their own. A million transitions of Queen take 0.9 GB. Files have their
 full size from the start, so a disk that is too small is an error at the start. Checkpoints hold a checksum of what
 can be sampled, as a file that was deleted or cut reads as zeros.
+
+Several environments take turns: with n of them, the transition after number k is number k + n.
 """
 
 import os
@@ -21,14 +23,15 @@ _CHUNK = 4096  # transitions that are read at once
 
 
 class Transitions(NamedTuple):
-    """Transitions, with leading axes; float32.
+    """Transitions of one or several control steps, with leading axes; float32.
 
     Attributes:
         observations: (..., size)
         actions: (..., joints)
-        rewards: (...)
-        goes_on: (...) 0 where the episode was terminated, else 1: a time limit terminates nothing.
-        next_observations: (..., size)
+        rewards: (...) sum of the rewards, those after the first step discounted.
+        goes_on: (...) 0 where the episode was terminated, as a time limit terminates nothing; else the discount of
+            the steps after the first, 1 for a single step.
+        next_observations: (..., size) after the last step.
     """
 
     observations: np.ndarray
@@ -39,7 +42,7 @@ class Transitions(NamedTuple):
 
 
 class Replay:
-    """The latest transitions of a stream of episodes, in files of a folder.
+    """The latest transitions of streams of episodes, in files of a folder.
 
     Transitions that could be sampled `slack` transitions ago are not overwritten, so a run can resume from a
     checkpoint that is not older.
@@ -50,7 +53,16 @@ class Replay:
         checksum: sum of the CRC-32 of the transitions that can be sampled, with their numbers since the start.
     """
 
-    def __init__(self, folder: Path, capacity: int, size: int, joints: int, slack: int = 0, mode: str = "w+"):
+    def __init__(
+        self,
+        folder: Path,
+        capacity: int,
+        size: int,
+        joints: int,
+        slack: int = 0,
+        mode: str = "w+",
+        num_envs: int = 1,
+    ):
         """Map the files.
 
         Args:
@@ -60,13 +72,16 @@ class Replay:
             joints: of an action.
             slack: further transitions that are kept.
             mode: "w+" to make the files where they are missing, "r+" to resume from them, "r" to read them alone.
+                Files to resume from may be shorter, of a smaller capacity at which no transition was overwritten.
+            num_envs: environments, whose transitions are added in turn.
 
         Raises:
-            Damaged: a file to resume from or to read is missing or too short.
+            Damaged: a file to resume from is missing, or one to read is missing or too short.
             OSError: the disk is full, or the like.
         """
         self._folder, self._capacity, self._size, self._mode = files.folder(folder), capacity, size, mode
-        self._slots = capacity + slack + 1  # one more for the observation that comes next
+        self._num_envs = num_envs
+        self._slots = capacity + slack + num_envs  # further ones for the observations that come next
         make = mode == "w+"
         self._observations = self._mapped("observations", np.float32, (self._slots, size), make)
         self._actions = self._mapped("actions", np.float32, (self._slots, joints), make)
@@ -91,27 +106,39 @@ class Replay:
             self._final[self.ends], self._end[slot] = next_observation, self.ends
             self.ends += 1
         else:
-            self._observations[(slot + 1) % self._slots] = next_observation
+            self._observations[(slot + self._num_envs) % self._slots] = next_observation
         if self.total >= self._capacity:
             self.checksum -= int(self._checksums[(self.total - self._capacity) % self._slots])
         self.total += 1
         self._count_in(self.total - 1, self.at(np.array([len(self) - 1])))
 
-    def at(self, indices: np.ndarray) -> Transitions:
+    def at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
         """Return copies of transitions by index; index 0 is the oldest.
 
         Args:
             indices: (batch,) from 0 to `len` - 1.
+            n_step: control steps of a transition; fewer where an episode or the stored transitions end.
+            discount: of a control step.
 
         Returns:
             Arrays (batch, ...).
         """
-        slots = (self.total - len(self) + indices) % self._slots
-        nexts, ends = self._observations[(slots + 1) % self._slots], self._end[slots]
-        last = ends >= 0
-        nexts[last] = self._final[ends[last]]
-        numbers = (array[slots] for array in (self._observations, self._actions, self._rewards, self._goes_on))
-        return Transitions(*numbers, nexts)
+        numbers = self.total - len(self) + indices  # since the start
+        first = numbers % self._slots
+        rewards, factor = self._rewards[first], np.ones(len(indices), np.float32)
+        going = np.ones(len(indices), bool)
+        for _ in range(n_step - 1):
+            going &= (self._end[numbers % self._slots] < 0) & (numbers + self._num_envs < self.total)
+            numbers = np.where(going, numbers + self._num_envs, numbers)
+            factor = np.where(going, factor * np.float32(discount), factor)
+            rewards += np.where(going, factor * self._rewards[numbers % self._slots], np.float32(0.0))
+        last = numbers % self._slots
+        nexts, ends = self._observations[(last + self._num_envs) % self._slots], self._end[last]
+        final = ends >= 0
+        nexts[final] = self._final[ends[final]]
+        return Transitions(
+            self._observations[first], self._actions[first], rewards, factor * self._goes_on[last], nexts
+        )
 
     def restore(self, total: int, ends: int, checksum: int) -> None:
         """Resume with the given counters; at most `slack` later transitions may be on disk.
@@ -144,11 +171,12 @@ class Replay:
 
     def _mapped(self, name: str, dtype, shape: tuple[int, ...], make: bool) -> np.ndarray:
         path, size = self._folder / name, int(np.prod(shape)) * np.dtype(dtype).itemsize
-        if make:
+        if make or (self._mode == "r+" and path.is_file()):
             _allocate(path, size)
         elif not (path.is_file() and path.stat().st_size >= size):
             raise Damaged(f"{path} is missing or too short")
-        return np.memmap(path, dtype, "r" if self._mode == "r" else "r+", shape=shape)
+        found = np.memmap(path, dtype, "r" if self._mode == "r" else "r+", shape=shape)
+        return np.asarray(found)  # indexing a plain array is faster
 
 
 def _allocate(path: Path, size: int) -> None:
@@ -174,17 +202,22 @@ class Protected:
         """Return the number of transitions that can be sampled."""
         return len(self._first) + len(self._second)
 
-    def at(self, indices: np.ndarray) -> Transitions:
-        """Return copies of transitions by index; those of the first source come first.
+    def at(self, indices: np.ndarray, n_step: int = 1, discount: float = 1.0) -> Transitions:
+        """Return copies of transitions by index, as `Replay.at` does; those of the first source come first.
 
         Args:
             indices: (batch,) from 0 to `len` - 1.
+            n_step: control steps of a transition.
+            discount: of a control step.
 
         Returns:
             Arrays (batch, ...), in the order of the indices.
         """
         count = len(self._first)
         of_first = indices < count
-        parts = self._first.at(indices[of_first]), self._second.at(indices[~of_first] - count)
+        parts = (
+            self._first.at(indices[of_first], n_step, discount),
+            self._second.at(indices[~of_first] - count, n_step, discount),
+        )
         places = np.argsort(np.concatenate([np.flatnonzero(of_first), np.flatnonzero(~of_first)]))
         return Transitions(*(np.concatenate(pair)[places] for pair in zip(*parts, strict=True)))

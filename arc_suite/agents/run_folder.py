@@ -13,6 +13,7 @@ Tables only grow; a run that resumes cuts them back to their lengths at the chec
 import contextlib
 import json
 import os
+import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -90,21 +91,23 @@ class RunFolder:
 
 
 @contextlib.contextmanager
-def opened(path: str | os.PathLike, config: Mapping[str, Any]) -> Iterator[RunFolder]:
-    """Open the folder of a run, or make one.
+def opened(path: str | os.PathLike, config: Mapping[str, Any], growing: Sequence[str] = ()) -> Iterator[RunFolder]:
+    """Open the folder of a run, or make one, which is deleted if an error comes before the run has begun.
 
     Args:
         path: of the folder.
         config: record of the configuration, plain values.
+        growing: names in it whose integers may be larger than in the folder.
 
     Raises:
         ValueError: the folder is of another run or of none, or damaged, or another process writes to it.
         OSError: it cannot be read or written.
     """
-    path = files.folder(path)
     with contextlib.ExitStack() as stack:
+        stack.enter_context(_made(Path(path)))
+        path = files.folder(path)
         stack.enter_context(files.locked(path / LOCK, f"{path}: another process goes on with this run"))
-        _configure(path, config)
+        _configure(path, config, growing)
         files.delete_unfinished(path / CHECKPOINT)  # megabytes
         folder = RunFolder(path, *_checkpoint(path / CHECKPOINT))
         stack.callback(folder.close)
@@ -184,13 +187,32 @@ def is_begun(path: str | os.PathLike) -> bool:
     return (Path(path) / CHECKPOINT).exists() or any(each.exists() and each.stat().st_size for each in tables)
 
 
-def _configure(path: Path, config: Mapping[str, Any]) -> None:
-    """Compare the record with the folder's, or write it if no run has begun."""
+@contextlib.contextmanager
+def _made(path: Path) -> Iterator[None]:
+    """Delete a folder that was missing before, and parents that it needed, if an error comes before its run begins."""
+    missing = [each for each in (path, *path.parents) if not each.exists()]
+    try:
+        yield
+    except Exception:
+        if missing and not is_begun(path):
+            shutil.rmtree(path, ignore_errors=True)
+            for parent in missing[1:]:
+                with contextlib.suppress(OSError):  # another run may be in it by now
+                    parent.rmdir()
+        raise
+
+
+def _configure(path: Path, config: Mapping[str, Any], growing: Sequence[str]) -> None:
+    """Compare the record with the folder's, and write it if no run has begun or some of its integers have grown."""
     others = sorted(each.name for each in path.iterdir() if not each.name.startswith("."))
     if others and CONFIG not in others:
         raise ValueError(f"{path}: no folder of a run, and not empty: it holds {others[0]}")
     if is_begun(path):
-        return check(path, config)
+        there = config_of(path)
+        grown = [name for name in growing if isinstance(there.get(name), int) and there[name] < config[name]]
+        check(path, config, grown)
+        if not grown:
+            return
     with files.writing_json(path / CONFIG) as file:  # maybe over that of a run that was refused
         file.update(config)
 

@@ -32,7 +32,7 @@ _LOG_TWO_PI = math.log(2.0 * math.pi)
 
 def core(hp: SoftActorCritic) -> SoftActorCritic:
     """Return hyperparameters that differ only where updates do, so that compiled programs are shared."""
-    names = "hidden", "learning_rate", "discount", "tau", "dropout"
+    names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy"
     return SoftActorCritic(**{name: getattr(hp, name) for name in names})
 
 
@@ -72,11 +72,12 @@ class Noise(NamedTuple):
 def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> State:
     """Draw the networks for observations (size,) and actions (joints,)."""
     hidden = [hp.hidden] * HIDDEN_LAYERS
-    *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True)
-    log_std = networks.layer(networks.xavier(random, hp.hidden, joints))
+    *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True, last_gain=hp.last_gain)
+    log_std = networks.layer(networks.xavier(random, hp.hidden, joints, hp.last_gain))
+    log_std["bias"] += np.float32(math.log(hp.initial_std))
     policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
     critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
-    adam, log_alpha = optimiser(hp), np.zeros((), np.float32)
+    adam, log_alpha = optimiser(hp), np.array(math.log(hp.initial_temperature), np.float32)
     moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
     return jax.tree.map(jnp.array, State(policy, critics, critics, log_alpha, moments))
 
@@ -187,8 +188,8 @@ def update(
     if noise.action is not None:
         policy_gradient = jax.value_and_grad(policy_loss, argnums=1, has_aux=True)
         (loss, density), gradient = policy_gradient(hp, state.policy, state, batch.observations, noise.action, masks[2])
-        joints = batch.actions.shape[-1]
-        log_alpha, moments = _stepped(hp, "log_alpha", state.log_alpha, joints - density, moments)
+        target_entropy = hp.target_entropy * batch.actions.shape[-1]
+        log_alpha, moments = _stepped(hp, "log_alpha", state.log_alpha, -target_entropy - density, moments)
         policy, moments = _stepped(hp, "policy", state.policy, gradient, moments)
         state = state._replace(policy=policy, log_alpha=log_alpha)
         metrics |= {"policy_loss": loss, "entropy": -density, "alpha": jnp.exp(log_alpha)}

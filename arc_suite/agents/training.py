@@ -29,7 +29,7 @@ def train(
     progress: Callable = tqdm,
     on_metrics: Callable[[int, Mapping[str, float]], None] = lambda step, metrics: None,
 ) -> bool:
-    """Train, or resume.
+    """Train, resume, or extend a run to more steps if its algorithm can.
 
     Args:
         configuration: of the run.
@@ -56,7 +56,8 @@ def train(
         record[PRIOR_SHA256] = priors.digest(configuration.prior)
     evaluation.check_ends(setup.definition.step_limit)
     module = definition.module
-    with run_folder.opened(folder, record) as run_files, contextlib.ExitStack() as stack:
+    growing = ("steps",) if definition.extends else ()
+    with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
         context = RunContext(
             setup=setup,

@@ -148,6 +148,15 @@ def six(
 # A tenth of the published phases, of the interval of their checks, and of the patience.
 _SHORT = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
 
+# Hyperparameters that leave out a part of `sac_parallel`.
+_PARTS = {
+    "raw": {"normalize": False},
+    "contacts": {"exclude_blocks": []},
+    "unmirrored": {"symmetry_augmentation": False},
+    "8-environments": {"num_envs": 8},
+    "one-step": {"n_step": 1},
+}
+
 # The paper's own study is `paper`: 3,000 hours of a core. The others fit fewer hours.
 STUDIES = {
     "paper": Study("the paper's six algorithms as published", six(ROBOTS, 1_000_000, 5, Prior())),
@@ -204,6 +213,22 @@ STUDIES = {
             *(run("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
             run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
             run("queen", "ppo", 2_000_000, task="steer"),
+        ),
+    ),
+    # Four to six minutes of a core a run.
+    "parallel": Study(
+        "SAC from nothing in parallel environments, 100,000 steps",
+        tuple(
+            run(robot, "sac_parallel", 100_000, seed)
+            for seed, robot in itertools.product(range(3), ("tick", "leaper", "queen", "bastion"))
+        ),
+    ),
+    # What each part of it gives; the runs with all parts are those of `parallel`.
+    "parallel-parts": Study(
+        "SAC in parallel environments without one of its parts, 60,000 steps",
+        tuple(
+            run(robot, "sac_parallel", 60_000, seed, hyperparameters=changes, label=f"sac_parallel-{part}")
+            for seed, robot, (part, changes) in itertools.product(range(2), ("tick", "leaper"), _PARTS.items())
         ),
     ),
     "beyond": Study(

@@ -18,12 +18,13 @@ from arc_suite.envs.setup import Setup
 SMALL = {"hidden": 16, "batch": 8, "start_steps": 20}
 SHORT = {"time_limit": 2.0}  # s: episodes of 40 steps
 PHASES = {"phase_every": 100, "phase_updates": 60, "check_every": 20, "patience": 40, "scored_batches": 1}
+FEW = {"num_envs": 10, "utd_ratio": 0.2}
 
 
 def small(name, **changes):
-    """Hyperparameters of small networks, batches and phases."""
-    phases = PHASES if algorithms.algorithm(name).hyperparameters.phase_updates else {}
-    return SMALL | phases | changes
+    """Hyperparameters of small networks, batches and phases, and of few environments."""
+    hp = algorithms.algorithm(name).hyperparameters
+    return SMALL | (PHASES if hp.phase_updates else {}) | (FEW if hp.num_envs > 1 else {}) | changes
 
 
 class Learning:

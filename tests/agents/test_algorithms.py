@@ -8,7 +8,9 @@ import pytest
 
 from arc_suite.agents import algorithms
 from arc_suite.agents.algorithms import ALGORITHMS, Algorithm, algorithm
+from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.hyperparameters import SoftActorCritic
+from arc_suite.envs.setup import Setup
 
 PAPER = {
     # prior data, transitions of an update, the most updates of a phase, early stop, dropout
@@ -42,6 +44,21 @@ def test_hyperparameters_can_be_changed():
 
 
 @pytest.mark.parametrize(
+    ("name", "task", "steps"),
+    [
+        ("ppo", "walk", 1_000_000),
+        ("ppo", "steer", 1_000_000),
+        ("ppo", "rough", 3_000_000),
+        ("ppo", "navigate", 3_000_000),
+        ("sac_parallel", "rough", 100_000),
+    ],
+)
+def test_the_default_length_of_a_run_follows_from_its_task(name, task, steps):
+    assert Configuration.of(Setup.of("tick", task), name).steps == steps
+    assert Configuration.of(Setup.of("tick", task), name, steps=5000).steps == 5000
+
+
+@pytest.mark.parametrize(
     ("changes", "line"),
     [
         ({"phase_update": 3}, r"^unknown hyperparameter 'phase_update'; did you mean 'phase_updates'\? "),
@@ -49,6 +66,12 @@ def test_hyperparameters_can_be_changed():
         ({"phase_updates": 1.5}, r"^hyperparameter phase_updates: expected int like 75000, got 1\.5$"),
         ({"dropout": True}, r"^hyperparameter dropout: expected float like 0\.01, got True$"),
         ({"dropout": 2}, r"^dropout: expected a number from 0 to 0\.9, got 2$"),
+        ({"discount": 1}, r"^discount: expected a number between 0 and 1, got 1$"),
+        ({"discount": 99}, r"^discount: expected a number between 0 and 1, got 99$"),
+        ({"held_out": 1}, r"^held_out: expected a number between 0 and 1, got 1$"),
+        ({"improvement": 1.0}, r"^improvement: expected a number between 0 and 1, got 1\.0$"),
+        ({"learning_rate": 0}, r"^learning_rate: expected a number between 0 and 1, got 0$"),
+        ({"tau": 0}, r"^tau: expected a number from 1e-06 to 1, got 0$"),
         ({"batch": 0}, r"^batch: expected an integer from 1, got 0$"),
         ({"early_stop": "safe"}, r"^unknown early_stop 'safe'"),
     ],
@@ -56,6 +79,13 @@ def test_hyperparameters_can_be_changed():
 def test_changes_that_do_not_fit(changes, line):
     with pytest.raises(ValueError, match=line):
         algorithm("sope").with_hyperparameters(changes)
+
+
+@pytest.mark.parametrize("changes", [{"discount": 1}, {"clip": 0.0}, {"policy_rate": 1}, {"value_rate": 0}])
+def test_ppo_takes_no_whole_number_for_a_share(changes):
+    with pytest.raises(ValueError, match=rf"^{next(iter(changes))}: expected a number between 0 and 1, got [01]"):
+        algorithm("ppo").with_hyperparameters(changes)
+    assert algorithm("ppo").with_hyperparameters({"gae_lambda": 1, "normalize_until": 0})
 
 
 @pytest.mark.parametrize(

@@ -125,11 +125,19 @@ def test_validation_set(name, learner, batches):
 
 
 def test_at_least_a_batch_is_held_out_and_at_least_one_is_not(learner):
-    for every_step, held_out in ((30, 0), (40, 16)):  # 30 transitions are not two batches
-        hyperparameters = small("sope_eo", phase_every=every_step, batch=16, start_steps=100)
-        agent = learner("sope_eo", hyperparameters, evaluate_every=100)
-        agent.advance()
-        assert agent.phase.held_out == held_out
+    agent = learner("sope_eo", small("sope_eo", phase_every=40, batch=16, start_steps=100), evaluate_every=100)
+    agent.advance()
+    assert agent.phase.held_out == 16
+
+
+def test_phases_without_two_batches_are_skipped(learner):
+    """Of online or of prior transitions, as published."""
+    agent = learner("sope_eo", small("sope_eo", phase_every=30, batch=16, start_steps=100), evaluate_every=100)
+    agent.advance()
+    assert agent.steps == 60 and agent.phase.held_out == 16, "30 transitions are not two batches"
+    agent = learner("sope", small("sope", batch=601, phase_every=30), steps=40, evaluate_every=40)
+    agent.until(40)
+    assert agent.updates == 40, "1200 prior transitions are not two batches"
 
 
 def test_a_phase_ends_by_the_rule(learner, monkeypatch):

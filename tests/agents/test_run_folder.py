@@ -1,5 +1,6 @@
 """Folders of runs: whole whatever happens, and refused in one line where they do not fit."""
 
+import json
 import os
 
 import numpy as np
@@ -56,6 +57,26 @@ def test_what_never_began_leaves_the_folder_to_others(tmp_path):
     one_line(tmp_path / "run", "of another run, whose seed is 1, and not 0")
 
 
+def test_a_rejected_run_leaves_no_folder(tmp_path):
+    with pytest.raises(ValueError, match="no prior data"), opened(tmp_path / "runs" / "run", CONFIG) as folder:
+        (folder.path / "replay").mkdir()
+        raise ValueError("no prior data")
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "runs" / "other").mkdir(parents=True)
+    for path in (tmp_path / "runs" / "run", tmp_path / "runs" / "other"):
+        with pytest.raises(ValueError, match="no prior data"), opened(path, CONFIG):
+            raise ValueError("no prior data")
+    assert [path.name for path in (tmp_path / "runs").iterdir()] == ["other"], "which was there before"
+
+
+def test_an_error_after_the_first_checkpoint_loses_nothing(tmp_path):
+    with pytest.raises(ValueError, match="diverged"), opened(tmp_path / "run", CONFIG) as folder:
+        folder.save(ARRAYS, {"evaluated": 2})
+        raise ValueError("diverged")
+    with opened(tmp_path / "run", CONFIG) as folder:
+        assert folder.progress["evaluated"] == 2
+
+
 def test_what_a_kill_has_left_half_written_is_deleted(path):
     (path / ".checkpoint.1234.npz").write_bytes(b"half")
     with opened(path, CONFIG):
@@ -86,6 +107,17 @@ def test_tables_are_read_also_while_a_line_is_written(path):
 )
 def test_another_run(path, changed, named):
     one_line(path, named, CONFIG | changed)
+
+
+def test_steps_may_grow(path):
+    (path / "config.json").write_text(json.dumps(CONFIG | {"steps": 5}))
+    with opened(path, CONFIG | {"steps": 9}, growing=["steps"]) as folder:
+        assert folder.progress["evaluated"] == 2
+    assert run_folder.config_of(path)["steps"] == 9
+    for config, growing in (({"steps": 8}, ["steps"]), ({"steps": 10}, []), ({"steps": 10, "seed": 1}, ["steps"])):
+        with pytest.raises(ValueError, match="of another run, whose"), opened(path, CONFIG | config, growing):
+            pass
+    assert run_folder.config_of(path)["steps"] == 9
 
 
 def test_a_folder_of_something_else(tmp_path):

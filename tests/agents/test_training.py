@@ -76,7 +76,7 @@ def fragile(method):
     return broken
 
 
-@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name in ("sac", "sope")))
+@pytest.mark.parametrize("name", tiers(NAMES, lambda name: name in ("sac", "sope", "sac_parallel")))
 def test_tiny_run(name, tiny, tmp_path, monkeypatch):
     """It writes what it should, and goes on to the same bits wherever it is broken off."""
     run = tiny(name)
@@ -138,6 +138,37 @@ def test_stops_after_minutes_and_goes_on(tiny, tmp_path):
     assert not train(run, tmp_path / "run", minutes=0.0, progress=silent)
     assert train(run, tmp_path / "run", progress=silent)
     assert train(run, tmp_path / "run", minutes=0.0, progress=silent), "nothing is left to do"
+
+
+@pytest.mark.parametrize("name", tiers(["sac_parallel", "sope_eo"], lambda name: name == "sac_parallel"))
+def test_a_run_is_extended_to_what_a_longer_one_is(name, tiny, tmp_path):
+    assert train(tiny(name, steps=300), tmp_path / "long", progress=silent)
+    for steps in (100, 300):
+        assert train(tiny(name, steps=steps), tmp_path / "extended", progress=silent)
+    long, extended = (contents(tmp_path / each) for each in ("long", "extended"))
+    own = ("training.csv", "checkpoint.npz/count", "checkpoint.npz/sums")  # a line of metrics more, at 100
+    assert [key for key in long if long[key] != extended[key] and not key.startswith(own)] == []
+    with pytest.raises(ValueError, match=r"of another run, whose steps is 300, and not 200; write to another folder$"):
+        train(tiny(name, steps=200), tmp_path / "extended", progress=silent)
+
+
+def test_a_run_with_a_schedule_is_not_extended(tmp_path):
+    """`ppo`: noise falls over the length of a run."""
+    hyperparameters = {"num_envs": 4, "horizon": 5, "minibatch": 10, "epochs": 1, "hidden": 16}
+    for steps in (20, 40):
+        run = Configuration.of(Setup.of("tick", "walk", SHORT), "ppo", hyperparameters, steps=steps, evaluate_every=20)
+        if steps == 20:
+            assert train(run, tmp_path / "run", progress=silent)
+        else:
+            with pytest.raises(ValueError, match=r"of another run, whose steps is 20, and not 40;"):
+                train(run, tmp_path / "run", progress=silent)
+
+
+def test_a_run_that_the_learner_refuses_leaves_no_folder(tmp_path):
+    run = Configuration.of(Setup.of("tick"), "finetune")
+    with pytest.raises(ValueError, match=r"^start: expected the folder of a run"):
+        train(run, tmp_path / "runs" / "run", progress=silent)
+    assert not list(tmp_path.iterdir())
 
 
 def test_another_seed_is_another_run(tiny, tmp_path):

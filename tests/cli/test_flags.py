@@ -20,7 +20,7 @@ def test_evaluate_takes_a_spec_and_a_body_made_to_order():
     done = arc_suite_program("evaluate", "--spec=spider", "--episodes=1")
     fields = done.stdout.splitlines()[-1].split()
     assert fields[:2] == ["spider,", "medium"]
-    assert float(fields[4]) > 2500.0
+    assert float(fields[5]) > 2500.0
     assert fields[-1] == "1000.0"  # and nothing of the paper, which knows nothing of it
     done = arc_suite_program("evaluate", "--legs=4", "--links=2", "--policy=zero", "--episodes=1")
     assert done.stdout.splitlines()[-1].split()[0] == "walker_4x2"
