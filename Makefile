@@ -3,6 +3,7 @@
 # make test    installs everything, runs the tests, on all cores
 # make check-long  tests that take long
 # make check-release  further cases of tests that have many, and tests that take minutes: half an hour, before a release
+# make check-types  type annotations of the public modules, by mypy in an environment of its own
 # make check-lowest  tests of the environments with the oldest Gymnasium that setup.cfg admits, in an environment of its own
 # make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
@@ -28,7 +29,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -59,6 +60,8 @@ check: lint $(INSTALLED)
 lint: $(VENV)/linter
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(VENV)/bin/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
 
 $(VENV)/demo: setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)
@@ -73,6 +76,12 @@ $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 $(VENV)/linter: $(INSTALLED)
 	$(PYTHON) -m pip install -q -e '.[lint]'
 	touch $@
+
+check-types: VENV := .venv-types
+check-types: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[test]' mypy==2.4.1
+	$(VENV)/bin/mypy
 
 check-lowest: VENV := .venv-lowest
 check-lowest: setup.cfg

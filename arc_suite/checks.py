@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 _LARGEST_SEED = 2**32 - 1  # that a RandomState takes
+_SMALL = 1e-6  # least number that errors name as a bound; a smaller one keeps out 0
 _LONGEST_QUOTE = 300  # characters
 
 
@@ -94,10 +95,13 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
         ValueError: it is no finite number, or out of range.
     """
     real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not real or not math.isfinite(value) or not low <= value <= high:
-        kind = "number" if math.isfinite(high - low) else "finite number"
-        raise ValueError(f"{what}: expected a {kind} from {low:g} to {high:g}, got {value!r}")
-    return float(value)
+    try:
+        found = float(value) if real else math.nan
+    except OverflowError:  # of a large integer
+        found = math.inf
+    if not math.isfinite(found) or not low <= found <= high:
+        raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {value!r}")
+    return found
 
 
 def boolean(what: str, value: Any) -> bool:
@@ -133,8 +137,17 @@ def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
         return first, number(what, last, first, high)
     except ValueError:
         raise ValueError(
-            f"{what}: expected a number from {low:g} to {high:g}, or two of them, the lower first, got {value!r}"
+            f"{what}: expected a {_numbers(low, high)}, or two of them, the lower first, got {value!r}"
         ) from None
+
+
+def _numbers(low: float, high: float) -> str:
+    """Return in words which numbers lie in a range."""
+    if low == -math.inf:
+        return "finite number"
+    if 0.0 < low < _SMALL:
+        return "finite number above 0" if high == math.inf else f"number above 0, at most {high:g}"
+    return f"finite number of at least {low:g}" if high == math.inf else f"number from {low:g} to {high:g}"
 
 
 def array(what: str, value: Any, size: int) -> np.ndarray:

@@ -2,9 +2,11 @@
 
 import contextlib
 import errno
+import glob
 import json
 import math
 import os
+import platform
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,8 +42,9 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
     """Write a file atomically: `with writing("a.png") as temporary: save(temporary)`.
 
     The temporary file lies in the target's folder and has its extension; it takes the target's place
-    when the block ends, unless the block has deleted it, and is deleted if the block raises. Open
-    the block before any long work: what cannot be written is found out at once.
+    when the block ends, unless the block has deleted it, and is deleted if the block raises. Temporary
+    files that killed processes of this machine left for the target are deleted. Open the block before
+    any long work: what cannot be written is found out at once.
 
     Args:
         path: the target; a file that is there is replaced.
@@ -53,13 +56,14 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         OSError: the target cannot be written.
     """
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{target.stem[:32]}.{os.getpid()}{target.suffix}")
+    temporary = target.with_name(f"{_prefix(target)}{os.getpid()}{target.suffix}")
     try:
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         if target.exists() and not (target.is_file() and os.access(target, os.W_OK)):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         temporary.touch()
+        _delete_abandoned(target)
     except OSError as error:
         raise OSError(f"cannot write {path}: {error.strerror.lower()}") from None
     try:
@@ -109,6 +113,33 @@ def read_json(path: str | os.PathLike, most: int = MAX_JSON) -> Any:
         raise ValueError("expected JSON that is not nested so deeply") from None
 
 
+def _prefix(target: Path) -> str:
+    """Return the beginning of the names of temporary files; other machines may write to the same folder."""
+    return f".{target.stem[:32]}.{platform.node()}."
+
+
+def _delete_abandoned(target: Path) -> None:
+    """Delete temporary files of a target whose processes are gone."""
+    prefix = _prefix(target)
+    for temporary in target.parent.glob(f"{glob.escape(prefix)}*{glob.escape(target.suffix)}"):
+        process = temporary.name.removeprefix(prefix).removesuffix(target.suffix)
+        if process.isdecimal() and not _runs(int(process)):
+            temporary.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    """Return whether a process may be running; on Windows, where a signal 0 would end it, always."""
+    if os.name == "nt":
+        return True
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:  # another user's
+        pass
+    return True
+
+
 def delete_unfinished(path: str | os.PathLike) -> None:
     """Delete temporary files that killed processes left in `writing` a file; no process may be writing it."""
     target = Path(path)
@@ -145,7 +176,7 @@ def lock(file: IO) -> bool:
             here = file.tell()
             file.seek(_FAR)
             try:
-                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+                msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]  # of Windows
             finally:
                 file.seek(here)
     except (BlockingIOError, PermissionError):

@@ -53,22 +53,23 @@ def register(
             nothing has been registered.
     """
     module = None if module == "__main__" else module
-    tasks, arenas = {_task_name(task): task for task in tasks}, dict(arenas or {})
-    for kind, table, new in (("task", TASKS, tasks), ("arena", ARENAS, arenas)):
+    new_tasks: dict[str, Any] = {_task_name(task): task for task in tasks}
+    new_arenas = dict(arenas or {})
+    for kind, table, new in (("task", TASKS, new_tasks), ("arena", ARENAS, new_arenas)):
         for name, value in new.items():
             if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
                 raise ValueError(f"{kind} {name!r} is already registered")
     if body is None:
         if (parameters, presets, visuals) != (None, None, None):
             raise ValueError("parameters, presets and visuals belong to a body, and none is given")
-        if not (tasks or arenas):
+        if not (new_tasks or new_arenas):
             raise ValueError("nothing to register: give a body, tasks or arenas")
     else:
         _register_body(body, parameters or {}, presets, visuals)
         MODULES["domain", body.name] = module
-    TASKS.update(tasks)
-    ARENAS.update(arenas)
-    MODULES.update({("task", name): module for name in tasks} | {("arena", name): module for name in arenas})
+    TASKS.update(new_tasks)
+    ARENAS.update(new_arenas)
+    MODULES.update({("task", name): module for name in new_tasks} | {("arena", name): module for name in new_arenas})
     register_ids()
 
 
@@ -91,11 +92,8 @@ def _register_body(body, parameters, presets, visuals) -> None:
     if presets is not None:
         _check_presets(body, parameters.get("walk", {}), presets)
     ROBOTS[body.name] = body
-    for table, value in (
-        *((PARAMETERS.setdefault(task, {}), given) for task, given in parameters.items()),
-        (PRESETS, presets),
-        (VISUALS, visuals),
-    ):
+    tables: list[tuple[dict, Any]] = [(PARAMETERS.setdefault(task, {}), given) for task, given in parameters.items()]
+    for table, value in (*tables, (PRESETS, presets), (VISUALS, visuals)):
         if value is not None:
             table[body.name] = value
 

@@ -64,9 +64,9 @@ MUTANTS = (
         "np.random.RandomState((self.seed, KINDS.index(kind), before))",
         "np.random.RandomState(self.seed)",
     ),
-    Mutant("feet may sink", "sinking, sinking >= SINKING, left", "sinking, sinking < 0, left"),
+    Mutant("feet may sink", "sunk=sinking >= SINKING", "sunk=sinking < 0"),
     Mutant("levels never fall", "numpy.where(stream.outcome < down, (level - 1).clip(0), level)", "level"),
-    Mutant("the highest level for ever", "numpy.where(stays < STAYS, level, other)", "level"),
+    Mutant("the highest level for ever", "& (stays >= STAYS)", "& False"),
     Mutant(
         "a scan that does not turn",
         "x = position[..., 0:1] + cosine * forward - sine * left",
@@ -111,9 +111,10 @@ MUTANTS = (
         "tick, x = memory.tick + 1, component(readings.frame_position, 0)",
         "tick, x = memory.tick + 1, component(readings.torso_position, 0)",
     ),
-    Mutant(
-        "the first step starts from nowhere", "_replace(x=component(readings.frame_position, 0) + 0.0)", "_replace()"
-    ),
+    Mutant("the first step starts from nowhere", "_replace(x=x, energy=", "_replace(energy="),
+    Mutant("swaying pays", "return gained.clip(max=1.0)", "return gained.clip(-1.0, 1.0)"),
+    Mutant("costs without a bound", "excess.__array_namespace__().sqrt(1.0 + excess * excess)", "1.0"),
+    Mutant("braking counts as work", "(angles - memory.angles)).clip(0.0).sum", "(angles - memory.angles)).sum"),
     Mutant(
         "schedule errors counted twice",
         "memory.all_schedule_errors + schedule_errors",
@@ -129,7 +130,9 @@ MUTANTS = (
     Mutant(
         "feet stay in the ground", "(clear - readings.foot_heights).max", "0.0 * (clear - readings.foot_heights).max"
     ),
-    Mutant("a memory written in place", "(1.0 - leak) * core.motion", "core.motion.__imul__(1.0 - leak)"),
+    Mutant(
+        "a memory written in place", "(1.0 - context.leak) * core.motion", "core.motion.__imul__(1.0 - context.leak)"
+    ),
     Mutant("a command that is ignored", "numpy.where(numpy.isnan(memory.live), scheduled, memory.live)", "scheduled"),
     Mutant("a schedule that does not end", "steps % memory.ends[..., -1]", "steps"),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
@@ -175,8 +178,14 @@ MUTANTS = (
     ),
     Mutant(
         "a command for all rows",
-        "_chosen(mask, self._task.commanded(self._memory, name, value), self._memory)",
-        "self.task.commanded(self._memory, name, value)",
+        "memory = changed if mask is None else trees.chosen(mask, changed, memory)",
+        "memory = changed",
+    ),
+    Mutant("commands of rows replace one another", "value, mask = np.where(mask[:, None], value, before)", "mask"),
+    Mutant(
+        "a copy resets the shared model",
+        "        if share_model:\n            self._shared",
+        "        if False:\n            self._shared",
     ),
     Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
     Mutant("two threads in one environment", "not lock.acquire(False)", "False"),

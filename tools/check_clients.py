@@ -1,9 +1,9 @@
-"""Runs the code of docs/clients.md, each client in an environment of its own.
+"""Runs the code of docs/clients.md and docs/first_steps.md, each section in an environment of its own.
 
     python tools/check_clients.py
 
-A section with a `pip install` line is a client. What one leaves in Minari's folder of datasets, or in the folder where
-its code runs, the later ones find.
+A section with a `pip install` line is a client; its commands and code run in order. What one leaves in Minari's folder
+of datasets, or in the folder where its page runs, the later ones find.
 Prints a line for each and exits with status 1 if one fails.
 """
 
@@ -11,6 +11,7 @@ import os
 import pathlib
 import re
 import shlex
+import shutil
 import subprocess
 import tempfile
 import time
@@ -20,53 +21,77 @@ from typing import NamedTuple
 from arc_suite.cli import program
 
 _ROOT = pathlib.Path(__file__).parents[1]
-PAGE = _ROOT / "docs" / "clients.md"
+PAGES = [_ROOT / "docs" / f"{name}.md" for name in ("clients", "first_steps")]
 _SECTION = re.compile(r"^## (?P<name>[^\n]*)\n(?P<text>.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
-_INSTALL = re.compile(r"^```sh\npip install (.*)\n```", re.MULTILINE)
-_CODE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+_INSTALL = re.compile(r"^```sh\npip install (.*)\n```\n", re.MULTILINE)
+_BLOCK = re.compile(r"^```(?P<kind>sh|python)\n(?P<text>.*?)^```", re.MULTILINE | re.DOTALL)
+_SHELLS = {"sh": ["bash", "-e"], "python": ["python"]}
+_SAVED = re.compile(r"[Ss]ave this as\s+`(?P<file>[^`]+)`[^`]*\Z")
+
+
+class Block(NamedTuple):
+    """A block of a section.
+
+    Attributes:
+        kind: sh or python.
+        text: commands, or a script.
+        file: that the text goes into, instead of being run; None for a block that is run.
+    """
+
+    kind: str
+    text: str
+    file: str | None = None
 
 
 class Client(NamedTuple):
-    """A section of the page.
+    """A section of a page.
 
     Attributes:
         name: its heading.
         packages: what pip is to install, `arc_suite` among it where the client can live with it.
-        blocks: of code, each a script.
+        blocks: in the section's order, without the installation.
     """
 
     name: str
     packages: list[str]
-    blocks: list[str]
+    blocks: list[Block]
 
 
 def clients(page: str) -> Iterator[Client]:
-    """Yield the clients of the page's text, in its order."""
+    """Yield the clients of a page's text, in its order."""
     for section in _SECTION.finditer(page):
         for packages in _INSTALL.findall(section["text"]):
-            yield Client(section["name"], shlex.split(packages), _CODE.findall(section["text"]))
+            yield Client(section["name"], shlex.split(packages), list(_blocks(_INSTALL.sub("", section["text"]))))
+
+
+def _blocks(text: str) -> Iterator[Block]:
+    for block in _BLOCK.finditer(text):
+        saved = _SAVED.search(text, 0, block.start())
+        yield Block(block["kind"], block["text"], saved and saved["file"])
 
 
 def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path) -> str:
-    """Make a client's environment, if it is not there, and run its code.
+    """Make a client's environment, if it is not there, and run its blocks.
 
     Args:
         client: of the page.
-        surroundings: variables of the code's environment.
-        folder: for its scripts, and for what they write where they run.
+        surroundings: variables of the blocks' environment.
+        folder: where they run, and that their files go into.
 
     Returns:
         What is wrong, in one line.
     """
-    venv = _ROOT / f".venv-clients-{client.name.lower()}"
+    venv = _ROOT / f".venv-clients-{re.sub('[^a-z0-9]+', '-', client.name.lower())}"
     python = venv / "bin" / "python"
     packages = [part for package in client.packages for part in _of_this_repository(package)]
     commands = [[_ROOT / "tools" / "ensure_venv.sh", venv], [python, "-m", "pip", "install", "-q", *packages]]
     wrong = next(filter(None, (_run(command, os.environ, _ROOT) for command in commands)), "")
-    for block in client.blocks if not wrong else ():
-        script = folder / "block.py"
-        script.write_text(block, encoding="utf-8")
-        wrong = wrong or _run([python, script], surroundings, folder)
+    surroundings = surroundings | {"PATH": f"{python.parent}{os.pathsep}{surroundings['PATH']}"}
+    for block in client.blocks:
+        script = folder / (block.file or "block")
+        script.write_text(block.text, encoding="utf-8")
+        if not block.file:
+            wrong = wrong or _run([*_SHELLS[block.kind], script], surroundings, folder)
     return wrong
 
 
@@ -85,15 +110,18 @@ def _run(command: list, surroundings: Mapping[str, str], folder: pathlib.Path) -
 def main() -> int:
     """Print a line for each client; return the exit status."""
     failed = False
-    with tempfile.TemporaryDirectory() as folder:
-        folder = pathlib.Path(folder)
-        # Some leave caches and tokens in the user's home.
-        surroundings = os.environ | {"HOME": str(folder), "MINARI_DATASETS_PATH": str(folder / "datasets")}
-        for client in clients(PAGE.read_text(encoding="utf-8")):
-            start = time.perf_counter()
-            problem = check(client, surroundings, folder)
-            failed |= bool(problem)
-            print(f"{client.name:20}{time.perf_counter() - start:7.1f} s  {problem or 'ok'}", flush=True)
+    for page in PAGES:
+        with tempfile.TemporaryDirectory() as name:
+            folder = pathlib.Path(name)
+            for script in (_ROOT / "examples" / "training").glob("*.py"):
+                shutil.copy(script, folder)
+            # Some leave caches and tokens in the user's home.
+            own = {"HOME": name, "MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg"}
+            for client in clients(page.read_text(encoding="utf-8")):
+                start = time.perf_counter()
+                problem = check(client, os.environ | own, folder)
+                failed |= bool(problem)
+                print(f"{client.name:40}{time.perf_counter() - start:7.1f} s  {problem or 'ok'}", flush=True)
     return int(failed)
 
 

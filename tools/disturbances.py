@@ -1,12 +1,10 @@
 """Measures how demonstrators fare under modifiers: how far they walk straight ahead, and how many fall.
 
 Each figure is the way along the first heading as a share of that at the target velocity, over whole
-episodes, with the share of episodes that ended in a fall in brackets. With --task, policies do the
-named task as it is: return, mean tracking, and the share of falls.
+episodes, with the share of episodes that ended in a fall in brackets. `tools/results.py` measures tasks as they are.
 
 Example:
   python tools/disturbances.py --robots tick,leaper --episodes 10 --steps 400
-  python tools/disturbances.py --task shoved --steps 1000
 """
 
 import contextlib
@@ -24,7 +22,6 @@ from arc_suite.robots import ROBOTS
 FLAGS = flags.FLAGS
 flags.DEFINE_list("robots", list(ROBOTS), "Who walks.")
 flags.DEFINE_list("presets", ["tuned", "steered", "surefooted"], "Of the demonstrator.")
-flags.DEFINE_string("task", None, "Task to do as it is, in place of walking straight under one modifier after another.")
 flags.DEFINE_integer("episodes", 10, "How many of each.", lower_bound=1)
 flags.DEFINE_integer("steps", 400, "Control steps of an episode.", lower_bound=1)
 flags.DEFINE_integer("seed", 0, "Of the first episode.", lower_bound=0)
@@ -77,21 +74,10 @@ def line(first: str, cells) -> str:
 
 
 def main() -> None:
-    """Print a table for each robot, or one for the task."""
+    """Print a table for each robot."""
     robots = {name: ROBOTS[checks.name(name, ROBOTS, "robot")] for name in FLAGS.robots}
     for body, preset in itertools.product(robots.values(), FLAGS.presets):
         checks.name(preset, presets_of(body), "preset")
-    if FLAGS.task is not None:
-        players = [("zero", "medium"), *(("cpg", preset) for preset in FLAGS.presets)]
-        print(line(FLAGS.task, ["zero", *FLAGS.presets]), line("---", ["---"] * len(players)), sep="\n")
-        for name, body in robots.items():
-            played = [episodes(FLAGS.task, body, {}, *player) for player in players]
-            names = "return", "progress_tracking", "progress_fell"
-            means = [[figures[name].mean() for name in names] for figures in played]
-            print(
-                line(name, [f"{total:.0f}, {tracking:.2f} ({fell:.0%})" for total, tracking, fell in means]), flush=True
-            )
-        return
     for name, body in robots.items():
         print(line(name, FLAGS.presets), line("---", ["---"] * len(FLAGS.presets)), sep="\n")
         for settings in program.progress(modifiers(body), desc=name, leave=False):

@@ -10,8 +10,9 @@ from absl import flags
 
 import arc_suite
 from arc_suite import checks, evaluation, files, policies
-from arc_suite.cli import films, program
+from arc_suite.cli import program
 from arc_suite.cpg import suited_preset
+from arc_suite.export import films
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 

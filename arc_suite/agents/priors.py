@@ -37,6 +37,10 @@ def mapped(context: RunContext, task: Task) -> Replay:
         raise ValueError(f"prior {context.prior!r}: of {found.body.name}, and not of {setup.body.name}")
     if found != setup:
         raise ValueError(f"prior {context.prior!r}: of {found}, and not of {setup}")
+    version = dataset.metadata["arc_suite"].get("task_version")
+    if version != setup.kind.version:  # of other dynamics, rewards or observations
+        there, here = checks.quoted(version), f"{setup.kind.version} is installed"
+        raise ValueError(f"prior {context.prior!r}: of version {there} of {setup.kind.name}; {here}")
     summaries = dataset.summaries()
     size, joints = task.size, len(setup.body.joint_names)
     count = sum(summary["length"] for summary in summaries)

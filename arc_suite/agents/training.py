@@ -10,7 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import evaluation, files
+from arc_suite import checks, evaluation, files
 from arc_suite.agents import priors, run_folder
 from arc_suite.agents.configuration import PRIOR_SHA256, Configuration
 from arc_suite.agents.learner import ENVIRONMENT, Damaged, Diverged, RunContext, Slice
@@ -44,14 +44,17 @@ def train(
         Whether the run is finished.
 
     Raises:
-        ValueError: a part of the run that does not fit, the folder of another run, or a damaged one.
+        ValueError: a part of the run or minutes that do not fit, the folder of another run, or a damaged one.
         Diverged: a value of the learner is not finite; the checkpoint before stays.
         OSError: the disk is full, or the like; the checkpoint before stays.
     """
     began = time.monotonic()
+    if minutes is not None:
+        checks.number("minutes", minutes, 0.0)
     record, definition, setup = configuration.record(), configuration.definition, configuration.setup
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.digest(configuration.prior)
+    evaluation.check_ends(setup.definition.step_limit)
     module = definition.module
     growing = ("steps",) if definition.extends else ()
     with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:

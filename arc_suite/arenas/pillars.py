@@ -33,13 +33,13 @@ class Pillars(Flat):
 
     def add_to(self, root: mjcf.RootElement, **contact) -> None:
         """Add the plane `floor`, and the pillars `floor_pillar_<number>`, each a body that `mocap_pos` moves."""
-        super().add_to(root, **contact)
+        super().add_to(root, contype=0, **contact)
         for number, place in enumerate(self.places(np.zeros((COUNT, 2)))):
             name = f"floor_pillar_{number}"
             pillar = root.worldbody.add("body", name=name, mocap=True, pos=place)
             # A capsule whose ends' middles are at the floor and at the top: as a cylinder between them.
             size = (RADIUS * self.unit, 0.5 * self.top)
-            pillar.add("geom", name=name, type="capsule", size=size, mass=0.0, conaffinity=1, **contact)
+            pillar.add("geom", name=name, type="capsule", size=size, mass=0.0, contype=0, conaffinity=1, **contact)
 
     def places(self, shifts: np.ndarray) -> np.ndarray:
         """Return the centres of the pillars (COUNT, 3), m.

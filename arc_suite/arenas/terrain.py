@@ -50,8 +50,8 @@ def _stairs(random: np.random.RandomState, difficulty: float, x: np.ndarray) -> 
 
 
 def _gaps(random: np.random.RandomState, difficulty: float, x: np.ndarray) -> np.ndarray:
-    """Trenches, 0.1 to 0.6 wide, across lands of 1.5 to 3."""
-    heights, at, width = np.zeros(len(x)), LEVEL, round((0.1 + 0.5 * difficulty) / _GRAIN) * _GRAIN
+    """Trenches, 1/16 to 10/16 wide, a sixteenth for each level of a curriculum, across lands of 1.5 to 3."""
+    heights, at, width = np.zeros(len(x)), LEVEL, round(1.0 + 9.0 * difficulty) * _GRAIN
     lands = np.round(random.uniform(1.5, 3.0, int(len(x) * _GRAIN)) / _GRAIN) * _GRAIN  # more than fit
     for land in lands:
         heights[(x >= at) & (x < at + width)] = -_TRENCH

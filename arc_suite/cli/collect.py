@@ -19,8 +19,18 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, made_body, policy_name, setups
+from arc_suite.cli.flags import (
+    MOST,
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_task,
+    made_body,
+    policy_name,
+    setups,
+)
 from arc_suite.cli.program import progress
+from arc_suite.cpg import suited_preset
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
@@ -37,9 +47,13 @@ flags.DEFINE_enum(
     "Of the run that --policy names: random, uniform actions; medium, the first checkpoint that earns a third of the "
     "best one's return; expert, the latest; replay, all checkpoints in turn.",
 )
-flags.DEFINE_list("preset", ["medium"], f"{policies.PRESET_HELP} Several with commas take turns.")
+flags.DEFINE_list(
+    "preset",
+    None,
+    f"{policies.PRESET_HELP} Several with commas take turns. [default: the one that suits the task and the body]",
+)
 flags.DEFINE_float("noise", 0.0, "Standard deviation of normal noise on actions.", lower_bound=0.0)
-flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", lower_bound=1)
+flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have.", 1, MOST)
 flags.DEFINE_integer(
     "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
 )
@@ -69,12 +83,15 @@ def main() -> None:
         return
     if FLAGS.id is not None and len(asked) > 1:
         raise ValueError(f"--id={FLAGS.id}: names one dataset, and --robot=all makes {len(asked)}")
-    presets = tuple(checks.name(preset, policies.preset_names(), "preset") for preset in FLAGS.preset)
-    presets = presets if FLAGS.policy == "cpg" else ()
+    for name in FLAGS.preset or ():
+        checks.name(name, policies.preset_names(), "preset")
     policy, label = chosen()
     for setup in asked.values():
-        settings = data.Settings(setup, policy, presets, FLAGS.noise, FLAGS.seed, FLAGS.steps)
-        dataset_id = FLAGS.id or settings.dataset_id(label)
+        presets = FLAGS.preset if FLAGS.policy == "cpg" else ()
+        if presets is None:
+            presets = [suited_preset(setup.definition)]
+        settings = data.Settings(setup, policy, tuple(presets), FLAGS.noise, FLAGS.seed, FLAGS.steps)
+        dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id
         missing = data.collect(
             dataset_id,
             settings,

@@ -1,11 +1,12 @@
 """Evaluate a policy: the task's metrics, and return and length of episodes.
 
-Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. The
-return is compared with that of the paper's demonstrator, where the task is the paper's. IQM is the
-interquartile mean of the return, with a stratified bootstrap interval. The JSON is an entry for
-`arc-suite enter`: it holds every episode, and hashes of policy, body, model and task.
+Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. IQM is
+the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
+still, in one episode from the first seed. With --preset medium, which is the paper's demonstrator, the
+table ends with the paper's return. The JSON is an entry for `arc-suite enter`: it holds every episode, and
+hashes of policy, body, model and task.
 
-  arc-suite evaluate --robot all --policy cpg --preset medium --episodes 10
+  arc-suite evaluate --robot all --policy cpg --episodes 10
   arc-suite evaluate --spec spider
   arc-suite evaluate --robot queen --set target_velocity=0.4
 """
@@ -15,8 +16,18 @@ from collections.abc import Mapping
 from absl import flags
 
 from arc_suite import checks, evaluation, files, policies, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, policy_name, setups
+from arc_suite.cli.flags import (
+    MOST,
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_preset,
+    define_task,
+    policy_name,
+    setups,
+)
 from arc_suite.cli.program import progress
+from arc_suite.cpg import suited_preset
 from arc_suite.evaluation import entries
 
 FLAGS = flags.FLAGS
@@ -24,12 +35,12 @@ define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "all", f"{ROBOT_HELP}, or all.")
 define_policy()
-flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", lower_bound=1)
+define_preset()
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", 1, MOST)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 
-_WIDTHS = (18, 26, 9, 12)  # of the columns that every task has
+_WIDTHS = (18, 9, 26, 9, 12)  # of the columns that every task has
 
 
 def line(first: str, metrics: Mapping[str, str], *cells: str) -> str:
@@ -38,52 +49,58 @@ def line(first: str, metrics: Mapping[str, str], *cells: str) -> str:
     Args:
         first: cell of the first column, as wide as the column.
         metrics: the task's own by name.
-        *cells: of the columns that every task has.
+        *cells: of the columns that every task has, the last of which may be missing.
     """
     own = [f"{cell:>{max(len(name), 6)}}" for name, cell in metrics.items()]
-    return " ".join([first, *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))])
+    return " ".join([first, *own, *(f"{cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=False))])
 
 
 def main() -> None:
     """Print the table and write the JSON."""
     asked = setups(_ROBOT)
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
-    chosen, players = policy_name(FLAGS.policy), {}
+    chosen, players, presets = policy_name(FLAGS.policy), {}, {}
     for name, setup in asked.items():
         environment, body = setup.load(), setup.body
-        players[name] = (
-            environment,
-            policies.policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=environment.task.definition),
-        )
+        task = environment.task.definition
+        if chosen == "cpg":
+            presets[name] = suited_preset(task) if FLAGS.preset is None else FLAGS.preset
+        policy = policies.policy(chosen, body, presets.get(name, FLAGS.preset), task=task)
+        players[name] = environment, policy, policies.policy("zero", body, task=task)
     experts = {name: evaluation.expert_return(setup) for name, setup in asked.items()}
+    papers = [name for name, expert in experts.items() if expert is not None and presets.get(name) == "medium"]
     with files.writing_json(FLAGS.json) as file:
         reports = {}
-        width = max(12, *map(len, players))
-        for robot, (environment, policy) in players.items():
+        labels = {name: f"{name}, {presets[name]}" if name in presets else name for name in players}
+        width = max(12, *map(len, labels.values()))
+        for robot, (environment, policy, zero) in players.items():
             episodes = evaluate(robot, environment, policy)
+            stood = evaluation.run(environment, zero, FLAGS.seed).total
             if not reports:
                 names = {name: name for name in episodes[0].progress}
-                header = line("robot".ljust(width), names, "return", "IQM [95 % interval]", "steps", "paper's cpg")
+                heads = ["return", "zero", "IQM [95 % interval]", "steps", *["paper's cpg"] * bool(papers)]
+                header = line("robot".ljust(width), names, *heads)
                 print(header, "-" * len(header), sep="\n")
-            reports[robot] = {"provenance": entries.provenance(asked[robot])} | report(episodes, experts[robot])
-            print(row(robot.ljust(width), reports[robot]), flush=True)
+            reports[robot] = {
+                "provenance": entries.provenance(asked[robot]),
+                "preset": presets.get(robot),
+                **report(episodes, stood, experts[robot]),
+            }
+            print(row(labels[robot].ljust(width), reports[robot], robot in papers), flush=True)
         file.update(
             task=setup.task,
             task_kwargs=setup.task_kwargs,
             policy=chosen,
             policy_sha256=entries.policy_sha256(chosen),
-            preset=FLAGS.preset if FLAGS.policy == "cpg" else None,
             seed=FLAGS.seed,
             robots=reports,
             versions=versions.recorded(),
         )
         if len(reports) > 1 and None not in experts.values():
             file["return_over_expert"] = total = over_all(reports)
-            print(
-                "all          IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]".format(
-                    total["iqm"], *total["interval"]
-                )
-            )
+            if papers:
+                text = "all          IQM of return / paper's cpg: {:.3f} [{:.3f}, {:.3f}]"
+                print(text.format(total["iqm"], *total["interval"]))
 
 
 def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
@@ -93,15 +110,17 @@ def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
         return evaluation.episodes(environment, policy, bar)
 
 
-def report(episodes: list[evaluation.Episode], expert: float | None) -> dict:
+def report(episodes: list[evaluation.Episode], zero: float, expert: float | None) -> dict:
     """Return the metrics of one robot, as in the JSON.
 
     Args:
         episodes: of the robot.
+        zero: return of standing still.
         expert: return of the paper's demonstrator, if it has one.
     """
     progress = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
     return {
+        "zero_return": zero,
         "expert_return": expert,
         "return": evaluation.summary([episode.total for episode in episodes]),
         "length": evaluation.summary([episode.length for episode in episodes]),
@@ -110,16 +129,17 @@ def report(episodes: list[evaluation.Episode], expert: float | None) -> dict:
     }
 
 
-def row(robot: str, metrics: dict) -> str:
-    """Return one line of the table."""
+def row(robot: str, metrics: dict, with_paper: bool) -> str:
+    """Return one line of the table, which may end with the paper's return."""
     total, progress = metrics["return"], metrics["episodes"][0].progress
     return line(
         robot,
         {name: f"{metrics[name].mean:.3f}" for name in progress},
         f"{total.mean:.1f} +- {total.deviation:.1f}",
+        f"{metrics['zero_return']:.1f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
         f"{metrics['length'].mean:.1f}",
-        "-" if metrics["expert_return"] is None else f"{metrics['expert_return']:.0f}",
+        *([f"{metrics['expert_return']:.0f}"] if with_paper else []),
     )
 
 

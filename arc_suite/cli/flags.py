@@ -1,6 +1,7 @@
 """Flags that several programs have: body, task and its settings."""
 
 import json
+import warnings
 from collections.abc import Iterable
 from typing import Any
 
@@ -8,6 +9,7 @@ from absl import flags
 
 from arc_suite import checks, policies, registry
 from arc_suite.envs.setup import Setup
+from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.robots.spec import Body
@@ -15,6 +17,7 @@ from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
 
+MOST = 100_000  # episodes, or bodies: more than anyone waits for
 ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
 
 
@@ -47,6 +50,11 @@ def define_policy(text: str = policies.HELP) -> None:
     """
     flags.DEFINE_string("policy", "cpg", text)
     define_vecnormalize()
+
+
+def define_preset() -> None:
+    """Define --preset, for programs that take the demonstrator."""
+    flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: the one that suits the task and the body]")
 
 
 def define_vecnormalize() -> None:
@@ -91,7 +99,8 @@ def made_body() -> Body | None:
 def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
 
-    A robot of another package is named `module:name`, and its module imported.
+    A robot of another package is named `module:name`, and its module imported. Flaws of the body in a spec file, such
+    as feet in the floor, are warned of with the values that fit, as `arc-suite check` has them.
 
     Raises:
         ValueError: as `made_body`, or an unknown robot, or a robot and a body.
@@ -106,6 +115,8 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
         return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
     if robot.present:
         raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
+    for flaw in flaws(body) if FLAGS.spec is not None else ():
+        warnings.warn(f"{FLAGS.spec}: {flaw.text}", stacklevel=2)
     return {body.name: body}
 
 

@@ -21,13 +21,21 @@ from absl import flags
 
 import arc_suite
 from arc_suite import checks, files, style
-from arc_suite.cli import films
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_policy, define_task, policy_name, task
+from arc_suite.cli.flags import (
+    ROBOT_HELP,
+    bodies,
+    define_body,
+    define_policy,
+    define_preset,
+    define_task,
+    policy_name,
+    task,
+)
 from arc_suite.cli.program import progress
-from arc_suite.export import pages
+from arc_suite.export import films, pages
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
-from arc_suite.policies import PRESET_HELP, Policy, alone, policy
+from arc_suite.policies import Policy, alone, policy
 
 _STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".html": 400}
 _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
@@ -38,7 +46,7 @@ define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all of them side by side.")
 define_policy()
-flags.DEFINE_string("preset", "medium", PRESET_HELP)
+define_preset()
 flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)
 flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
 flags.DEFINE_integer("width", None, "Of a view, in pixels. [default: 640, in a GIF 240]", 16, MAX_WIDTH)
@@ -57,7 +65,8 @@ def main() -> None:
     """Play the episodes, write the file and print the returns."""
     walkers = bodies(_ROBOT)
     task_name, task_kwargs = task()
-    camera = checks.name(FLAGS.camera or ("profile" if len(walkers) == 1 else "portrait"), CAMERAS, "camera")
+    usual = "profile" if len(walkers) == 1 else "portrait"
+    camera = checks.name(usual if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
     environments = {
         name: arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed}) for name, body in walkers.items()
     }

@@ -18,8 +18,18 @@ import pathlib
 
 from absl import flags
 
-from arc_suite import evaluation, files, policies, style, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, made_body, policy_name, setups
+from arc_suite import evaluation, files, style, versions
+from arc_suite.cli.flags import (
+    MOST,
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_preset,
+    define_task,
+    made_body,
+    policy_name,
+    setups,
+)
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.export import pages
@@ -30,10 +40,10 @@ define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all. [default: the one of stored tracks, else queen]")
 define_policy(sources.HELP)
-flags.DEFINE_string("preset", "medium", policies.PRESET_HELP)
+define_preset()
 flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
-flags.DEFINE_string("compare_preset", "medium", "Preset of --compare, if that is the cpg.")
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", lower_bound=1)
+flags.DEFINE_string("compare_preset", None, "Preset of --compare, if that is the cpg. [default: as of --preset]")
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", 1, MOST)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON.")
 flags.DEFINE_string(

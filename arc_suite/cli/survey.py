@@ -15,17 +15,17 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.cli import films
-from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import survey
+from arc_suite.export import films
 from arc_suite.robots import generator
 
 FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
-flags.DEFINE_integer("count", 500, "Number of bodies.", lower_bound=1)
+flags.DEFINE_integer("count", 500, "Number of bodies.", 1, MOST)
 flags.DEFINE_integer("legs", None, "Number of legs. [default: random]", *generator.LEGS)
 flags.DEFINE_integer("links", None, "Actuated links of each leg. [default: random, 2 to 4]", *generator.LINKS)
 flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0)

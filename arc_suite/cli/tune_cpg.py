@@ -14,7 +14,7 @@ import pathlib
 from absl import flags
 
 from arc_suite import checks, evaluation, files, versions
-from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
@@ -32,15 +32,15 @@ flags.DEFINE_string(
     "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
 )
 for name, least, most, what in (
-    ("generations", 1, None, "Generations of the search, more make a finished one go on"),
-    ("episodes", 1, None, "Episodes by which a candidate is evaluated"),
+    ("generations", 1, MOST, "Generations of the search, more make a finished one go on"),
+    ("episodes", 1, MOST, "Episodes by which a candidate is evaluated"),
     ("steps", 1, STEPS, "Control steps of these episodes"),
-    ("starts", 0, None, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
+    ("starts", 0, MOST, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
 ):
     usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
     flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
-flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", lower_bound=1)
+flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", 1, MOST)
 flags.DEFINE_string(
     "output", "out/tune", "Folder of the journal, the plot and the result, made if need be.", short_name="o"
 )

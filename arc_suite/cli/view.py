@@ -17,9 +17,17 @@ from absl import flags
 
 import arc_suite
 from arc_suite import policies
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_policy, define_task, only_body, policy_name, task
+from arc_suite.cli.flags import (
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_preset,
+    define_task,
+    only_body,
+    policy_name,
+    task,
+)
 from arc_suite.cli.live import Live, play
-from arc_suite.cpg import suited_preset
 from arc_suite.envs.window import Window
 
 _INSTEAD = "`arc-suite render -o walk.html` writes a page that plays in any browser"
@@ -29,7 +37,7 @@ define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
 define_policy()
-flags.DEFINE_string("preset", None, f"{policies.PRESET_HELP} [default: the one for the task]")
+define_preset()
 
 
 def main() -> None:
@@ -38,8 +46,7 @@ def main() -> None:
     name, settings = task()
     environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings)
     definition = environment.task.definition
-    preset = FLAGS.preset or suited_preset(definition)
-    policy = policies.policy(policy_name(FLAGS.policy), body, preset, task=definition)
+    policy = policies.policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=definition)
     live = Live(environment, policies.alone(policy))
     keys = queue.SimpleQueue()
     window = Window(live.shown, pressed=keys.put, instead=_INSTEAD)

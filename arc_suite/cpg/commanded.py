@@ -70,7 +70,7 @@ class Commanded(ABC):
         damping: (joints,) action per rad/s.
     """
 
-    reads = ("posture", "velocities", "command", "gait_clock")
+    reads: tuple[str, ...] = ("posture", "velocities", "command", "gait_clock")
 
     def __init__(self, task: Task, parameters, angles: tuple[float, ...] | None = None):
         """Fit the law to a task.

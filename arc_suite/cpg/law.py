@@ -9,7 +9,7 @@ A law of a demonstrator is a pure function `(state, observation) -> (state, acti
 state is a NamedTuple of arrays with a leading axis of environments, as `initial(count)` returns it.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -98,9 +98,9 @@ class Clock(NamedTuple):
 class Clocked:
     """A law with a clock of its own."""
 
-    reads = ("posture", "velocities")
+    reads: tuple[str, ...] = ("posture", "velocities")
 
-    def __init__(self, control: Callable):
+    def __init__(self, control):
         """Take a function of control steps (...), quaternion (..., 4), joint angles and velocities (..., joints)."""
         self.control = control
 

@@ -122,7 +122,7 @@ def path(goal: np.ndarray, circles: np.ndarray, extent: float, parameters: Plann
     left = np.hypot(*(points - goal).T)  # the least that is left from each
     costs, before = np.where(np.arange(len(points)), np.inf, 0.0), np.zeros(len(points), int)
     done = np.zeros(len(points), bool)
-    queue = [(left[0], 0)]  # least cost of the whole path, through a point
+    queue: list[tuple] = [(left[0], 0)]  # least cost of the whole path, through a point
     while queue:
         _, point = heapq.heappop(queue)
         if point == 1:

@@ -179,4 +179,5 @@ def feedforward(body: Body, preset: Preset) -> Feedforward | None:
             sign = -1.0 if hip and leg.side == "left" else 1.0
             amplitudes.append(sign * np.array(preset.torques[joint.name][rank]) if preset.torques else (0.0, 0.0))
             steering.append(preset.steering if hip else 0.0)
-    return Feedforward(*np.split(np.array(amplitudes), 2, axis=-1), np.array(steering))
+    cosines, sines = np.split(np.array(amplitudes), 2, axis=-1)
+    return Feedforward(cosines, sines, np.array(steering))

@@ -1,8 +1,11 @@
 """Opens datasets to be read."""
 
 import contextlib
-from collections.abc import Iterator
+import json
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import h5py
 
@@ -75,6 +78,7 @@ class Dataset:
             )
             self._length = checks.integer("total_episodes", self.metadata["total_episodes"], 0, 1 << 32)
             checks.integer("total_steps", self.metadata["total_steps"], 0, 1 << 53)
+            _check_spec(self.metadata.get("env_spec"), self.settings, known)
 
     def __len__(self) -> int:
         return self._length
@@ -132,6 +136,25 @@ def _typed(name: str, value, kind: type):
     if not isinstance(value, kind):
         raise TypeError(f"expected {name} to be a {kind.__name__}")
     return value
+
+
+def _check_spec(spec: str | None, settings: Settings, known: Mapping[str, Any]) -> None:
+    """Compare Minari's spec of the environment, if there is one, with the settings, which are what we replay.
+
+    Raises:
+        ValueError: they differ.
+    """
+    if spec is None:
+        return
+    there, here = json.loads(spec), json.loads(settings.setup.spec(settings.steps).to_json())
+    # A robot's text is that of the file; versions of tasks may have moved on since.
+    here["kwargs"]["domain_name"] = known["robot"]
+    for found in (there, here):
+        found["id"] = re.sub(r"-v\d+$", "", found["id"])
+    for name in ("id", "entry_point", "max_episode_steps", "kwargs"):
+        if there.get(name) != here[name]:
+            said, wanted = (checks.quoted(json.dumps(each)) for each in (there.get(name), here[name]))
+            raise ValueError(f"{name} of its env_spec is {said}, and its settings say {wanted}")
 
 
 def read_metadata(dataset_id: str, path: Path) -> dict:

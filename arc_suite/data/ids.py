@@ -20,8 +20,8 @@ def check(dataset_id: str) -> str:
     if not _valid(dataset_id):
         example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0")))
         raise ValueError(
-            f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between and a version "
-            f"at the end alone, such as {example!r}"
+            f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between, two "
+            f"characters at least before the last '/', and a version at the end alone, such as {example!r}"
         )
     return dataset_id
 

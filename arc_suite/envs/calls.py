@@ -1,17 +1,20 @@
-"""Checks of calls of an environment: one thread at a time, actions and live commands that fit."""
+"""Calls of an environment: one thread at a time, actions and live commands that fit, and commands of any thread."""
 
 import functools
 import threading
+from typing import Any
 
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.envs import trees
 from arc_suite.tasks import Task
+from arc_suite.tasks.parameters import LARGEST
 
 _NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
 
 
-class Lock(type(threading.RLock())):
+class Lock(type(threading.RLock())):  # type: ignore[misc]  # the class has no name
     """The lock of one environment, as MuJoCo crashes where two threads step one simulation.
 
     Its pickles and copies are new locks, which nobody holds.
@@ -43,6 +46,42 @@ def one_thread_at_a_time(method):
     return alone
 
 
+class LiveCommands:
+    """The latest value of each live command that no step has taken yet; any thread may put one at any time.
+
+    Pickles and copies hold the same values.
+    """
+
+    def __init__(self, task: Task):
+        """Start without any."""
+        self._task = task
+        self._lock, self._latest = Lock(), {}  # the latter is replaced, never changed
+
+    def put(self, name: str, value: np.ndarray, mask: np.ndarray | None = None) -> None:
+        """Add a checked value, in a batch for the environments of a mask (num_envs,)."""
+        with self._lock:
+            if mask is not None and name in self._latest:
+                before, others = self._latest[name]
+                value, mask = np.where(mask[:, None], value, before), mask | others
+            self._latest = {**self._latest, name: (value, mask)}
+
+    def seen(self, memory) -> Any:
+        """Return the memory of an episode as the next step will find it."""
+        return self._commanded(memory, self._latest)
+
+    def taken(self, memory) -> Any:
+        """Return the memory of an episode after the commands, which are gone then."""
+        with self._lock:
+            latest, self._latest = self._latest, {}
+        return self._commanded(memory, latest)
+
+    def _commanded(self, memory, latest) -> Any:
+        for name, (value, mask) in latest.items():
+            changed = self._task.commanded(memory, name, value)
+            memory = changed if mask is None else trees.chosen(mask, changed, memory)
+        return memory
+
+
 def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:
     """Return the action as float64, clipped to [-1, 1].
 
@@ -71,14 +110,14 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
     """Return the value of a live command as floats, (*leading, size); None stands for what the task itself would do.
 
     Raises:
-        ValueError: the task has no such command, or the value has another size.
+        ValueError: the task has no such command, or the value has another size or is out of range.
     """
     if not task.commands:
         raise ValueError(f"command {name!r}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     numbers = np.full(size, np.nan) if value is None else _real(value)
-    if numbers is None or numbers.shape not in ((size,), (*leading, size)) or np.isinf(numbers).any():
-        raise ValueError(f"command {name!r}: expected {size} finite numbers, got {value!r}")
+    if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
+        raise ValueError(f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {value!r}")
     return np.broadcast_to(numbers, (*leading, size)).copy()
 
 

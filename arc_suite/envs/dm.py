@@ -2,6 +2,7 @@
 
 import collections
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,10 +13,11 @@ from dm_control.rl import control
 from dm_env import specs
 
 from arc_suite import checks
-from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.calls import LiveCommands, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
 
@@ -30,7 +32,13 @@ _FIXED = {
 }
 
 
-def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visualize_reward=False):
+def load(
+    domain_name: str | os.PathLike | Body,
+    task_name: str,
+    task_kwargs: Mapping[str, Any] | None = None,
+    environment_kwargs: Mapping[str, Any] | None = None,
+    visualize_reward: bool = False,
+) -> "Environment":
     """Open an environment, as `dm_control.suite.load` does.
 
     Args:
@@ -69,7 +77,7 @@ def load(domain_name, task_name, task_kwargs=None, environment_kwargs=None, visu
 class Environment(control.Environment):
     """A task in a simulation; steps, resets and specs are those of dm_control.
 
-    While one thread is in a step, reset or command, another's is refused with a RuntimeError.
+    While one thread is in a step or reset, another's is refused with a RuntimeError. Any thread may set commands.
 
     Attributes:
         task_kwargs: the settings with which `load` opened the task.
@@ -108,9 +116,10 @@ class Environment(control.Environment):
             self.task.random = np.random.RandomState(checks.seed(seed))
         return super().reset()
 
-    @one_thread_at_a_time
     def command(self, name: str, value) -> None:
-        """Set a command of the task from now on, as a player's stick does, until the next episode.
+        """Set a command of the task from the next step on, as a player's stick does, until the next episode.
+
+        Any thread may call it while another is in a step, which goes on with the command before.
 
         Args:
             name: one of the task's `commands`.
@@ -131,7 +140,7 @@ class TaskRun(TaskView, control.Task):
 
     Attributes:
         definition: the task, a value of the contract.
-        memory: of the present episode; None before the first.
+        memory: of the present episode, as the next step will find it; None before the first.
         terms: the unweighted terms of the latest reward by name; empty before the first step.
         visualize_reward: whether rendered pictures show the reward as a colour.
     """
@@ -152,7 +161,8 @@ class TaskRun(TaskView, control.Task):
         if not isinstance(random, np.random.RandomState):
             random = np.random.RandomState(None if random is None else checks.seed(random))
         self.definition = task
-        self.memory = None
+        self._memory = None
+        self._commands = LiveCommands(task)
         self.terms = {}
         self.visualize_reward = False
         self.random = random
@@ -172,9 +182,18 @@ class TaskRun(TaskView, control.Task):
         self._random, self._stream, self._stream_begins = value, self.definition.first(), True
 
     @property
+    def memory(self) -> Any:
+        """The memory of the present episode."""
+        return self._commands.seen(self._memory)
+
+    @memory.setter
+    def memory(self, value: Any):
+        self._memory = value
+
+    @property
     def progress(self) -> dict[str, float]:
         """How well the episode has gone so far, figures by name."""
-        return self.definition.progress(self.memory)
+        return self.definition.progress(self._memory)
 
     def set_command(self, name: str, value) -> None:
         """Set a live command; see `Environment.command`.
@@ -183,9 +202,9 @@ class TaskRun(TaskView, control.Task):
             ValueError: no such command, a value that does not fit, or no episode has begun.
         """
         value = checked_command(self.definition, name, value)
-        if self.memory is None:
+        if self._memory is None:
             raise ValueError(f"command {name!r}: no episode has begun; reset first")
-        self.memory = self.definition.commanded(self.memory, name, value)
+        self._commands.put(name, value)
 
     def action_spec(self, physics):
         """Return the spec of one control in [-1, 1] for each motor."""
@@ -198,8 +217,9 @@ class TaskRun(TaskView, control.Task):
 
     def initialize_episode(self, physics):
         """Draw how the episode starts, and write it."""
-        if self.memory is not None and not self._stream_begins:
-            self._stream = self.definition.stream_state(self.memory)
+        self._memory = self._commands.taken(self._memory)
+        if self._memory is not None and not self._stream_begins:
+            self._stream = self.definition.stream_state(self._memory)
         self._stream_begins = False
         start = self.definition.start(self._random, self._stream)
         if start.model:
@@ -209,7 +229,7 @@ class TaskRun(TaskView, control.Task):
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
         physics.shown_reward, physics.marker = None, self.markers
-        self.memory, self._starting = start.memory, True
+        self._memory, self._starting = start.memory, True
 
     def before_step(self, action, physics):
         """Apply the action, clipped to [-1, 1].
@@ -218,7 +238,7 @@ class TaskRun(TaskView, control.Task):
             ValueError: the action has another shape or holds NaN; nothing has changed then.
         """
         action = checked_action(action, self._motors)
-        self.memory, inputs = self.definition.before(self.memory, action)
+        self._memory, inputs = self.definition.before(self._commands.taken(self._memory), action)
         data, physics.marker = physics.data.ptr, self.markers  # which a copy of the simulation has not
         data.ctrl[:] = inputs.ctrl
         if inputs.kick is not None:
@@ -233,12 +253,12 @@ class TaskRun(TaskView, control.Task):
         if physics.divergence is not None and self._on_divergence == "raise":
             raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
         self._readings = self.definition.read(physics.data.ptr)
-        self.memory = self.definition.after(self.memory, self._readings)
+        self._memory = self.definition.after(self._memory, self._readings)
 
     def get_reward(self, physics):
         """Return the weighted sum of the terms, which stay in `terms`."""
         weights = self.definition.settings.weights
-        self.terms = self.definition.terms(self.memory, self._latest(physics))
+        self.terms = self.definition.terms(self._memory, self._latest(physics))
         if physics.divergence is not None:
             self.terms = dict.fromkeys(self.terms, np.float64(0.0))
         reward = terms.total(self.terms, weights)
@@ -249,14 +269,14 @@ class TaskRun(TaskView, control.Task):
     def get_observation(self, physics):
         """Return the observation's blocks by name; or one vector of them, as `observations`."""
         readings = self._begin(physics) if self._starting else self._latest(physics)
-        blocks = self.definition.observe(self.memory, readings)
+        blocks = self.definition.observe(self._memory, readings)
         return {_FLAT: self.definition.vector(blocks)} if self._flat else self.definition.named(blocks)
 
     def get_termination(self, physics):
         """Return 0 where the task is failed or the physics has diverged, 1 where it cuts the episode off, else None."""
         if physics.divergence is not None:
             return 0.0
-        terminated, truncated = self.definition.ended(self.memory, self._latest(physics))
+        terminated, truncated = self.definition.ended(self._memory, self._latest(physics))
         self._readings = None  # stale as soon as the simulation moves
         return 0.0 if terminated else 1.0 if truncated else None
 
@@ -272,10 +292,10 @@ class TaskRun(TaskView, control.Task):
         """Return the readings of the start, from which the memory keeps what the first step needs."""
         self._starting, data = False, physics.data.ptr
         readings = self.definition.read(data)
-        lifted = self.definition.clear_spawn(self.memory, readings)
+        lifted = self.definition.clear_spawn(self._memory, readings)
         if lifted is not None:
             data.qpos[:] = lifted
             physics.after_reset()
             readings = self.definition.read(data)
-        self.memory, self._readings = self.definition.begin(self.memory, readings), None
+        self._memory, self._readings = self.definition.begin(self._memory, readings), None
         return readings

@@ -81,11 +81,11 @@ class Env(DmControlCompatibilityV0):
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
         self.render_mode = render_mode
-        size = self.observation_space["observations"].shape
+        size = environment.observation_spec()["observations"].shape
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
-        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, self.action_space.shape, np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, environment.action_spec().shape, np.float32)
         self._lock = environment._lock
-        self._window = None
+        self._window: Window | None = None
         self._stepping = False  # between a reset and the end of its episode
         self._closed = False
         random = (task_kwargs or {}).get("random")
@@ -189,7 +189,7 @@ class Env(DmControlCompatibilityV0):
         self._closed = True
         if self._window is not None:
             self._window.close()
-            self._window = None
+            self._window: Window | None = None
         super().close()
 
     def _check_open(self, call: str) -> None:

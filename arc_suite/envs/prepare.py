@@ -9,7 +9,7 @@ import mujoco
 from arc_suite import checks, registry
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks import modified, modifiers
+from arc_suite.tasks import modified, modifiers, parameters
 from arc_suite.tasks.contract import CHANGEABLE, STEPS, Scene, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
@@ -74,4 +74,4 @@ def _step_limit(time_limit, step: float) -> float:
         return STEPS
     if time_limit == math.inf:
         return math.inf
-    return max(1, math.ceil(checks.number("time_limit", time_limit, 1e-9) / step - 1e-6))
+    return max(1, math.ceil(parameters.positive("time_limit", time_limit) / step - 1e-6))

@@ -40,7 +40,7 @@ class VecEnv(vec_env.VecEnv):
                 f"got {environments!r}{'' if mode is None else f' in the mode {mode.value}'}"
             )
         self.environments = environments
-        self._actions = None
+        self._actions: np.ndarray | None = None
         observations = copy.copy(environments.single_observation_space)
         with contextlib.suppress(ValueError):  # settings that files cannot hold
             setattr(observations, ATTRIBUTE, Setup.of(*environments.arguments).to_dict())

@@ -22,7 +22,7 @@ class TaskView:
 
     definition: Task
     terms: Mapping[str, np.ndarray]
-    progress: Mapping[str, np.ndarray]
+    progress: Mapping[str, Any]
 
     @property
     def body(self) -> Body:

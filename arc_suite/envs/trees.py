@@ -3,6 +3,8 @@
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import numpy as np
+
 
 def mapped(function: Callable, tree, *others) -> Any:
     """Return a tree whose leaves a function makes from the leaves of trees of the same structure."""
@@ -14,6 +16,13 @@ def mapped(function: Callable, tree, *others) -> Any:
 def at(tree, index: int) -> Any:
     """Return the tree of the entries that leaves have at an index of their first axis."""
     return mapped(lambda leaf: leaf[index], tree)
+
+
+def chosen(mask: np.ndarray, there, elsewhere) -> Any:
+    """Return a tree that is one in some environments, (num_envs,) booleans, and another in the others."""
+    if mask.all():
+        return there
+    return mapped(lambda new, old: np.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
 
 
 def leaves(tree) -> Iterator:

@@ -12,14 +12,16 @@ from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
 from arc_suite.envs import snapshots, trees
-from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.calls import LiveCommands, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
 from arc_suite.tasks import Task, terms
 
+_MOST_ENVS, _MOST_THREADS = 1 << 20, 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
 _OF_EACH = ("np_random", "np_random_seed", "render")  # attributes that have a value for each environment
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
@@ -65,7 +67,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     well the episodes have gone so far, such as `progress_speed`: (num_envs,) floats, with
     the mask of the environments that have them under the same name after an underscore.
 
-    Pickles and copies carry on bit for bit. While one thread is in a call, another's is refused.
+    Pickles and copies carry on bit for bit. While one thread is in a call, another's is refused, except `command`.
 
     Where the physics of an environment diverges, its episode is terminated with reward 0 and `info` has
     `diverged`; the others notice nothing.
@@ -74,12 +76,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         arguments: robot, task and its settings, as `Setup.of` takes them.
         autoreset_mode: what happens to an environment whose episode has ended.
         batch: the simulations. Writing their state is for experiments.
+        step_limit: control steps after which every episode is over, may be infinite.
         task: what the environments do; its `split` gives an observation's blocks by name.
     """
 
     def __init__(
         self,
-        domain_name: str,
+        domain_name: str | os.PathLike | Body,
         task_name: str,
         num_envs: int = 1,
         num_threads: int | None = None,
@@ -94,7 +97,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Load the task and allocate the environments.
 
         Args:
-            domain_name: a robot; see `arc_suite.load`.
+            domain_name: a robot or another body; see `arc_suite.load`.
             task_name: as in `arc_suite.load`.
             num_envs: number of environments.
             num_threads: on which to simulate; None for as many as this process has cores.
@@ -113,7 +116,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ValueError: an unknown name, or a value that does not fit.
         """
         self._lock, self.batch = Lock(), None  # first, as Gymnasium closes also what could not be made
-        task_kwargs = dict(task_kwargs or {})
+        task_kwargs = dict(checks.mapping("task_kwargs", task_kwargs))
         seed = task_kwargs.pop("random", None)
         checks.name(task_kwargs.pop("on_divergence", "terminate"), ["terminate"], "on_divergence of many environments")
         mode = autoreset_mode.value if isinstance(autoreset_mode, AutoresetMode) else autoreset_mode
@@ -121,21 +124,23 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self.autoreset_mode = AutoresetMode(checks.name(mode, modes, "autoreset_mode"))
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
-        self.num_envs = checks.integer("num_envs", num_envs, 1)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         pictures.check_size(height, width)
-        threads = usable_cores() if num_threads is None else checks.integer("num_threads", num_threads, 1)
+        threads = min(usable_cores(), _MOST_THREADS) if num_threads is None else num_threads
+        threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
         self._task, model = prepared(*self.arguments)
         pictures.check_camera(model, camera_id)
-        self._step_limit = (
-            np.inf if max_episode_steps is None else checks.integer("max_episode_steps", max_episode_steps, 1)
-        )
+        self.step_limit = self._task.step_limit
+        if max_episode_steps is not None:
+            self.step_limit = min(self.step_limit, checks.integer("max_episode_steps", max_episode_steps, 1))
 
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
         self._terms = {}  # of the latest step
         self._memory = None  # of all environments, with a leading axis
+        self._commands = LiveCommands(self._task)
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
         self._streams = [self._task.first() for _ in range(self.num_envs)]
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
@@ -152,7 +157,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
-        self._picture = {
+        self._picture: dict[str, Any] = {
             "width": width,
             "height": height,
             "camera_id": camera_id,
@@ -182,11 +187,12 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
-        mask = self._mask((options or {}).get("reset_mask"))
+        mask = self._mask(checks.mapping("options", options).get("reset_mask"))
         if self._memory is None and not mask.all():
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:
             self._seed(self._seeds(seed), mask)
+        self._take_commands()
         self._begin(mask, self._observation)
         return self._observation.copy(), {}
 
@@ -211,6 +217,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("step")
         if self._memory is None:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
+        self._take_commands()
         task, before, data = self._task, self._memory, self.batch.data
         waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
         stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
@@ -220,7 +227,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             data.qvel[stepping] += inputs.kick[stepping]
         diverged = self.batch.step(SUBSTEPS, stepping)
         readings = task.read(data)
-        self._memory = memory = _chosen(stepping, task.after(memory, readings), before)
+        self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)
         self._steps += 1
 
         self._terms = earned = task.terms(memory, readings)
@@ -231,7 +238,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         failed, cut = task.ended(memory, readings)
         time_is_up = self._steps >= task.step_limit
         terminated = stepping & (diverged | failed) & ~time_is_up
-        truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self._step_limit))
+        truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self.step_limit))
         self._ended = waiting | terminated | truncated
 
         info = {}
@@ -246,9 +253,10 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
-    @one_thread_at_a_time
     def command(self, name: str, value, mask=None) -> None:
-        """Set a command of the task in some environments from now on, until their next episodes.
+        """Set a command of the task in some environments from the next step on, until their next episodes.
+
+        Any thread may call it while another is in a step, which goes on with the command before.
 
         Args:
             name: one of the task's `commands`.
@@ -265,7 +273,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         mask, value = self._mask(mask, "mask"), checked_command(self._task, name, value, (self.num_envs,))
         if self._memory is None:
             raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
-        self._memory = _chosen(mask, self._task.commanded(self._memory, name, value), self._memory)
+        self._commands.put(name, value, mask)
 
     @one_thread_at_a_time
     def rest(self, mask) -> None:
@@ -292,6 +300,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("take a snapshot")
         if self._memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
+        self._take_commands()
         return snapshots.taken(self)
 
     @one_thread_at_a_time
@@ -305,6 +314,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("restore")
         if self._memory is None:
             self._begin(np.ones(self.num_envs, bool), self._observation)
+        self._take_commands()
         snapshots.put(self, arrays)
 
     @one_thread_at_a_time
@@ -326,6 +336,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._check_open("render")
         if self.render_mode is None:
             return None
+        self._take_commands()
         every = range(self.num_envs)
         indices = every if indices is None else list(indices)
         for index in indices:
@@ -346,7 +357,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """Free the simulations; `close` calls it."""
         self.batch = None
 
-    @property
+    @property  # type: ignore[misc]  # of Gymnasium, which can be set and is of one environment
     def np_random(self) -> tuple[np.random.Generator, ...]:
         """Draw, for each environment, from the stream that its resets draw from."""
         return tuple(np.random.Generator(random._bit_generator) for random in self._randoms)
@@ -397,6 +408,9 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             raise ValueError(f"set_attr {name!r}: environments share it; expected one value for all, got {values!r}")
         setattr(self, name, values[0])
 
+    def _take_commands(self) -> None:
+        self._memory = self._commands.taken(self._memory)
+
     def _check_open(self, call: str) -> None:
         if self.closed:
             raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
@@ -411,7 +425,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
     def _begin(self, mask: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""
         task, starts = self._task, []
-        for index in np.flatnonzero(mask):
+        for index in np.flatnonzero(mask).tolist():
             if not self._streams_begin[index]:
                 self._streams[index] = task.stream_state(trees.at(self._memory, index))
             starts.append(task.start(self._randoms[index], self._streams[index]))
@@ -454,7 +468,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments, except those whose seed is None."""
-        for index in np.flatnonzero(mask):
+        for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
                 self._randoms[index], self._streams[index] = np.random.RandomState(seeds[index]), self._task.first()
                 self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
@@ -472,13 +486,6 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 def usable_cores() -> int:
     """Return how many cores this process may use, where the system tells; else how many there are."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-
-
-def _chosen(mask: np.ndarray, there, elsewhere):
-    """A memory that is one in some environments, (num_envs,) booleans, and another in the others."""
-    if mask.all():
-        return there
-    return trees.mapped(lambda new, old: np.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old), there, elsewhere)
 
 
 def _scattered(mask: np.ndarray, some, memory):
@@ -500,6 +507,6 @@ def _marked(values: Mapping[str, Any], mask: np.ndarray) -> dict[str, Any]:
 def _by_environment(observations: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Observations of some environments in an array of objects, with None for the others."""
     objects = np.full(len(observations), None, dtype=object)
-    for index in np.flatnonzero(mask):
+    for index in np.flatnonzero(mask).tolist():
         objects[index] = observations[index].copy()
     return objects

@@ -1,6 +1,15 @@
 """Evaluation of policies: the protocol, and statistics over episodes."""
 
-from arc_suite.evaluation.protocol import EPISODES, Episode, episodes, episodes_in_batch, expert_return, rollout, run
+from arc_suite.evaluation.protocol import (
+    EPISODES,
+    Episode,
+    check_ends,
+    episodes,
+    episodes_in_batch,
+    expert_return,
+    rollout,
+    run,
+)
 from arc_suite.evaluation.statistics import (
     Curve,
     Summary,
@@ -16,6 +25,7 @@ __all__ = [
     "EPISODES",
     "Curve",
     "Episode",
+    "check_ends",
     "Summary",
     "curve",
     "episodes",

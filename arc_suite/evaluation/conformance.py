@@ -27,12 +27,12 @@ def difference(setup: Setup, steps: int = STEPS) -> str | None:
     try:
         for step in range(1, steps + 1):
             actions = random.uniform(-1.0, 1.0, environments.action_space.shape)
-            before, stepping = environments._memory, np.flatnonzero(~environments._ended)
+            before, stepping = environments._memory, np.flatnonzero(~environments._ended).tolist()
             environments.step(actions)
             together = _told(task, environments._memory, task.read(environments.batch.data))
             for index in stepping:
                 memory = trees.at(before, index)
-                readings = task.read(environments.batch.part(int(index)))
+                readings = task.read(environments.batch.part(index))
                 alone = _told(task, task.after(task.before(memory, actions[index])[0], readings), readings)
                 different = [name for name in alone if not np.array_equal(alone[name], together[name][index])]
                 if different:

@@ -21,12 +21,14 @@ class Entry(NamedTuple):
     Attributes:
         setup: body, task and settings.
         policy: its name, as on the command line.
+        preset: of the demonstrator; None for other policies.
         policy_sha256: hash of its files; None for a policy without files.
         episodes: results of the protocol's episodes.
     """
 
     setup: Setup
     policy: str
+    preset: str | None
     policy_sha256: str | None
     episodes: list[protocol.Episode]
 
@@ -93,18 +95,20 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
     for report in found["robots"].values():
         told = report["provenance"]
         try:
-            setup = Setup.from_dict(told)
+            setup, preset = Setup.from_dict(told), report.get("preset")
+            if preset is not None:
+                checks.name(checks.quoted(preset), policies.preset_names(), "preset")
         except (ValueError, registry.NotImported) as error:
             raise ValueError(f"{path}: {error}") from None
         known = provenance(setup)
         for field in _OF_SETUP:
             _same(path, field, told.get(field), known[field])
         environment = setup.load()
-        player = policies.policy(name, setup.body, found.get("preset") or "medium", task=environment.task.definition)
+        player = policies.policy(name, setup.body, preset, task=environment.task.definition)
         episodes = protocol.episodes(environment, player, progress(range(EPISODES)))
         totals = [each.total for each in episodes]
         _same(path, f"returns of {setup.body.name}", _totals(report), totals)
-        entries.append(Entry(setup, name, found["policy_sha256"], episodes))
+        entries.append(Entry(setup, name, preset, found["policy_sha256"], episodes))
     return entries
 
 

@@ -1,5 +1,6 @@
 """The evaluation protocol, in one place: ten seeded episodes and deterministic actions."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -35,6 +36,16 @@ def expert_return(setup: Setup) -> float | None:
     return DEMONSTRATORS.get(setup.body.name) if published else None
 
 
+def check_ends(limit: float) -> None:
+    """Check that episodes end, given the longest duration, in control steps or s.
+
+    Raises:
+        ValueError: they need not.
+    """
+    if limit == math.inf:
+        raise ValueError("time_limit: expected a finite number, as every episode must end, got inf")
+
+
 def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Iterator:
     """Play one episode.
 
@@ -46,7 +57,12 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
 
     Yields:
         The `TimeStep` of the reset and of every step; the environment stands there meanwhile.
+
+    Raises:
+        ValueError: an episode that need not end.
     """
+    if max_steps is None:
+        check_ends(environment.task.definition.step_limit)
     act, length = alone(policy, seed), 0
     timestep = environment.reset(seed)
     yield timestep
@@ -83,7 +99,11 @@ def episodes_in_batch(environment: VectorEnv, policy: Policy, seeds: Sequence[in
         environment: one environment for each seed, in the mode Disabled.
         policy: made for as many environments.
         seeds: of the episodes; by default the protocol's.
+
+    Raises:
+        ValueError: episodes that need not end.
     """
+    check_ends(environment.step_limit)
     num_envs = len(seeds)
     observations, _ = environment.reset(seed=list(seeds))
     policy.reset(range(num_envs), list(seeds))

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import protocol
 from arc_suite.models.sizing import GRAVITY
 
 LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
@@ -139,18 +140,23 @@ def survey(trials: Sequence[Trial], processes: int | None = None, progress: Call
 
     Args:
         trials: to run.
-        processes: to run them on; None for one per core.
+        processes: to run them on, at most one for each; None for one per core.
         progress: makes a progress bar as `tqdm` does.
 
     Yields:
         The outcomes, in the order of the trials.
+
+    Raises:
+        ValueError: a walk that need not end, or a setting that does not fit.
     """
+    for trial in trials:
+        protocol.check_ends(trial.setup.task_kwargs["time_limit"])
     progress = functools.partial(progress, total=len(trials), unit="body", desc="walk")
     if processes == 1:
         yield from progress(map(run, trials))
         return
     # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
-    with multiprocessing.get_context("spawn").Pool(processes) as pool:
+    with multiprocessing.get_context("spawn").Pool(processes and min(processes, len(trials))) as pool:
         yield from progress(pool.imap(run, trials))
 
 

@@ -114,11 +114,13 @@ def clips(
         progress: wraps the names, such as `tqdm`.
 
     Raises:
-        ValueError: an unknown name, a value out of range, a policy that falls or whose pose does not return
+        ValueError: no name, an unknown one, a value out of range, a policy that falls or whose pose does not return
             within two degrees.
         OSError: a file cannot be read.
     """
     checks.number("fps", fps, 1.0, 1000.0)
+    if not names:
+        raise ValueError(f"clips: expected one or more of {', '.join(CLIPS)}, got none")
     for name in names:
         checks.name(name, CLIPS, "clip")
     if len(set(names)) < len(names):

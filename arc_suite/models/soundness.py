@@ -87,7 +87,7 @@ def _mass_of_legs(body: Body) -> float:
     """Return the mass of all legs, kg: capsules and spheres."""
     volume = 0.0
     for leg in body.legs:
-        balls = sum(part.radius**3 for part in (*leg.links, leg.foot))
+        balls = sum(part.radius**3 for part in leg.parts)
         rods = sum(link.radius**2 * math.hypot(*link.end) for link in leg.links)
         volume += math.pi * (4.0 / 3.0 * balls + rods)
     return body.density * volume

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import checks, versions
-from arc_suite.cpg import Demonstrator
+from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, zips
 from arc_suite.policies.network import Network
@@ -20,6 +21,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
 _CHUNK = 256  # control steps that are drawn at once
+_PACKAGED = Path(__file__).with_name("packaged")
 
 
 def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -27,7 +29,8 @@ def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
         raise ValueError(f"preset: expected one or more of {', '.join(preset_names())}, got none")
     demonstrators = [Demonstrator(task or body, preset) for preset in presets]
     made = demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, num_envs)
-    return Positioned(made, task) if task and task.actions == "position" else made
+    # Modified tasks alone take positions.
+    return Positioned(made, task) if task and task.actions == "position" else made  # type: ignore[arg-type]
 
 
 def _zero(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -45,8 +48,17 @@ def _random(body: Body, presets: Sequence[str], num_envs: int, task: Task | None
     return Script(draw, num_envs, joints)
 
 
+def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
+    """A trained policy that comes with the package; `policies.json` holds its command, hash and return."""
+    path = _PACKAGED / f"{body.name}-{task.name if task else 'walk'}{network.EXTENSION}"
+    if not (is_robot(body) and path.is_file()):
+        there = ", ".join(sorted(each.stem for each in _PACKAGED.glob(f"*{network.EXTENSION}")))
+        raise ValueError(f"policy ppo: none for {path.stem} (there are: {there}); arc-suite train makes others")
+    return _from_file(path, body, task)
+
+
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
-POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random}
+POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
@@ -59,7 +71,7 @@ PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the rob
 def policy(
     name: str,
     robot: str | Body,
-    presets: str | Sequence[str] = "medium",
+    presets: str | Sequence[str] | None = "medium",
     num_envs: int = 1,
     noise: float = 0.0,
     task: Task | None = None,
@@ -68,12 +80,14 @@ def policy(
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
-            episode's seed; the path of a run's folder, of a policy file (.npz), see `network`, or of a
-            folder of checkpoints, which take turns from seed to seed, see `checkpoints`; that of a zip of
-            stable-baselines3, see `zips`; or `module:attribute`, a function on Python's path that makes
-            a function from a `TimeStep` to an action, from the name of a robot, or from a body that is none.
+            episode's seed; ppo, a trained policy that comes with the package; the path of a run's folder, of a
+            policy file (.npz), see `network`, or of a folder of checkpoints, which take turns from seed to seed,
+            see `checkpoints`; that of a zip of stable-baselines3, see `zips`; or `module:attribute`, a function on
+            Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a
+            body that is none.
         robot: queen, bastion, tick or leaper, or any body.
-        presets: of the demonstrator, a name or several that take turns from seed to seed; see `cpg.Demonstrator`.
+        presets: of the demonstrator, a name or several that take turns from seed to seed, see `cpg.Demonstrator`; None
+            for the one that suits the task and the body.
         num_envs: number of environments.
         noise: standard deviation of normal noise on the actions, by the episode's seed.
         task: that it is to act in. The demonstrator is fitted to it, and gives positions in place of torques
@@ -83,11 +97,13 @@ def policy(
         ValueError: an unknown name, or a value out of range.
         OSError: a file that cannot be read.
     """
+    body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
+    if presets is None:
+        presets = suited_preset(task or prepared(body, "walk")[0]) if name == "cpg" else ()
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
     for preset in presets:
         checks.name(preset, preset_names(), "preset")
     checks.number("noise", noise, 0.0)
-    body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
     if isinstance(name, os.PathLike) or (isinstance(name, str) and _is_path(name)):
         turns = network.checkpoint_files(Path(name))
         several = [_from_file(path, body, task) for path in turns or [Path(name)]]

@@ -13,7 +13,7 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -117,10 +117,13 @@ class Network(NamedTuple):
     def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
         """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
 
+        Blocks that its task excluded are left out.
+
         Raises:
-            ValueError: other blocks than those it was trained with.
+            ValueError: other blocks than those.
         """
-        sizes = {name: block.shape[-1] for name, block in observation.items()}
+        excluded = self.setup.task_kwargs.get("exclude_blocks", ())
+        sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
             raise ValueError(
                 f"policy of {self.setup.kind.name}: expected observation blocks {dict(self.blocks)}, got {sizes}"
@@ -137,7 +140,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
     """
     kinds = [layer.kind for layer in network.layers]
     known = network.setup.to_dict() | {"blocks": dict(network.blocks), "layers": kinds}
-    arrays = {
+    arrays: dict[str, Any] = {
         f"{index}.{place}": array
         for index, layer in enumerate(network.layers)
         for place, array in enumerate(layer.arrays)
@@ -186,6 +189,7 @@ def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray], width: int) 
     sizes, found = {"i": width}, []
     for place, letters in enumerate(KINDS[checks.name(kind, KINDS, "layer")].shapes):
         array = arrays[f"{index}.{place}"]
+        array = array.astype(np.float32) if array.dtype == np.float16 else array  # as packaged ones are stored
         sizes = dict(zip(letters, array.shape, strict=False)) | sizes  # the first array tells an axis' size
         if array.dtype != np.float32 or array.shape != tuple(map(sizes.get, letters)):
             given = f"{array.dtype} {array.shape}"

@@ -6,6 +6,7 @@ The input `observations` is (num_envs, size) float32, flat: the task's blocks on
 
 import json
 import os
+from collections.abc import Callable
 
 import numpy as np
 
@@ -87,7 +88,7 @@ def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
     """The operators of a layer: names, constants after the input, attributes."""
     arrays = [np.ascontiguousarray(array, np.float32) for array in layer.arrays]
     one = np.float32(1.0)
-    return {
+    operators: dict[str, Callable[[], list]] = {
         "linear": lambda: [("Gemm", arrays, {})],
         "layer_norm": lambda: [("LayerNormalization", arrays, {"axis": -1, "epsilon": EPSILON})],
         "normalise": lambda: [
@@ -99,4 +100,5 @@ def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
         "elu": lambda: [("Elu", [], {"alpha": 1.0})],
         "tanh": lambda: [("Tanh", [], {})],
         "clip": lambda: [("Clip", [np.array(-one), np.array(one)], {})],
-    }[layer.kind]()
+    }
+    return operators[layer.kind]()

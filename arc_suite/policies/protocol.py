@@ -66,7 +66,8 @@ class Sum:
 
     def act(self, observation, rewards) -> np.ndarray:
         """Return the sum of the actions (num_envs, joints)."""
-        return sum(policy.act(observation, rewards) for policy in self._policies)
+        first, second = self._policies
+        return first.act(observation, rewards) + second.act(observation, rewards)
 
 
 class Positioned:
@@ -130,7 +131,8 @@ class Individuals:
             name: with which an error begins.
         """
         self._make, self._name, self._joints = make, name, joints
-        self._functions, self._seeds, self._clock = [None] * num_envs, [0] * num_envs, [0] * num_envs
+        self._functions: list[Callable | None] = [None] * num_envs
+        self._seeds, self._clock = [0] * num_envs, [0] * num_envs
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start the episodes of seeds in some environments."""

@@ -55,7 +55,7 @@ def image(body: Body) -> Image:
         legs=np.array(legs),
         joints=np.array([joints[other.full_name(joint)] for _, other in across for joint in other.joints]),
         signs=np.array(signs),
-        parts=np.array([0, *(parts[other.full_name(p)] for _, other in across for p in (*other.links, other.foot))]),
+        parts=np.array([0, *(parts[other.full_name(p)] for _, other in across for p in other.parts)]),
     )
 
 
@@ -74,7 +74,7 @@ def _signs(leg: Leg, other: Leg, rounding: float) -> list[int] | None:
         cosine = (_axis(leg, link) * _TURNED) @ _axis(other, across)
         sign = 1 if cosine > 0.0 else -1
         bounds = tuple(sorted(sign * bound for bound in link.joint.range_deg))
-        ours, theirs = ([j.armature, j.damping, j.motor and j.motor.gear] for j in (link.joint, across.joint))
+        ours, theirs = ([j.armature, j.damping, j.motor.gear if j.motor else None] for j in (link.joint, across.joint))
         pairs = zip([*bounds, *ours], [*across.joint.range_deg, *theirs], strict=True)
         if abs(cosine) < 1.0 - _ROUNDING or not all(_equal(a, b) for a, b in pairs):
             return None

@@ -282,6 +282,11 @@ class Leg(_Spec):
             points.append((x + (cos * a - sin * b), y + (sin * a + cos * b), z + c))
         return tuple(points)
 
+    @property
+    def parts(self) -> tuple[Link | Foot, ...]:
+        """Return the rigid parts, from the torso outwards."""
+        return (*self.links, self.foot)
+
     def full_name(self, part: Link | Foot | Joint) -> str:
         """Return the name of a link's or foot's body, or of a joint and its motor, in the model."""
         return f"{self.name}_{part.name}"
@@ -436,7 +441,7 @@ class Body(_Spec):
         """Refuse moving parts whose inertia is too small for MuJoCo; that of a ball is 8/15 pi density radius^5."""
         least = (_LEAST_INERTIA / (8.0 / 15.0 * math.pi * self.density)) ** 0.2
         parts = [("torso", solid.name, min(solid.size)) for solid in self.torso.solids]
-        parts += [("legs", leg.full_name(part), part.radius) for leg in self.legs for part in (*leg.links, leg.foot)]
+        parts += [("legs", leg.full_name(part), part.radius) for leg in self.legs for part in leg.parts]
         field, name, size = min(parts, key=lambda part: part[2])
         if size < least:
             denser = float(f"{1.1 * self.density * (least / size) ** 5:.2g}")
@@ -454,7 +459,7 @@ class Body(_Spec):
     @property
     def part_names(self) -> tuple[str, ...]:
         """Return the names of the rigid bodies in the order of the contact forces, the torso first."""
-        return ("torso", *(leg.full_name(part) for leg in self.legs for part in (*leg.links, leg.foot)))
+        return ("torso", *(leg.full_name(part) for leg in self.legs for part in leg.parts))
 
     @property
     def foot_names(self) -> tuple[str, ...]:

@@ -4,6 +4,7 @@ A file holds one object with the fields of a `Body`; a field that is a spec hold
 There are no includes, no paths and no markup.
 """
 
+import collections
 import dataclasses
 import json
 import os
@@ -87,8 +88,8 @@ def body_from_json(text: str | bytes) -> Body:
 def _object(pairs: list[tuple[str, Any]]) -> dict:
     result = dict(pairs)
     if len(result) < len(pairs):
-        seen = set()
-        twice = next(key for key, _ in pairs if key in seen or seen.add(key))
+        counts = collections.Counter(key for key, _ in pairs)
+        twice = next(key for key, count in counts.items() if count > 1)
         raise SpecError(f"the key {twice[:40]!r} occurs twice in one object")
     return result
 

@@ -43,8 +43,8 @@ class Batch:
         self._forks = forks.count
         self._simulations = mujoco.batch.Batch(model, count, threads)
         forks.keep(self._simulations)
-        self._own = None  # a model of its own for each simulation, once one has been changed
-        self._changed = {}  # fields that ever were, as compiled
+        self._own: list[mujoco.MjModel] | None = None  # one for each simulation, once one has been changed
+        self._changed: dict[str, np.ndarray] = {}  # fields that ever were, as compiled
         self._silent = _silent(model)
         # What is bound is filled by every call, so it must be bound before the first.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
@@ -140,7 +140,7 @@ class Batch:
         scratch = mujoco.MjData(model)
         for index, fields in zip(np.flatnonzero(mask), models, strict=True):
             for own in (self._own[index], self._silent[index]):
-                change(own, self._changed | fields, scratch)
+                change(own, {**self._changed, **fields}, scratch)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""

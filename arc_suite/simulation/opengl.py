@@ -67,7 +67,7 @@ def _postpone_backend() -> None:
         _reload(module)
         return vars(module)[name]
 
-    module.__getattr__ = load
+    module.__getattr__ = load  # type: ignore[method-assign]  # of a module: PEP 562
     sys.modules[_BACKEND] = dm_control._render = module
 
 

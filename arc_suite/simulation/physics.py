@@ -39,6 +39,7 @@ class Physics(dm_mujoco.Physics):
     """
 
     divergence: str | None = None
+    _shared = False  # whether another simulation has the same model
 
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> Physics:
@@ -91,14 +92,15 @@ class Physics(dm_mujoco.Physics):
         if nstep < 1:
             raise ValueError(f"nstep: expected an integer from 1, got {nstep!r}")
         with timers.off:
-            if nstep > 1:
+            if nstep > 1 and not self._shared:  # whose options another thread may be using
                 flags = option.disableflags
                 option.disableflags = flags | _SENSOR
                 try:
                     mujoco.mj_step(model, data, nstep - 1)
                 finally:  # an interrupt from the keyboard arrives here
                     option.disableflags = flags
-            mujoco.mj_step(model, data)
+                nstep = 1
+            mujoco.mj_step(model, data, nstep)
         self.divergence = self._describe_divergence(time) if np.count_nonzero(self._warnings) else None
 
     def _describe_divergence(self, time: float) -> str:
@@ -146,10 +148,20 @@ class Physics(dm_mujoco.Physics):
         super().free()
 
     def copy(self, share_model: bool = False) -> Physics:
-        """Return an independent copy of the simulation in its present state."""
+        """Return a copy of the simulation in its present state.
+
+        Args:
+            share_model: the copy has this simulation's model, with every change of it, rather than one of its own.
+                Its `reset` leaves the model as it is. Each may be stepped by a thread of its own; steps of both cost
+                more from then on, as all of their substeps compute sensors.
+        """
         copied = super().copy(share_model)
         mujoco.mj_copyData(copied.data.ptr, copied.model.ptr, self.data.ptr)
-        copied.body, copied.arena, copied._unchanged = self.body, self.arena, self._unchanged
+        copied.body, copied.arena = self.body, self.arena
+        if share_model:
+            self._shared = copied._shared = True
+        else:
+            copied._unchanged = self._unchanged
         return copied
 
     def __getstate__(self):

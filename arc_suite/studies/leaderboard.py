@@ -94,6 +94,7 @@ def _command(entry: Entry) -> str:
     setup = entry.setup
     settings = [f"--set={name}={json.dumps(value)}" for name, value in setup.task_kwargs.items()]
     words = ["arc-suite evaluate", f"--robot={setup.body.name}", f"--task={setup.task}", f"--policy={entry.policy}"]
+    settings += [f"--preset={entry.preset}"] * (entry.preset is not None)
     return f"`{' '.join([*words, *settings])}`"
 
 

@@ -211,6 +211,8 @@ STUDIES = {
             run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
             # The noise falls over the length of a run; with a million steps on rough ground it is gone too early.
             *(run("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
+            run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
+            run("queen", "ppo", 2_000_000, task="steer"),
         ),
     ),
     # Four to six minutes of a core a run.
@@ -233,8 +235,6 @@ STUDIES = {
         "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
         (
             *(run(robot, "dagger", 25_600) for robot in ROBOTS),
-            run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
-            run("queen", "ppo", 2_000_000, task="steer"),
             *(
                 run(robot, "ppo", 832_000 if robot == "tick" else 1_200_000, seed)
                 for seed, robot in itertools.product(range(3), ROBOTS)

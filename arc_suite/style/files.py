@@ -51,7 +51,7 @@ def save(path: str | os.PathLike, tracks: Sequence[Track]) -> None:
         raise ValueError(f"tracks: expected those of one setup, got {sorted(map(str, setups))}")
     (setup,) = setups
     known = {"setup": setup.to_dict(), "versions": versions.recorded()}
-    arrays = {"format": FORMAT, **{name: json.dumps(value) for name, value in known.items()}}
+    arrays: dict[str, Any] = {"format": FORMAT, **{name: json.dumps(value) for name, value in known.items()}}
     for index, track in enumerate(tracks):
         fields = track._asdict()
         del fields["setup"]
@@ -125,7 +125,7 @@ def _names(track: Track) -> tuple:
 
 def _track(setup: Setup, arrays: Mapping[str, np.ndarray], index: int) -> Track:
     """Return the track of an index; arrays without axes become numbers."""
-    fields = {}
+    fields: dict[str, Any] = {}
     for name, array in arrays.items():
         top, *path = name.split("/")
         if top == str(index):

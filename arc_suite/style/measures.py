@@ -125,5 +125,5 @@ def report(tracks: Sequence[Track]) -> dict:
 
 def _prescribed(metric: Metric, track: Track) -> float | None:
     """Return the prescribed value of a metric, or None."""
-    value = metric.prescribed and metric.prescribed(track)
+    value = metric.prescribed(track) if metric.prescribed else None
     return None if value is None or np.isnan(value) else value

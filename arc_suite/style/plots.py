@@ -6,6 +6,7 @@ Each function takes labelled tracks, one or two to compare, and returns a figure
 
 import functools
 from collections.abc import Mapping
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -16,7 +17,7 @@ from arc_suite.style import metrics
 from arc_suite.style.colours import BLUE, FAINT, INK, PALE, VERMILION, of_terms
 from arc_suite.style.tracks import Track
 
-_LOOK = {
+_LOOK: dict[Any, Any] = {
     "font.size": 9.5,
     "axes.titlesize": 10.5,
     "axes.titleweight": "bold",
@@ -36,7 +37,7 @@ _LOOK = {
     "savefig.dpi": 150,
 }
 _WIDTH = 9.5  # inches
-_BELOW = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}  # a legend
+_BELOW: dict[str, Any] = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}  # a legend
 _WINDOW = 4.0  # s of foot contacts
 
 

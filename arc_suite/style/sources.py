@@ -32,14 +32,14 @@ class Source(NamedTuple):
     recorders: Callable[[Setup, Sequence[int]], list[Callable[[], Track]]]
 
 
-def source(name: str, preset: str = "medium") -> Source:
+def source(name: str, preset: str | None = "medium") -> Source:
     """Open a source, of a kind that follows from its name.
 
     Args:
         name: a policy, see `policies.policy`, which is recorded once for every seed; a file of tracks,
             path/to/file.npz; or the id of a dataset, arc_suite/queen/walk/cpg-medium-v0. Of the latter two, at most as
             many tracks are taken as there are seeds.
-        preset: of the demonstrator.
+        preset: of the demonstrator; None for the one that suits the task and the body.
 
     Raises:
         ValueError: an unknown name, a file that holds no tracks, or a dataset that cannot be opened.
@@ -47,7 +47,8 @@ def source(name: str, preset: str = "medium") -> Source:
             functions for an invalid action and for a replay with other rewards than those recorded.
         OSError: a file cannot be read.
     """
-    checks.name(preset, policies.preset_names(), "preset")
+    if preset is not None:
+        checks.name(preset, policies.preset_names(), "preset")
     if policies.is_file(name):
         return _played(name, preset)
     if name.endswith(".npz"):
@@ -59,14 +60,14 @@ def source(name: str, preset: str = "medium") -> Source:
     return _played(name, preset)
 
 
-def _played(name: str, preset: str) -> Source:
+def _played(name: str, preset: str | None) -> Source:
     def recorders(setup, seeds):
         seeds = [checks.seed(seed) for seed in seeds]
         environment = setup.load()
         policy = policies.policy(name, setup.body, preset, task=environment.task.definition)
         return [functools.partial(record, environment, policy, seed) for seed in seeds]
 
-    return Source(f"cpg {preset}" if name == "cpg" else name, None, recorders)
+    return Source(f"cpg {preset}" if name == "cpg" and preset else name, None, recorders)
 
 
 def _saved(path: str) -> Source:

@@ -19,7 +19,7 @@ _WHITE = 255
 _COLOURS = 64
 
 
-def ticks(frequency: float, control_timestep: float, length: int, count: int = FRAMES) -> np.ndarray:
+def ticks(frequency: float, control_timestep: float, length: float, count: int = FRAMES) -> np.ndarray:
     """Return the ticks of the gait clock, one a control step, at which the frames of a strip are taken.
 
     They are the nearest to equal phases of one gait cycle, from phase 0 on: the cycle after `SETTLED` others, or

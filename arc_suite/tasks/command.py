@@ -37,7 +37,7 @@ class Followed(NamedTuple):
     Attributes:
         memory: of the command.
         desired: (..., 3) the velocity that holds from now on.
-        tracking: (...) how well the step followed it, 0 to 1.
+        tracking: (...) how well the step followed it, at most 1.
         arrived: (...) whether the step reached a goal; False where there are none.
     """
 
@@ -120,10 +120,12 @@ class Live(NamedTuple):
     Attributes:
         live: (..., 3) set from outside; NaN for what the task itself would do.
         distance: (...) along world x since the start, m.
+        gained: (...) velocity along world x by the target velocity, a leaky mean over a cycle of the gait.
     """
 
     live: np.ndarray
     distance: np.ndarray
+    gained: np.ndarray
 
 
 class Scheduled(NamedTuple):
@@ -190,7 +192,7 @@ class AlongLane(Command):
 
     def start(self, context: Context, random, schedule: Scheduled) -> Live:
         """Return a memory without displacement; the drawn schedule is not used."""
-        return Live(schedule.live, np.float64(0.0))
+        return Live(schedule.live, np.float64(0.0), np.float64(0.0))
 
     def desired(self, context: Context, memory: Live, steps, place):
         """Return the command as the torso heads."""
@@ -203,8 +205,13 @@ class AlongLane(Command):
         """Return the command after a control step, and the distance."""
         desired = self.desired(context, memory, steps, place)
         displacement = component(place, 0) - component(before, 0)
-        memory = Live(memory.live, memory.distance + displacement)
+        gained = _gained(context, memory.gained, displacement)
+        memory = Live(memory.live, memory.distance + displacement, gained)
         return Followed(memory, desired, tracking(desired, motion))
+
+    def terms(self, memory: Live, upright) -> dict:
+        """Return the bonus for progress along the lane."""
+        return {"progress": _bounded(memory.gained) * upright}
 
     def progress(self, context: Context, memory: Live, judged) -> dict:
         """Return the distance along the lane as a share of that at the target velocity."""
@@ -222,7 +229,7 @@ class Chain(NamedTuple):
         goals: (..., GOALS, 2) where they are, m.
         reached: (...) how many goals were.
         arrived: (...) whether one was in the latest step.
-        gained: (...) progress to the goal in the latest step, a share of that at the target velocity, from -1 to 1.
+        gained: (...) approach to the goal by the target velocity, a leaky mean over a cycle of the gait.
         to_goal: (..., 2) from the torso to the present goal, forward and left, m.
     """
 
@@ -296,21 +303,19 @@ class ToGoal(Command):
         goal = _to_goal(memory.goals, memory.reached, place)
         near = numpy.hypot(goal[..., 0], goal[..., 1])
         arrived = near <= NEAR * unit
-        toward = goal[..., 0] * motion[..., 0] + goal[..., 1] * motion[..., 1]
         reached = memory.reached + arrived
         memory = Chain(
             goals=memory.goals,
             reached=reached,
             arrived=arrived,
-            gained=((far - near) / (context.units[0] * context.control_timestep)).clip(-1.0, 1.0),
+            gained=_gained(context, memory.gained, far - near),
             to_goal=_to_goal(memory.goals, reached, place),
         )
-        tracking = (toward / numpy.maximum(near, 1e-9 * unit)).clip(0.0, 1.0)
-        return Followed(memory, self.desired(context, memory, steps, place), tracking, arrived)
+        return Followed(memory, self.desired(context, memory, steps, place), _bounded(memory.gained), arrived)
 
     def terms(self, memory: Chain, upright) -> dict:
         """Return the bonuses for progress to the goal and for reaching it."""
-        return {"progress": memory.gained * upright, "goal": memory.arrived * 1.0}
+        return {"progress": _bounded(memory.gained) * upright, "goal": memory.arrived * 1.0}
 
     def observe(self, context: Context, memory: Chain) -> dict:
         """Return cosine and sine of the goal's bearing, and its distance."""
@@ -328,6 +333,16 @@ class ToGoal(Command):
         unit = context.arena.unit
         middle = np.array((*_goal(memory.goals, memory.reached), 0.0))
         return [Marker("cylinder", middle, middle + (0.0, 0.0, _DISC * unit), NEAR * unit, _GOAL)]
+
+
+def _gained(context: Context, before, displacement):
+    """The leaky mean (...) of progress, given that before the step and the displacement (...) of the step, m."""
+    return (1.0 - context.leak) * before + context.leak * displacement / (context.units[0] * context.control_timestep)
+
+
+def _bounded(gained):
+    """What progress (...) earns: at most 1, without a lower bound, so that a body that sways earns its net progress."""
+    return gained.clip(max=1.0)
 
 
 def _goal(goals, reached):

@@ -19,7 +19,7 @@ from arc_suite.arenas import Arena
 from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import clock, mirrors, paper, parameters, terms
+from arc_suite.tasks import clock, energy, mirrors, paper, parameters, terms
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.command import Command, draw_schedule
@@ -30,6 +30,8 @@ from arc_suite.tasks.health import Condition, Upright
 from arc_suite.tasks.mirrors import PLANAR, Mirror
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings, component
+
+COST_LIMIT = 0.6  # a third of it is what standing costs, twice as much uniform torques
 
 # Walk's weights of rates in SI units, as Queen has them in units of her own.
 RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
@@ -44,12 +46,14 @@ class Settings(NamedTuple):
     Attributes:
         parameters: of the gait, and the target velocity.
         weights: signed weight of every term.
+        cost_limit: bound of the costs of a step, whose weights are negative; see `terms.limited`.
         noise: of the start.
         ground: the ground with its own settings.
     """
 
     parameters: Parameters
     weights: dict[str, float]
+    cost_limit: float
     noise: Noise
     ground: Ground
 
@@ -75,6 +79,8 @@ class Core(NamedTuple):
         previous_action: (..., joints) of the step before; 0 before the first.
         schedule_errors: (...) number of contact schedule errors in the latest step.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
+        energy: of the motors.
+        path: (...) length of the path of the leaky motion since the start, m.
         place: (..., 3) of the torso's frame at the latest reading: x and y, m, and yaw, rad.
         motion: (..., 3) velocity of the torso, a leaky mean over a cycle of the gait.
         desired: (..., 3) velocity that the command asks for.
@@ -88,6 +94,8 @@ class Core(NamedTuple):
     previous_action: np.ndarray
     schedule_errors: np.ndarray
     all_schedule_errors: np.ndarray
+    energy: energy.Energy
+    path: np.ndarray
     place: np.ndarray
     motion: np.ndarray
     desired: np.ndarray
@@ -128,12 +136,14 @@ class CommandTask(Task):
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
-        names, elsewhere = (*cls.ground.settings, *parameters.NAMES), () if cls.own_arena else ("arena",)
+        names = (*cls.ground.settings, *parameters.NAMES, "cost_limit")
+        elsewhere = () if cls.own_arena else ("arena",)
         given = parameters.values(body, overrides, cls.name, names, elsewhere)
-        weights = {**cls.bonuses, **paper.COSTS, **given["weights"], **RATES}
+        weights = {**cls.bonuses, **paper.COSTS, **given["weights"], **RATES, "transport": 0.0}
         return Settings(
             parameters.parameters(body, given),
             parameters.weights(weights, overrides.get("weights")),
+            parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
             parameters.noise(given),
             cls.ground.with_settings(overrides),
         )
@@ -162,7 +172,7 @@ class CommandTask(Task):
     @functools.cached_property
     def context(self) -> Context:
         """Lengths and speeds of the body."""
-        return Context.of(self.scene, self.parameters.target_velocity, self.step_limit)
+        return Context.of(self.scene, self.parameters, self.step_limit)
 
     @functools.cached_property
     def clock(self) -> Clock:
@@ -194,7 +204,8 @@ class CommandTask(Task):
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
         command_memory = self.command.start(context, random, schedule)
         still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
-        core = Core(0, 0, still, still, zero, zero, np.zeros(3), np.zeros(3), np.zeros(3), zero, zero)
+        spent, none = energy.start(len(still)), np.zeros(3)
+        core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
         return Start(qpos, qvel, Memory(core, command_memory, ground_memory, self.health.start()), obstacles)
 
     def read(self, data) -> Sensed:
@@ -216,7 +227,9 @@ class CommandTask(Task):
         place = _place(readings)
         command = self.command.begin(self.context, memory.command, place)
         desired = self.command.desired(self.context, command, memory.core.steps, place)
-        return memory._replace(core=memory.core._replace(place=place, desired=desired), command=command)
+        spent = energy.begin(memory.core.energy, readings.joint_angles)
+        core = memory.core._replace(energy=spent, place=place, desired=desired)
+        return memory._replace(core=core, command=command)
 
     def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
         """Remember the action, which is applied as it is."""
@@ -226,7 +239,7 @@ class CommandTask(Task):
     def after(self, memory: Memory, readings: Sensed) -> Memory:
         """Return the memory after a control step, in this order: gait, health, motion, command, ground."""
         core, context, place = memory.core, self.context, _place(readings)
-        steps = core.steps + 1
+        numpy, steps = place.__array_namespace__(), core.steps + 1
         going = core.desired.any(axis=-1)
         tick = core.tick + going
         stance = self.clock.at(self.clock.stance, tick) | ~going[..., None]  # all feet, while the command says stop
@@ -242,6 +255,8 @@ class CommandTask(Task):
             previous_action=core.previous_action,
             schedule_errors=schedule_errors,
             all_schedule_errors=core.all_schedule_errors + schedule_errors,
+            energy=energy.after(core.energy, self.scene.body, core.action, readings.joint_angles),
+            path=core.path + self._pace * numpy.hypot(motion[..., 0], motion[..., 1]),
             place=place,
             motion=motion,
             desired=followed.desired,
@@ -250,14 +265,17 @@ class CommandTask(Task):
         )
         return Memory(core, followed.memory, ground, health)
 
+    @functools.cached_property
+    def _pace(self) -> float:
+        """Displacement of a step at the target velocity, m."""
+        return float(self.context.units[0] * self.context.control_timestep)
+
     def _motion(self, core: Core, place):
         """The mean velocity (..., 3), of steps in the frame of the heading at their start."""
-        context, numpy = self.context, place.__array_namespace__()
-        step, moved = context.control_timestep, place - core.place
+        context, numpy, moved = self.context, place.__array_namespace__(), place - core.place
         turn = rotations.wrapped(moved[..., 2])
         moved = numpy.concatenate([rotations.headed(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1)
-        leak = min(self.parameters.gait_frequency * step, 1.0)
-        return (1.0 - leak) * core.motion + leak * moved / (step * context.units)
+        return (1.0 - context.leak) * core.motion + context.leak * moved / (context.control_timestep * context.units)
 
     def commanded(self, memory: Memory, name: str, value) -> Memory:
         """Return the memory with a live command."""
@@ -266,7 +284,10 @@ class CommandTask(Task):
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
 
     def terms(self, memory: Memory, readings: Sensed) -> dict:
-        """Return the paper's costs without scale, and bonuses for following the command in the prescribed gait."""
+        """Return the paper's costs without scale, within `cost_limit`, and bonuses for following the command.
+
+        `transport` is the cost of transport of a step at the target velocity; its weight is 0.
+        """
         core, height, feet = memory.core, self.context.height, len(self.parameters.phase_offsets)
         costs = terms.costs(
             readings, core.action, core.previous_action, core.schedule_errors, self.parameters.default_angles
@@ -277,10 +298,11 @@ class CommandTask(Task):
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
             "tracking": core.followed,
             "obedient_gait": core.followed * (1.0 - core.schedule_errors / feet),
+            "transport": core.energy.step / self._pace,
             **self.health.terms(memory.health),
             **self.command.terms(memory.command, memory.health.upright),
         }
-        return {name: found[name] for name in self.settings.weights}
+        return terms.limited(found, self.settings.weights, self.settings.cost_limit)
 
     def observe(self, memory: Memory, readings: Sensed) -> dict:
         """Return the blocks as the torso heads, without a clock at a stop and without negative zeros."""
@@ -305,7 +327,10 @@ class CommandTask(Task):
         return self.settings.ground.ended(memory.ground, memory.health.fell)
 
     def progress(self, memory: Memory) -> dict:
-        """Return the mean `tracking`, whether the body `fell`, `gait_compliance`, and what command and ground add."""
+        """Return the mean `tracking`, whether the body `fell`, `gait_compliance`, and what command and ground add.
+
+        The cost of transport divides by the path of the leaky motion, whatever its direction.
+        """
         core = memory.core
         steps = core.steps + (core.steps == 0)
         return {
@@ -313,6 +338,7 @@ class CommandTask(Task):
             "tracking": core.tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
+            "cost_of_transport": energy.cost_of_transport(core.energy, core.path, self._pace * steps),
             **self.settings.ground.progress(memory.ground),
         }
 

@@ -21,6 +21,7 @@ class Context(NamedTuple):
         units: (3,) of commands: the target velocity, twice, m/s, and rad/s at which feet move as fast when turning.
         force_unit: (6,) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
         control_timestep: s.
+        leak: weight of the latest step in leaky means, which reach back over a cycle of the gait.
         steps: control steps over which an episode is judged.
     """
 
@@ -30,13 +31,14 @@ class Context(NamedTuple):
     units: np.ndarray
     force_unit: np.ndarray
     control_timestep: float
+    leak: float
     steps: int
 
     @classmethod
-    def of(cls, scene, target_velocity: float, step_limit: float) -> "Context":
-        """Return the context of a task in a `contract.Scene`."""
+    def of(cls, scene, parameters, step_limit: float) -> "Context":
+        """Return the context of a task in a `contract.Scene` that prescribes `parameters.Parameters`."""
         body, pose = scene.body, standing(scene.body)
-        units = velocity_units(body, target_velocity)
+        units = velocity_units(body, parameters.target_velocity)
         return cls(
             arena=scene.arena,
             height=body.torso.standing_height,
@@ -44,5 +46,6 @@ class Context(NamedTuple):
             units=units,
             force_unit=pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3),
             control_timestep=scene.control_timestep,
+            leak=min(parameters.gait_frequency * scene.control_timestep, 1.0),
             steps=int(min(step_limit, STEPS)),
         )

@@ -117,11 +117,13 @@ class Stream(NamedTuple):
         level: of a curriculum.
         outcome: share of what was commanded that it achieved; NaN where there was no episode.
         failed: whether it ended in failure.
+        visited: whether its level was any one in place of the highest.
     """
 
     level: int | np.ndarray
     outcome: float | np.ndarray
     failed: bool | np.ndarray
+    visited: bool | np.ndarray = False
 
 
 class Lane(NamedTuple):
@@ -130,6 +132,7 @@ class Lane(NamedTuple):
     Attributes:
         lane: (...) y of its middle, m.
         level: (...) of the curriculum; 0 without one.
+        visits: (...) whether the level is any one in place of the highest.
         sinking: (...) consecutive control steps for which a foot has been under ground.
         sunk: (...) whether a foot is stuck in the ground, which contacts should never allow.
         left: (...) whether the torso has left the lane, to a side or at an end.
@@ -137,13 +140,16 @@ class Lane(NamedTuple):
 
     lane: np.ndarray
     level: np.ndarray
+    visits: np.ndarray
     sinking: np.ndarray
     sunk: np.ndarray
     left: np.ndarray
 
 
 def next_level(stream: Stream, stays, other, down: float, up: float):
-    """Return the level (...) of the next episode, of arrays with any leading axes.
+    """Return the level (...) of the next episode, and whether it visits any level; arrays have any leading axes.
+
+    Who masters the highest level visits another one for one episode in four, and returns.
 
     Args:
         stream: of the episode before.
@@ -153,11 +159,12 @@ def next_level(stream: Stream, stays, other, down: float, up: float):
         up: outcome above which it rises, unless the episode failed.
     """
     level = np.asarray(stream.level) if isinstance(stream.level, int) else stream.level
-    numpy = level.__array_namespace__()
+    numpy, highest = level.__array_namespace__(), LEVELS - 1
     rises = (stream.outcome > up) & numpy.logical_not(stream.failed)
-    risen = numpy.where(level < LEVELS - 1, level + 1, numpy.where(stays < STAYS, level, other))
+    visits = rises & (level == highest) & numpy.logical_not(stream.visited) & (stays >= STAYS)
+    risen = numpy.where(visits, other, (level + 1).clip(max=highest))
     fallen = numpy.where(stream.outcome < down, (level - 1).clip(0), level)
-    return numpy.where(rises, risen, fallen)
+    return numpy.where(stream.visited, highest, numpy.where(rises, risen, fallen)), visits
 
 
 @dataclasses.dataclass(frozen=True)
@@ -222,10 +229,12 @@ class Lanes(Ground):
         kind, stays, other = random.randint(len(self.kinds)), random.uniform(), random.randint(LEVELS)
         copies, arena = self.copies[self.curriculum], context.arena
         lane, aside = random.randint(copies), random.uniform(-SPREAD, SPREAD)
-        level, levels = (int(next_level(stream, stays, other, *self.thresholds)), LEVELS) if self.curriculum else (0, 1)
-        middle = arena.start((kind * levels + level) * copies + lane)
+        level, visits, levels = 0, np.False_, 1
+        if self.curriculum:
+            (level, visits), levels = next_level(stream, stays, other, *self.thresholds), LEVELS
+        middle = arena.start((kind * levels + int(level)) * copies + lane)
         start = (self.middle * arena.length * arena.unit, middle + aside * arena.unit)
-        return Lane(np.float64(middle), level, 0, np.False_, np.False_), start
+        return Lane(np.float64(middle), int(level), visits, 0, np.False_, np.False_), start
 
     def after(self, context: Context, memory: Lane, place, readings: Readings, arrived) -> Lane:
         """Count how long a foot has been under ground, and see whether the torso is still in the lane."""
@@ -234,7 +243,7 @@ class Lanes(Ground):
         x, y = place[..., 0], place[..., 1]
         beyond = (x > (length - END) * unit) | (x < (END - terrain.BACK) * unit)
         left = beyond | (abs(y - memory.lane) > OFF_LANE * unit)
-        return Lane(memory.lane, memory.level, sinking, sinking >= SINKING, left)
+        return memory._replace(sinking=sinking, sunk=sinking >= SINKING, left=left)
 
     def ended(self, memory: Lane, fell) -> tuple:
         """Terminate where the body fell or a foot sank; truncate where the torso has left the lane."""
@@ -259,7 +268,7 @@ class Lanes(Ground):
 
     def stream_state(self, memory: Lane, outcome, fell) -> Stream:
         """Return what the next level follows from."""
-        return Stream(memory.level, outcome, fell | memory.sunk)
+        return Stream(memory.level, outcome, fell | memory.sunk, memory.visits)
 
 
 class Pillared(NamedTuple):

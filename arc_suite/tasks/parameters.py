@@ -20,7 +20,7 @@ SHARED_NOISE = {
     "base_noise": ("position_noise", "orientation_noise", "linear_velocity_noise", "angular_velocity_noise"),
     "joint_noise": ("joint_angle_noise", "joint_velocity_noise"),
 }
-_LARGEST = 1e6  # bound of a setting, in its unit: far beyond sense, and finite when squared and summed up
+LARGEST = 1e6  # bound of a setting, in its unit: far beyond sense, and finite when squared and summed up
 
 _TRIPOD, _TROT = (tuple(TWO_PI * offset for offset in offsets) for offsets in (gaits.TRIPOD, gaits.TROT))
 
@@ -120,10 +120,10 @@ class Noise(NamedTuple):
 NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")
 
 _BOUNDS = {
-    "target_velocity": (-_LARGEST, _LARGEST),
-    "gait_frequency": (0.0, _LARGEST),
+    "target_velocity": (-LARGEST, LARGEST),
+    "gait_frequency": (0.0, LARGEST),
     "duty_factor": (0.0, 1.0),
-    "stance_threshold": (-_LARGEST, _LARGEST),
+    "stance_threshold": (-LARGEST, LARGEST),
 }
 
 
@@ -159,7 +159,7 @@ def _spread(given: Mapping[str, Any]) -> dict[str, Any]:
     spread = dict(given)
     for shared, names in SHARED_NOISE.items():
         if shared in spread:
-            number = checks.number(shared, spread.pop(shared), 0.0, _LARGEST)
+            number = checks.number(shared, spread.pop(shared), 0.0, LARGEST)
             spread = dict.fromkeys(names, number) | spread
     return spread
 
@@ -183,7 +183,7 @@ def noise(given: Mapping[str, Any]) -> Noise:
     Raises:
         ValueError: a negative value.
     """
-    return Noise(*(checks.number(name, given[name], 0.0, _LARGEST) for name in Noise._fields))
+    return Noise(*(checks.number(name, given[name], 0.0, LARGEST) for name in Noise._fields))
 
 
 def positive(name: str, value: Any) -> float:
@@ -192,7 +192,7 @@ def positive(name: str, value: Any) -> float:
     Raises:
         ValueError: it is not.
     """
-    return checks.number(name, value, 1e-9, _LARGEST)
+    return checks.number(name, value, 1e-9, LARGEST)
 
 
 def weights(defaults: Mapping[str, float], changed: Any) -> dict[str, float]:
@@ -205,5 +205,5 @@ def weights(defaults: Mapping[str, float], changed: Any) -> dict[str, float]:
         raise ValueError(f"weights: expected a mapping of names to numbers, got {changed!r}")
     found = dict(defaults)
     for name, weight in (changed or {}).items():
-        found[checks.name(name, found, "weight")] = checks.number(f"weights[{name!r}]", weight, -_LARGEST, _LARGEST)
+        found[checks.name(name, found, "weight")] = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)
     return found

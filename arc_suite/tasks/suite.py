@@ -5,6 +5,9 @@ from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
 from arc_suite.tasks.commanded import CommandTask
 from arc_suite.tasks.ground import Lanes, PillarField
 
+# Progress pays for a lane that is walked in part.
+_LANE = {"progress": 0.5, **CommandTask.bonuses}
+
 
 class Steer(CommandTask):
     """Following a velocity forward, sideways and in turning, stops included."""
@@ -27,7 +30,7 @@ class Limp(CommandTask):
 class Rough(CommandTask):
     """Walking over rough ground."""
 
-    name, yaw = "rough", 0.3
+    name, yaw, bonuses = "rough", 0.3, _LANE
     command, ground = AlongLane(), Lanes(("rough",))
     demonstrators = ("balanced", "surefooted")
 
@@ -35,7 +38,7 @@ class Rough(CommandTask):
 class Slopes(CommandTask):
     """Walking up and down slopes."""
 
-    name, yaw = "slopes", 0.3
+    name, yaw, bonuses = "slopes", 0.3, _LANE
     command, ground = AlongLane(), Lanes(("slopes",))
     demonstrators = ("balanced", "surefooted")
 
@@ -43,7 +46,7 @@ class Slopes(CommandTask):
 class Stairs(CommandTask):
     """Walking up and down flights of stairs."""
 
-    name, yaw = "stairs", 0.3
+    name, yaw, bonuses = "stairs", 0.3, _LANE
     command, ground = AlongLane(), Lanes(("stairs",), copies=(4, 1))
     demonstrators = ("balanced", "surefooted")
 
@@ -51,7 +54,7 @@ class Stairs(CommandTask):
 class Gaps(CommandTask):
     """Walking over trenches."""
 
-    name, yaw = "gaps", 0.3
+    name, yaw, bonuses = "gaps", 0.3, _LANE
     command, ground = AlongLane(), Lanes(("gaps",), copies=(4, 1))
     demonstrators = ("sighted",)
 
@@ -59,7 +62,7 @@ class Gaps(CommandTask):
 class Course(CommandTask):
     """Walking over one of the four kinds of ground, drawn for every episode."""
 
-    name, yaw = "course", 0.3
+    name, yaw, bonuses = "course", 0.3, _LANE
     command, ground = AlongLane(), Lanes(terrain.KINDS, copies=(2, 1))
     demonstrators = ("balanced", "surefooted")
 
@@ -78,4 +81,4 @@ class Navigate(CommandTask):
     name = "navigate"
     command, ground = ToGoal(), PillarField()
     demonstrators = ("planned",)
-    bonuses = {"progress": 2.5, "healthy": 1.0, "obedient_gait": 1.5, "goal": 10.0}
+    bonuses = {"progress": 1.5, "healthy": 1.0, "obedient_gait": 2.5, "goal": 10.0}

@@ -37,6 +37,20 @@ def triangle(error, width):
     return share.__array_namespace__().maximum(share, 0.0)
 
 
+def limited(terms: Mapping, weights: Mapping, limit: float) -> dict:
+    """Return the weighted terms, costs scaled down together so that their weighted sum stays below a limit.
+
+    A sum s becomes s / sqrt(1 + (s / limit)^2): small costs count in full, and more always costs more. Random
+    actions cost the most; within a limit it pays to stay alive while a learner explores.
+    """
+    costs = {name: weight for name, weight in weights.items() if weight < 0.0}
+    if not costs:
+        return {name: terms[name] for name in weights}
+    excess = total(terms, costs) / limit
+    share = 1.0 / excess.__array_namespace__().sqrt(1.0 + excess * excess)
+    return {name: terms[name] * share if name in costs else terms[name] for name in weights}
+
+
 def total(terms: Mapping, weights: Mapping):
     """Return the reward: the sum of the terms times their signed weights, in the order of the weights."""
     reward = 0

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import clock, paper, parameters, terms
+from arc_suite.tasks import clock, energy, paper, parameters, terms
 from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Mirror
@@ -52,6 +52,7 @@ class Memory(NamedTuple):
         distance: (...) along world x since the start, m.
         all_schedule_errors: (...) sum of `schedule_errors` over the steps.
         healthy: (...) whether the torso is in its healthy range of heights.
+        energy: of the motors.
     """
 
     tick: int | np.ndarray
@@ -63,6 +64,7 @@ class Memory(NamedTuple):
     distance: np.ndarray
     all_schedule_errors: np.ndarray
     healthy: np.ndarray
+    energy: energy.Energy
 
 
 class Walk(Task):
@@ -118,11 +120,13 @@ class Walk(Task):
         """Draw the state: the standing pose, with noise. The clock starts at 0, with no action before."""
         qpos, qvel = paper.drawn_state(self.scene.standing, self.settings.noise, random)
         still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
-        return Start(qpos, qvel, Memory(0, still, still, zero, zero, zero, zero, zero, np.True_))
+        spent = energy.start(len(still))
+        return Start(qpos, qvel, Memory(0, still, still, zero, zero, zero, zero, zero, np.True_, spent))
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
         """Remember where the torso's frame stands."""
-        return memory._replace(x=component(readings.frame_position, 0) + 0.0)  # not a view
+        x = component(readings.frame_position, 0) + 0.0  # not a view
+        return memory._replace(x=x, energy=energy.begin(memory.energy, readings.joint_angles))
 
     def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
         """Remember the action, which is applied as it is."""
@@ -144,6 +148,7 @@ class Walk(Task):
             distance=memory.distance + displacement,
             all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
+            energy=energy.after(memory.energy, self.scene.body, memory.action, readings.joint_angles),
         )
 
     def terms(self, memory: Memory, readings: Readings) -> dict:
@@ -170,11 +175,14 @@ class Walk(Task):
         return ~memory.healthy, False
 
     def progress(self, memory: Memory) -> dict:
-        """Return the mean forward `speed`, m/s, and `gait_compliance`, the mean share of feet as prescribed."""
+        """Return the mean `speed`, m/s, `gait_compliance`, the share of feet as prescribed, and `cost_of_transport`."""
         steps = memory.tick + (memory.tick == 0)
+        time = steps * self.scene.control_timestep
+        path = abs(self.target_velocity) * time
         return {
-            "speed": memory.distance / (steps * self.scene.control_timestep),
+            "speed": memory.distance / time,
             "gait_compliance": clock.compliance(memory.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
+            "cost_of_transport": energy.cost_of_transport(memory.energy, abs(memory.distance), path),
         }
 
 

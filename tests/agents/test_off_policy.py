@@ -12,6 +12,7 @@ from arc_suite import data
 from arc_suite.agents import algorithms, off_policy
 from arc_suite.agents import soft_actor_critic as sac
 from arc_suite.envs.setup import Setup
+from arc_suite.tasks import Walk
 
 
 @pytest.fixture
@@ -212,6 +213,12 @@ def test_prior_data_that_do_not_fit(name, context, line, learner):
     with pytest.raises(ValueError, match=line) as caught:
         learner(name, small(name), **context).advance()
     assert "\n" not in str(caught.value)
+
+
+def test_prior_data_of_another_version_of_the_task(learner, monkeypatch):
+    monkeypatch.setattr(Walk, "version", 1)
+    with pytest.raises(ValueError, match=r"^prior '.*': of version 0 of walk; 1 is installed$"):
+        learner("sope", small("sope")).advance()
 
 
 def test_runs_share_the_files_of_prior_data(learner, tmp_path):

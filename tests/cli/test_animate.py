@@ -57,6 +57,7 @@ def test_any_body_as_rigid_parts(tmp_path):
             "tick, clip walk: the pose does not return",
             marks=pytest.mark.slow,
         ),
+        (("-o", "a.glb", "--clips="), "clips: expected one or more of walk, slow, fast, turn_left, "),
         (
             ("-o", "nowhere/a.glb"),
             "cannot write nowhere/a.glb: no such file or directory",

@@ -10,7 +10,7 @@ import pytest
 from arc_suite import data
 from arc_suite.robots import ROBOTS
 
-ID = "arc_suite/queen/walk/cpg-medium-20steps-v0"
+ID = "arc_suite/queen/walk/cpg-refined-20steps-v0"
 
 
 @pytest.fixture(autouse=True)
@@ -61,8 +61,18 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         (["--robot=all", "--id=some-v0"], f"--id=some-v0: names one dataset, and --robot=all makes {len(ROBOTS)}"),
         (
             ["--id=arc_suite/queen/mine"],
-            "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between and a "
-            "version at the end alone, such as 'arc_suite/queen/mine-v0'",
+            "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between, two "
+            "characters at least before the last '/', and a version at the end alone, such as "
+            "'arc_suite/queen/mine-v0'",
+        ),
+        (
+            ["--episodes=4294967296"],
+            "flag --episodes=4294967296: 4294967296 is not an integer in the range [1, 100000]",
+        ),
+        (
+            ["--id="],
+            "dataset id '': expected names of letters, digits, '-' and '_' with '/' between, two characters at least "
+            "before the last '/', and a version at the end alone, such as 'arc_suite/queen/walk/cpg-medium-v0'",
         ),
         (["--noise=-1"], "flag --noise=-1: -1.0 is not a non-negative number"),
         (["queen"], "unexpected argument 'queen'; see --help"),

@@ -15,16 +15,60 @@ def evaluate(*arguments):
     return programs.arc_suite("evaluate", *arguments)
 
 
-def test_table_of_all_robots():
-    result = evaluate("--robot=all", "--policy=random", "--episodes=2")
+def test_table_of_all_robots(tmp_path):
+    path = tmp_path / "a.json"
+    result = evaluate("--robot=all", "--policy=random", "--episodes=2", "--set=time_limit=5", f"--json={path}")
     assert result.returncode == 0, result.stderr
-    rows = {line.split()[0]: line for line in result.stdout.splitlines()[2:]}
+    head, _, *rows = result.stdout.splitlines()
+    assert head.split() == [
+        "robot",
+        "speed",
+        "gait_compliance",
+        "cost_of_transport",
+        "return",
+        "zero",
+        "IQM",
+        "[95",
+        "%",
+        "interval]",
+        "steps",
+    ]
+    assert [row.split()[0] for row in rows] == list(ROBOTS)
+    reports = json.loads(path.read_text())["robots"]
+    for row in rows:  # standing earns more than a fall
+        total, zero = float(row.split()[4]), float(row.split()[7])
+        assert zero == pytest.approx(reports[row.split()[0]]["zero_return"], abs=0.05)
+        assert total < zero == pytest.approx(163.0, abs=20.0)
+
+
+@pytest.mark.slow
+def test_the_papers_returns_stand_beside_medium_alone(tmp_path):
+    path = tmp_path / "a.json"
+    result = evaluate("--robot=all", "--preset=medium", "--episodes=1", f"--json={path}")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.splitlines()[0].endswith("steps  paper's cpg")
+    rows = {line.split()[0].strip(","): line for line in result.stdout.splitlines()[2:]}
     over_all = rows.pop("all", None)  # where the paper has all robots
     assert list(rows) == list(ROBOTS) and (over_all is None) == (RETURNS.keys() != ROBOTS.keys())
     if over_all:
-        assert re.match(r"all +IQM of return / paper's cpg: 0\.\d{3} \[0\.\d{3}, 0\.\d{3}\]$", over_all)
+        assert re.match(r"all +IQM of return / paper's cpg: 1\.0\d\d \[\d\.\d{3}, \d\.\d{3}\]$", over_all)
+        assert json.loads(path.read_text())["return_over_expert"]["iqm"] == pytest.approx(1.0, abs=0.05)
     for robot, returns in RETURNS.items():
         assert rows[robot].split()[-1] == f"{returns.paper:.0f}"
+
+
+def test_the_preset_is_the_one_that_suits_task_and_body(tmp_path):
+    path = tmp_path / "a.json"
+    for arguments, preset in (
+        (["--robot=queen"], "refined"),
+        (["--legs=4"], "medium"),
+        (["--robot=leaper", "--task=rough"], "balanced"),
+        (["--robot=queen", "--preset=slow"], "slow"),
+    ):
+        result = evaluate(*arguments, "--episodes=1", "--set=time_limit=0.5", f"--json={path}")
+        assert result.returncode == 0, result.stderr
+        ((name, report),) = json.loads(path.read_text())["robots"].items()
+        assert result.stdout.splitlines()[-1].startswith(f"{name}, {preset} ") and report["preset"] == preset
 
 
 @pytest.mark.slow
@@ -32,15 +76,17 @@ def test_figures_of_a_demonstrator():
     result = evaluate("--robot", "queen", "--policy", "cpg", "--preset", "medium", "--episodes", "2")
     assert result.returncode == 0, result.stderr
     fields = result.stdout.splitlines()[-1].split()
-    assert fields[0] == "queen"
-    assert result.stdout.splitlines()[0].split()[:4] == ["robot", "speed", "gait_compliance", "return"]
-    assert float(fields[1]) == pytest.approx(0.5, abs=0.05)
-    assert 0 < float(fields[2]) < 1
-    assert float(fields[3]) == pytest.approx(RETURNS["queen"].medium, rel=0.015)
-    iqm, low, high = (float(field.strip("[],")) for field in fields[6:9])
+    assert fields[:2] == ["queen,", "medium"]
+    head = ["robot", "speed", "gait_compliance", "cost_of_transport", "return", "zero"]
+    assert result.stdout.splitlines()[0].split()[:6] == head
+    assert float(fields[2]) == pytest.approx(0.5, abs=0.05)
+    assert 0 < float(fields[3]) < 1
+    assert float(fields[5]) == pytest.approx(RETURNS["queen"].medium, rel=0.015)
+    assert float(fields[8]) == pytest.approx(1635.0, rel=0.015)
+    iqm, low, high = (float(field.strip("[],")) for field in fields[9:12])
     assert low <= iqm <= high
     assert iqm == pytest.approx(RETURNS["queen"].medium, rel=0.015)
-    assert fields[9] == "1000.0"
+    assert fields[12:] == ["1000.0", f"{RETURNS['queen'].paper:.0f}"]
 
 
 def test_json_holds_every_episode_and_the_versions(tmp_path):
@@ -48,8 +94,9 @@ def test_json_holds_every_episode_and_the_versions(tmp_path):
     result = evaluate("--robot=leaper", "--policy=random", "--episodes=3", "--seed=5", f"--json={path}")
     assert result.returncode == 0, result.stderr
     report = json.loads(path.read_text())
-    assert (report["policy"], report["preset"], report["seed"]) == ("random", None, 5)
+    assert (report["policy"], report["seed"]) == ("random", 5)
     figures = report["robots"]["leaper"]
+    assert figures["preset"] is None
     totals = [episode["total"] for episode in figures["episodes"]]
     assert len(totals) == 3
     assert figures["return"]["mean"] == pytest.approx(sum(totals) / 3)
@@ -62,18 +109,33 @@ def test_json_holds_every_episode_and_the_versions(tmp_path):
 
 def test_another_task_than_the_papers_has_no_expert(tmp_path):
     path = tmp_path / "evaluation.json"
-    changed = ("--set=target_velocity=0.25", '--set=weights={"posture": -0.01}', "--set=gait=wave")
-    result = evaluate("--robot=all", "--policy=random", "--episodes=1", *changed, f"--json={path}")
+    changed = (
+        "--set=target_velocity=0.25",
+        '--set=weights={"posture": -0.01}',
+        "--set=gait=wave",
+        "--set=time_limit=5",
+    )
+    short = ("--policy=random", "--episodes=1", "--set=time_limit=5")
+    result = evaluate("--robot=all", *short, *changed, f"--json={path}")
     assert result.returncode == 0, result.stderr
     rows = [line.split() for line in result.stdout.splitlines()[2:]]
-    assert [(row[0], row[-1]) for row in rows] == [(robot, "-") for robot in ROBOTS]
+    assert [row[0] for row in rows] == list(ROBOTS)
     report = json.loads(path.read_text())
     assert report["task"] == "walk"
-    assert report["task_kwargs"] == {"target_velocity": 0.25, "weights": {"posture": -0.01}, "gait": "wave"}
+    assert report["task_kwargs"] == {
+        "target_velocity": 0.25,
+        "weights": {"posture": -0.01},
+        "gait": "wave",
+        "time_limit": 5,
+    }
     assert "return_over_expert" not in report
-    plain = evaluate("--robot=queen", "--policy=random", "--episodes=1").stdout.splitlines()[2].split()
-    assert plain[-1] == f"{RETURNS['queen'].paper:.0f}"
-    assert plain[3] != rows[0][3]
+    assert {figures["expert_return"] for figures in report["robots"].values()} == {None}
+    plain = (
+        evaluate("--robot=queen", "--policy=random", "--episodes=1", "--set=time_limit=5")
+        .stdout.splitlines()[2]
+        .split()
+    )
+    assert plain[4] != rows[0][4]
 
 
 def test_json_is_refused_before_the_work_starts():
@@ -86,8 +148,14 @@ def test_json_is_refused_before_the_work_starts():
     ("arguments", "message"),
     [
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
-        (["--episodes=0"], "flag --episodes=0: 0 is not a positive integer"),
+        (["--episodes=0"], "flag --episodes=0: 0 is not an integer in the range [1, 100000]"),
+        (
+            ["--episodes=200000"],
+            "flag --episodes=200000: 200000 is not an integer in the range [1, 100000]",
+        ),
+        (["--episodes=1e20"], "flag --episodes=1e20: invalid literal for int() with base 10: '1e20'"),
         (["--episode=3"], "Unknown command line flag 'episode'. Did you mean: episodes ?"),
+        (["--set=time_limit=Infinity"], "time_limit: expected a finite number, as every episode must end, got inf"),
         (["queen"], "unexpected argument 'queen'; see --help"),
     ],
 )

@@ -10,7 +10,7 @@ import arc_suite
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.gym import Env
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec_files import EXAMPLES, load_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
 SPIDER = EXAMPLES["spider"]
 
@@ -19,9 +19,9 @@ SPIDER = EXAMPLES["spider"]
 def test_evaluate_takes_a_spec_and_a_body_made_to_order():
     done = arc_suite_program("evaluate", "--spec=spider", "--episodes=1")
     fields = done.stdout.splitlines()[-1].split()
-    assert fields[0] == "spider"
-    assert float(fields[3]) > 2500.0
-    assert fields[-1] == "-"  # the paper knows nothing of it
+    assert fields[:2] == ["spider,", "medium"]
+    assert float(fields[5]) > 2500.0
+    assert fields[-1] == "1000.0"  # and nothing of the paper, which knows nothing of it
     done = arc_suite_program("evaluate", "--legs=4", "--links=2", "--policy=zero", "--episodes=1")
     assert done.stdout.splitlines()[-1].split()[0] == "walker_4x2"
 
@@ -47,7 +47,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
         (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
-        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
+        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
         (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(preset_names())})"),
     ],
 )
@@ -55,6 +55,17 @@ def test_bad_arguments_are_one_line(program, arguments, message, tmp_path):
     output = [f"--output={tmp_path / 'a.png'}"] if program == "render" else []
     done = arc_suite_program(program, *arguments, *output)
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite {program}: {message}\n")
+
+
+@pytest.mark.parametrize("policy", ["cpg", "zero"])
+def test_feet_in_the_floor_come_with_the_cure(policy, tmp_path):
+    body = load_body(SPIDER)
+    save_body(body.replace(torso=body.torso.replace(standing_height=0.2)), tmp_path / "low.json")
+    arguments = ("--spec=low.json", f"--policy={policy}", "--episodes=1", "--set=time_limit=0.5")
+    done = arc_suite_program("evaluate", *arguments, cwd=tmp_path)
+    line = "low.json: feet stand 0.05 m in the floor: standing_height 0.25 fits\n"
+    assert (done.returncode, done.stderr) == (0, f"arc-suite evaluate: {line}")
+    assert arc_suite_program("check", "low.json", cwd=tmp_path).stdout == line
 
 
 @pytest.mark.slow

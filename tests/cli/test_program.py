@@ -4,7 +4,9 @@ import collections
 import functools
 import json
 import os
+import platform
 import pty
+import signal
 import subprocess
 import sys
 import termios
@@ -206,3 +208,26 @@ def test_writing_json_writes_nothing_without_a_path_or_after_an_error(tmp_path, 
     with pytest.raises(KeyError), writing_json("a.json") as report:
         raise KeyError
     assert list(tmp_path.iterdir()) == []
+
+
+KILLED = """
+import os, signal
+from arc_suite import files
+with files.writing("report[1].json") as temporary:
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_kill_left_is_deleted_by_the_next_that_writes_the_file(tmp_path):
+    (tmp_path / "killed.py").write_text(KILLED)
+    assert programs.run("killed.py", cwd=tmp_path).returncode == -signal.SIGKILL
+    (left,) = tmp_path.glob(".report*")
+    *_, process, _ = left.name.split(".")
+    changes = ((platform.node(), "elsewhere"), ("report", "other"), (process, str(os.getppid())))
+    others = [left.with_name(left.name.replace(*change)) for change in changes]  # also that of a process that runs
+    for other in others:
+        other.touch()
+    with writing(tmp_path / "report[1].json"):
+        assert not left.exists()
+    assert sorted(tmp_path.glob(".*")) == sorted(others)

@@ -11,7 +11,7 @@ from PIL import Image
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite.cli import films
+from arc_suite.export import films
 from arc_suite.models.sizing import control_timestep
 from arc_suite.policies import alone, policy
 from arc_suite.robots import ROBOTS, generator
@@ -38,7 +38,7 @@ def test_png_of_the_demonstrator_is_a_gait_cycle(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "MUJOCO_GL" not in done.stderr  # nothing but progress
     # 60 steps are 4.5 cycles of 1.5 Hz; the next starts with step 67, its last view is 5/6 of a cycle later.
-    assert re.fullmatch(r"queen: return 1[0-9]{2}\.[0-9] in 78 steps\nwrote queen.png\n", done.stdout)
+    assert re.fullmatch(r"queen: return 2[0-9]{2}\.[0-9] in 78 steps\nwrote queen.png\n", done.stdout)
     assert distinct(views_of(tmp_path / "queen.png", 3, 2)) == 6
     assert os.listdir(tmp_path) == ["queen.png"]
 
@@ -161,6 +161,7 @@ def test_a_take_stays_at_its_end():
             ["--camera=portait", "--output=a.png"],
             "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
         ),
+        (["--camera=", "--output=a.png"], "unknown camera '' (there are: tracking, portrait, profile)"),
         (["--output=a.jpg"], "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .html)"),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
         ([], "no file to write; say --output=FILE.png, .mp4, .gif or .html"),

@@ -42,6 +42,11 @@ def one_line(done, line):
         (["--hp=batch"], "arc-suite train: --hp batch: expected name=value"),
         (["--config=a.json", "--seed=3"], "arc-suite train: --seed: expected none with --config, which has the whole "),
         (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
+        (
+            ["--set=time_limit=Infinity"],
+            "arc-suite train: time_limit: expected a finite number, as every",
+        ),
+        (["--minutes=nan"], "arc-suite train: minutes: expected a finite number of at least 0, got nan"),
         (["--task=wlak"], "arc-suite train: unknown task 'wlak'; did you mean 'walk'?"),
     ],
 )

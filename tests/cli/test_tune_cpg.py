@@ -63,7 +63,8 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     ("arguments", "message"),
     [
         (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'?"),
-        (["--generations=0"], "flag --generations=0: 0 is not a positive integer"),
+        (["--generations=0"], "flag --generations=0: 0 is not an integer in the range [1, 100000]"),
+        (["--resets=100000000000000000000"], "flag --resets=100000000000000000000: "),
         (["--steps=1001"], "flag --steps=1001: "),
         (["--space=torqes"], "unknown space 'torqes'; did you mean 'torques'?"),
         (["--starts=7"], "flag --starts=7: expected 8 or more, or 0"),

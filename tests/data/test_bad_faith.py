@@ -1,5 +1,6 @@
 """Datasets made in bad faith: nothing is imported, nothing outside the dataset is read, one line says what is wrong."""
 
+import json
 import os
 import pathlib
 import resource
@@ -135,6 +136,7 @@ def test_counts_of_another_type_are_named(root, name, value):
 def test_steps_that_no_episode_has_are_not_allocated(root):
     collect(ID, SETTINGS, 1)
     edited(root, lambda metadata: metadata["arc_suite"].update(steps=10**15))
+    edited(root, lambda metadata: metadata.pop("env_spec"))
     refused(verify, "20 steps were recorded, 21 replayed")
 
 
@@ -330,3 +332,30 @@ def test_links_while_a_dataset_is_collected_lead_to_its_parts_alone(root):
     assert killed_at(10, settings=SETTINGS, episodes=6)
     with h5py.File(root / ID / "data" / "main_data.hdf5") as file:
         assert episodes.read(file, 0).seed == 5
+
+
+def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(root):
+    """Minari's `recover_environment` makes the environment by the spec, and a replay by the settings."""
+    collect(ID, SETTINGS, 1)
+    spec = json.loads(data.open(ID).metadata["env_spec"])
+    for change, line in (
+        ({"max_episode_steps": 40}, "max_episode_steps of its env_spec is 40, and its settings say 20"),
+        (
+            {"id": "arc_suite/tick-walk-v0"},
+            'id of its env_spec is "arc_suite/tick-walk", and its settings say "arc_suite',
+        ),
+        (
+            {"entry_point": "elsewhere:Env"},
+            'entry_point of its env_spec is "elsewhere:Env", and its settings say "arc_',
+        ),
+        ({"kwargs": spec["kwargs"] | {"domain_name": "tick"}}, 'kwargs of its env_spec is {"domain_name": "tick", "ta'),
+        ({"kwargs": spec["kwargs"] | {"task_kwargs": {"gait": "wave"}}}, "kwargs of its env_spec is "),
+    ):
+        edited(root, lambda metadata, change=change: metadata.update(env_spec=json.dumps(spec | change)))
+        refused(data.open, "metadata.json: ", line)
+        refused(verify, line)
+    for damaged in ("{", "[]", "{}", 3, "[" * 9999):
+        edited(root, lambda metadata, damaged=damaged: metadata.update(env_spec=damaged))
+        refused(data.open, "metadata.json: ")
+    edited(root, lambda metadata: metadata.update(env_spec=json.dumps(spec | {"id": "arc_suite/queen-walk-v7"})))
+    assert len(data.open(ID)) == 1  # of a version that this one does not replay

@@ -260,7 +260,7 @@ def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch
         ({"presets": ()}, "preset: expected one or more of slow, medium, fast"),
         ({"policy": "cgp", "presets": ()}, "unknown policy 'cgp'; did you mean 'cpg'?"),
         ({"policy": "nowhere:make", "presets": ()}, "policy 'nowhere:make': No module named 'nowhere'"),
-        ({"noise": float("nan")}, "noise: expected a finite number from 0 to inf, got nan"),
+        ({"noise": float("nan")}, "noise: expected a finite number of at least 0, got nan"),
         ({"steps": 0}, "steps: expected an integer from 1, got 0"),
         (
             {"setup": Setup.of("queen", "walk", {"gaits": "wave"})},

@@ -115,7 +115,7 @@ def test_types_of_a_reset_and_a_step(env_id):
     observation, reward, terminated, truncated, info = env.step(actions(env, 1)[0])
     assert observation.dtype == np.float32 and observation in env.observation_space
     assert [type(value) for value in (reward, terminated, truncated)] == [float, bool, bool]
-    figures = ["progress_speed", "progress_gait_compliance"]
+    figures = ["progress_speed", "progress_gait_compliance", "progress_cost_of_transport"]
     assert list(info) == [f"reward_{name}" for name in WEIGHTS] + figures
     assert {type(figure) for figure in info.values()} == {float}
     assert json.loads(json.dumps(info)) == info

@@ -6,10 +6,12 @@ import re
 import subprocess
 import sys
 
+import gymnasium
 import programs
 import pytest
 
 import arc_suite
+from arc_suite import registration
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
@@ -55,7 +57,7 @@ def test_programs_find_the_robot_in_the_current_folder(package, tmp_path):
     done = programs.arc_suite(
         "evaluate", "--robot=hopper:hopper", "--preset=slow", "--episodes=1", "--set=time_limit=1", cwd=tmp_path
     )
-    assert (done.returncode, done.stderr) == (0, "") and "\nhopper  " in done.stdout
+    assert (done.returncode, done.stderr) == (0, "") and "\nhopper, slow  " in done.stdout
 
 
 @pytest.mark.long
@@ -287,3 +289,18 @@ print(gymnasium.spec("arc_suite/queen-saunter-v0").kwargs)
         "{'domain_name': 'queen', 'task_name': 'creatures.hopper:amble'}",
         "{'domain_name': 'queen', 'task_name': 'saunter'}",
     ]
+
+
+@pytest.mark.filterwarnings("ignore:.*out of date")
+def test_an_id_of_an_earlier_version_is_refused(monkeypatch):
+    """As docs/contributing.md says of releases, which have the latest version of each task."""
+    for name in [name for name in gymnasium.registry if name.startswith("arc_suite/")]:
+        monkeypatch.delitem(gymnasium.registry, name)
+    monkeypatch.setattr(Walk, "version", 1)
+    registration.register_ids()
+    try:
+        with pytest.raises(gymnasium.error.DeprecatedEnv, match="use `arc_suite/queen-walk-v1` instead"):
+            gymnasium.make("arc_suite/queen-walk-v0")
+    finally:
+        for name in [name for name in gymnasium.registry if name.startswith("arc_suite/")]:
+            del gymnasium.registry[name]

@@ -230,6 +230,7 @@ def test_calls_and_attributes_of_rows_are_those_of_single_environments():
     steer = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=2)
     steer.reset(seed=0)
     assert steer.call("command", "command", [1.0, 0.0, 0.5]) == (None, None)
+    steer.step(np.zeros((2, 18)))
     assert_array_equal(steer._memory.command.live, [[1.0, 0.0, 0.5]] * 2)
 
 
@@ -409,8 +410,8 @@ def test_calls_at_the_wrong_time():
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        ({"num_envs": 0}, "num_envs: expected an integer from 1, got 0"),
-        ({"num_threads": 1.5}, "num_threads: expected an integer from 1, got 1.5"),
+        ({"num_envs": 0}, "num_envs: expected an integer from 1 to 1048576, got 0"),
+        ({"num_threads": 1.5}, "num_threads: expected an integer from 1 to 1024, got 1.5"),
         (
             {"autoreset_mode": "samestep"},
             "unknown autoreset_mode 'samestep'; did you mean 'SameStep'? (there are: NextStep, SameStep, Disabled)",

@@ -1,11 +1,13 @@
 """The evaluation protocol: seeded episodes and their figures."""
 
+import contextlib
+
 import numpy as np
 import pytest
 from returns import RETURNS
 
 import arc_suite
-from arc_suite import evaluation
+from arc_suite import evaluation, policies
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import generator
@@ -23,7 +25,7 @@ def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
         compliance += environment.task.terms["gait_bonus"]
     assert third.length == 40
     assert third.total == pytest.approx(total)
-    assert third.progress.keys() == {"speed", "gait_compliance"}
+    assert third.progress.keys() == {"speed", "gait_compliance", "cost_of_transport"}
     assert third.progress["gait_compliance"] == pytest.approx(compliance / 40)
     assert third.progress["speed"] == pytest.approx((environment.physics.data.xpos[1, 0] - start) / 2.0)
 
@@ -48,7 +50,7 @@ def test_policies_get_named_rows_and_the_reward_of_the_step_before():
     assert policy.begun == [([0], [4])]
     np.testing.assert_array_equal(policy.rewards, [[0.0], *([step.reward] for step in steps[1:-1])])
     episode = evaluation.run(environment, policy, seed=4)
-    assert episode.progress.keys() == {"tracking", "fell", "gait_compliance"}
+    assert episode.progress.keys() == {"tracking", "fell", "gait_compliance", "cost_of_transport"}
     assert episode.total == sum(step.reward for step in steps[1:])
 
 
@@ -63,6 +65,22 @@ def test_returns_of_the_papers_demonstrators():
 def test_the_protocol_is_ten_episodes():
     environment = arc_suite.load("tick", "walk", {"time_limit": 0.1})
     assert len(evaluation.episodes(environment, Demonstrator("tick"))) == 10
+
+
+def test_episodes_that_need_not_end_are_one_line():
+    setup, line = (
+        Setup.of("tick", "walk", {"time_limit": np.inf}),
+        r"^time_limit: expected a finite number, ",
+    )
+    environment = setup.load()
+    with pytest.raises(ValueError, match=line):
+        evaluation.episodes(environment, Demonstrator("tick"))
+    assert len(list(evaluation.rollout(environment, Demonstrator("tick"), seed=0, max_steps=3))) == 4
+    zero = policies.policy("zero", "tick", num_envs=2)
+    with contextlib.closing(setup.make_vec(2)) as endless, pytest.raises(ValueError, match=line):
+        evaluation.episodes_in_batch(endless, zero, range(2))
+    with contextlib.closing(setup.make_vec(2, max_episode_steps=3, autoreset_mode="Disabled")) as cut:
+        assert [episode.length for episode in evaluation.episodes_in_batch(cut, zero, range(2))] == [3, 3]
 
 
 def test_rollouts_stop_early():

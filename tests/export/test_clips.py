@@ -339,6 +339,7 @@ SHORT = Setup.of("tick", "walk", {"time_limit": 1.0})
     ("arguments", "message"),
     [
         ({"names": ["wlak"]}, "unknown clip 'wlak'; did you mean 'walk'?"),
+        ({"names": []}, "clips: expected one or more of walk, slow, fast, turn_left, turn_right, strafe_left, "),
         ({"names": ["walk", "walk"]}, "clips: expected each once"),
         ({"names": ["walk"], "fps": 0.0}, "fps: expected a number from 1 to 1000"),
         pytest.param(

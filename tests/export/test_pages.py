@@ -159,7 +159,7 @@ def test_programs_write_pages(tmp_path):
     done = programs.run("-m", "arc_suite", "style", *compare, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     labels = [walk["label"] for walk in walks_of((tmp_path / "both.html").read_text())]
-    assert labels == ["tick, cpg medium", "tick, zero"]
+    assert labels == ["tick, cpg", "tick, zero"]
 
 
 @pytest.mark.parametrize(

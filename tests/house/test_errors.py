@@ -27,7 +27,9 @@ CAMERAS = "['tracking', 'portrait', 'profile']"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
-FINITE = "expected a finite number from"
+FINITE = "expected a finite number"
+POSITIVE = "expected a number above 0, at most 1e+06"
+COMMAND = "command 'command': expected 3 numbers from -1e+06 to 1e+06, got"
 
 
 class World:
@@ -107,15 +109,10 @@ CASES = [
         lambda w: w.steer.command("comand", None),
         "unknown command 'comand'; did you mean 'command'? (there are: command)",
     ),
-    (lambda w: w.steer.command("command", [0.5]), "command 'command': expected 3 finite numbers, got [0.5]"),
-    (
-        lambda w: w.steer.command("command", [0, 0, np.inf]),
-        "command 'command': expected 3 finite numbers, got [0, 0, inf]",
-    ),
-    (
-        lambda w: w.steer.command("command", ["1", "0", "0"]),
-        "command 'command': expected 3 finite numbers, got ['1', '0', '0']",
-    ),
+    (lambda w: w.steer.command("command", [0.5]), f"{COMMAND} [0.5]"),
+    (lambda w: w.steer.command("command", [0, 0, np.inf]), f"{COMMAND} [0, 0, inf]"),
+    (lambda w: w.steer.command("command", [1e308, 0, 0]), f"{COMMAND} [1e+308, 0, 0]"),
+    (lambda w: w.steer.command("command", ["1", "0", "0"]), f"{COMMAND} ['1', '0', '0']"),
     # Seeds.
     (lambda w: w.env.reset(seed=[1]), f"{SEED} [1]"),
     (lambda w: w.env.reset(seed=np.array([1, 2])), f"{SEED} array([1, 2])"),
@@ -191,11 +188,11 @@ CASES = [
     (lambda w: w.rows.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
     (
         lambda w: policies.policy("cgp", "queen"),
-        "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)",
+        "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)",
     ),
     (
         lambda w: policies.policy(None, "queen"),
-        "unknown policy None (there are: cpg, zero, random)",
+        "unknown policy None (there are: cpg, zero, random, ppo)",
     ),
     (lambda w: policies.policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
     (lambda w: policies.policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),
@@ -213,8 +210,14 @@ CASES = [
     ),
     (lambda w: arc_suite.load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
     # Keyword arguments.
-    (walk(time_limit=0), f"time_limit: {FINITE} 1e-09 to inf, got 0"),
-    (walk(time_limit=float("nan")), f"time_limit: {FINITE} 1e-09 to inf, got nan"),
+    (walk(time_limit=0), f"time_limit: {POSITIVE}, got 0"),
+    (walk(time_limit=1e308), f"time_limit: {POSITIVE}, got 1e+308"),
+    (walk(target_velocity=10**400), f"target_velocity: expected a number from -1e+06 to 1e+06, got {10**400}"),
+    (
+        lambda w: policies.policy("zero", "queen", noise=10**400),
+        f"noise: expected a finite number of at least 0, got {10**400}",
+    ),
+    (walk(time_limit=float("nan")), f"time_limit: {POSITIVE}, got nan"),
     (walk(target_velocity=True), "target_velocity: expected a number from -1e+06 to 1e+06, got True"),
     (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),
     (walk(phase_offsets=None), "phase_offsets: expected one finite number or 6 of them, got None"),
@@ -244,8 +247,14 @@ CASES = [
         "(there are: flat_observation)",
     ),
     (walk(arena="bumpy"), f"unknown arena 'bumpy'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
-    (rows(num_envs=2.5), "num_envs: expected an integer from 1, got 2.5"),
-    (rows(num_threads="all"), "num_threads: expected an integer from 1, got 'all'"),
+    (rows(num_envs=2.5), "num_envs: expected an integer from 1 to 1048576, got 2.5"),
+    (rows(num_envs=0), "num_envs: expected an integer from 1 to 1048576, got 0"),
+    (rows(num_envs="4"), "num_envs: expected an integer from 1 to 1048576, got '4'"),
+    (rows(num_envs=10**12), "num_envs: expected an integer from 1 to 1048576, got 1000000000000"),
+    (rows(num_threads="all"), "num_threads: expected an integer from 1 to 1024, got 'all'"),
+    (rows(num_threads=10**30), f"num_threads: expected an integer from 1 to 1024, got {10**30}"),
+    (rows(task_kwargs=[1]), "task_kwargs: expected a mapping of names to values, got [1]"),
+    (lambda w: w.rows.reset(options=[1]), "options: expected a mapping of names to values, got [1]"),
     (rows(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
     (
         rows(autoreset_mode="SomeStep"),

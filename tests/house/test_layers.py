@@ -85,6 +85,7 @@ THIRD_PARTY = {
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},
     "export": {"numpy", "mujoco"},
+    "export.films": {"numpy", "imageio", "imageio_ffmpeg", "PIL"},
     "export.gltf": {"numpy"},
     "export.shapes": {"numpy"},
     "export.pages": {"numpy"},
@@ -219,7 +220,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
 
 
 def test_import_is_light():
-    heavy = ("torch", "jax", "stable_baselines3", "shimmy", "matplotlib", "imageio")
+    heavy = ("torch", "jax", "stable_baselines3", "shimmy", "matplotlib", "imageio", "arc_suite.export")
     code = f"import sys, arc_suite; print([m for m in {heavy} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"

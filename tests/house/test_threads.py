@@ -1,6 +1,8 @@
 """Threads: each may have its own environment; two may not share one."""
 
 import concurrent.futures
+import functools
+import itertools
 import threading
 
 import gymnasium
@@ -63,3 +65,45 @@ def test_two_threads_cannot_use_one_environment(face, call, monkeypatch):
     assert data_equivalence(result, twin.step(actions), exact=True)
     assert data_equivalence(shared.step(actions), twin.step(actions), exact=True)
     shared.close()
+
+
+@pytest.mark.parametrize("face", ["dm", "rows"])
+def test_a_thread_may_set_commands_without_end_while_another_steps(face):
+    load = functools.partial(arc_suite.load, "tick", "steer", {"random": 0})
+    make = functools.partial(gymnasium.make_vec, "arc_suite/tick-steer-v0", num_envs=2, task_kwargs={"random": 0})
+    shared, twin = (load() if face == "dm" else make() for _ in range(2))
+    shared.reset(), twin.reset()
+    actions, stop = np.zeros((2, 18) if face == "rows" else 18), threading.Event()
+
+    def command(environment, number):
+        environment.command("command", (number, -number, 2.0 * number))
+
+    def play():
+        for number in itertools.cycle(np.arange(128) / 256):  # exact as float32
+            command(shared, number)
+            if stop.is_set():
+                return
+
+    def used(result):
+        """The command of a step (..., 3), as observed."""
+        return result.observation["command"][:3] if face == "dm" else shared.task.split(result[0])["command"][:, :3]
+
+    command(shared, 0.0)
+    results = []
+    with concurrent.futures.ThreadPoolExecutor(1) as pool:
+        playing = pool.submit(play)
+        try:
+            while len({used(result).flat[0] for result in results}) < 4 and len(results) < 900:
+                results.append(shared.step(actions))
+        finally:
+            stop.set()
+        playing.result()
+    numbers = [float(used(result).flat[0]) for result in results]
+    assert len(set(numbers)) == 4
+    for number, result in zip(numbers, results, strict=True):
+        assert (used(result) == (number, -number, 2.0 * number)).all()
+        command(twin, number)
+        assert data_equivalence(result, twin.step(actions), exact=True)
+    command(shared, 0.25)
+    assert (used(shared.step(actions)) == (0.25, -0.25, 0.5)).all()
+    shared.close(), twin.close()

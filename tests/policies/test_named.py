@@ -63,7 +63,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random)"),
+        (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
         (
             ("zero", "quen"),
             f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
@@ -80,7 +80,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
             ("cpg", "queen", ()),
             f"preset: expected one or more of {ALL}, got none",
         ),
-        (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number from 0 to inf, got -0.1"),
+        (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number of at least 0, got -0.1"),
         (
             ("cpg", ROBOTS["bastion"].replace(name="queen")),
             "presets: expected a body named 'queen' to have the 18 joints of queen, got 12; give it another name",

@@ -111,6 +111,20 @@ def test_of_another_body(saved):
         policies.policy(str(saved), "tick")
 
 
+def test_blocks_that_its_task_excluded_are_left_out(saved):
+    observed = arc_suite.load("tick", "walk", {"random": 0}).reset().observation
+    blocks = {name: block[None] for name, block in observed.items()}
+    whole = policies.policy(str(saved), "tick")
+    rest = {name: size for name, size in whole.blocks.items() if name != "contact_forces"}
+    blind = whole._replace(
+        layers=(Layer("linear", (np.eye(sum(rest.values()), 18, dtype=np.float32), np.zeros(18, np.float32))),),
+        setup=Setup.of("tick", "walk", {"exclude_blocks": ["contact_forces"]}),
+        blocks=rest,
+    )
+    del (less := dict(blocks))["contact_forces"]
+    np.testing.assert_array_equal(blind.act(blocks, np.zeros(1)), blind.act(less, np.zeros(1)))
+
+
 def test_of_another_task(saved):
     policy = policies.policy(str(saved), "tick")
     with pytest.raises(ValueError, match=r"^policy of walk: expected observation blocks \{.*\}, got \{.*command"):

@@ -1,5 +1,6 @@
 """One simulation: its arena, its copies, and what an interrupted step leaves."""
 
+import concurrent.futures
 import copy
 import pickle
 
@@ -20,11 +21,15 @@ def copied(physics):
     return physics.copy()
 
 
+def sharing(physics):
+    return physics.copy(share_model=True)
+
+
 def pickled(physics):
     return pickle.loads(pickle.dumps(physics))
 
 
-@pytest.mark.parametrize("twin_of", tiers([copied, copy.deepcopy, pickled], lambda way: way == pickled))
+@pytest.mark.parametrize("twin_of", tiers([copied, sharing, copy.deepcopy, pickled], lambda way: way == pickled))
 def test_copies_go_on_in_the_same_arena(twin_of):
     physics = Physics.from_body(BODY, fitted(BODY))
     physics.set_control(np.linspace(-1.0, 1.0, physics.model.nu))
@@ -52,3 +57,32 @@ def test_an_interrupted_step_leaves_sensors_on():
     with pytest.raises(TypeError):
         physics.step(2.5)
     assert physics.model.opt.disableflags == flags
+
+
+def test_a_copy_that_shares_the_model_changes_nothing_in_it():
+    physics = Physics.from_body(BODY)
+    heavy = 2.0 * physics.model.body_mass
+    physics.change_model({"body_mass": heavy})
+    twin = physics.copy(share_model=True)
+    assert twin.model.ptr is physics.model.ptr
+    twin.reset()
+    assert_array_equal(physics.model.body_mass, heavy)
+    physics.reset()
+    assert_array_equal(twin.model.body_mass, 0.5 * heavy)
+
+
+def test_copies_that_share_the_model_can_be_stepped_by_threads():
+    physics, alone = Physics.from_body(BODY), Physics.from_body(BODY)
+    twins, flags = [physics, physics.copy(share_model=True)], physics.model.opt.disableflags
+
+    def stepped(simulation):
+        for _ in range(200):
+            simulation.step(5)
+
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        list(pool.map(stepped, twins))
+    stepped(alone)
+    assert physics.model.opt.disableflags == flags  # whose sensors were off for both, once threads had met here
+    for twin in twins:
+        assert_array_equal(twin.data.cfrc_ext, alone.data.cfrc_ext)
+        assert_array_equal(twin.data.qpos, alone.data.qpos)

@@ -53,6 +53,7 @@ def _changed(report, *keys, value):
     [
         (("versions", "mujoco"), "3.0.0", "versions: the file says "),
         (("policy_sha256",), "00", 'policy_sha256: the file says "00", and here it is null'),
+        (("robots", "tick", "preset"), ["medium"], "unknown preset "),
         (("policy",), "os:system", "policy 'os:system': expected --policy with its file, got none"),
         (("seed",), 5, "expected episodes from seed 0, got 5"),
         (("robots", "tick", "provenance", "task_sha256"), "00", 'task_sha256: the file says "00", and here it is '),

@@ -30,6 +30,8 @@ def test_tracks_agree_with_the_reward(robot):
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
     results = measure(track)
     assert results["gait_compliance"].value == pytest.approx(track.terms["gait_bonus"].mean(), rel=1e-12)
+    cost = episode.progress["cost_of_transport"]
+    assert cost == pytest.approx(results["cost_of_transport"].value, rel=0.25), "of x alone, and with the first step"
     joints = track.actions.shape[1]
     for metric, term in (("action_change", "smoothness"), ("posture_deviation", "posture")):
         squares = np.array(list(results[metric].legs.values())) ** 2
@@ -59,7 +61,8 @@ def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
     assert len(track.times) == episode.length == 40
     assert track.rewards.sum() == pytest.approx(episode.total, rel=1e-12)
     assert track.progress == episode.progress
-    assert track.progress.keys() == ({"tracking", "fell", "gait_compliance"} if task == "steer" else set())
+    metrics = {"tracking", "fell", "gait_compliance", "cost_of_transport"} if task == "steer" else set()
+    assert track.progress.keys() == metrics
     assert np.isnan(track.target_velocity)
     for points, heights in ((track.foot_positions, track.foot_heights), (track.positions, track.torso_heights)):
         ground = arena.height(points[..., 0], points[..., 1])

@@ -244,19 +244,39 @@ def test_distance_is_the_share_of_what_was_asked_for():
 @pytest.mark.parametrize(
     ("carry", "stays", "level"),
     [
-        (Stream(4, 0.81, False), 0.9, 5),
-        (Stream(4, 0.81, True), 0.9, 4),
-        (Stream(4, 0.79, False), 0.9, 4),
-        (Stream(4, 0.41, True), 0.9, 4),
-        (Stream(4, 0.39, False), 0.9, 3),
-        (Stream(0, 0.1, True), 0.9, 0),
-        (Stream(9, 0.9, False), 0.74, 9),
-        (Stream(9, 0.9, False), 0.76, 2),
-        (Stream(9, 0.9, True), 0.76, 9),
+        (Stream(4, 0.81, False), 0.9, (5, False)),
+        (Stream(4, 0.81, True), 0.9, (4, False)),
+        (Stream(4, 0.79, False), 0.9, (4, False)),
+        (Stream(4, 0.41, True), 0.9, (4, False)),
+        (Stream(4, 0.39, False), 0.9, (3, False)),
+        (Stream(0, 0.1, True), 0.9, (0, False)),
+        (Stream(9, 0.9, False), 0.74, (9, False)),
+        (Stream(9, 0.9, False), 0.76, (2, True)),
+        (Stream(9, 0.9, True), 0.76, (9, False)),
+        (Stream(2, 0.9, False, True), 0.76, (9, False)),
+        (Stream(2, 0.1, True, True), 0.76, (9, False)),
+        (Stream(9, 0.9, False, True), 0.76, (9, False)),
     ],
 )
 def test_levels_rise_and_fall_by_what_was_commanded(carry, stays, level):
     assert next_level(carry, stays, 2, down=0.4, up=0.8) == level
+
+
+def test_a_master_of_all_levels_spends_most_episodes_at_the_highest():
+    random, stream, levels = np.random.RandomState(0), Stream(0, np.nan, False), []
+    for _ in range(5000):
+        level, visits = next_level(stream, random.uniform(), random.randint(LEVELS), down=0.4, up=0.8)
+        stream = Stream(level, 1.0, False, visits)
+        levels.append(int(level))
+    assert np.mean(np.array(levels) == LEVELS - 1) > 0.8
+    assert set(levels) == set(range(LEVELS))
+
+
+def test_levels_of_gaps_differ():
+    arena = prepared("tick", "gaps", {"curriculum": True})[0].scene.arena
+    x = np.arange(terrain.LEVEL, terrain.LEVEL + 1.0, 1.0 / 32.0) * arena.unit  # the first trench begins here
+    trenches = [(arena.height(x, arena.start(level) + 0.0 * x) < 0.0).mean() for level in range(LEVELS)]
+    assert_allclose(trenches, np.arange(1, LEVELS + 1) / 16.0)
 
 
 @pytest.mark.slow

@@ -15,6 +15,8 @@ from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import command
 from arc_suite.tasks.health import Upright
 
+NUMBERS = "command 'command': expected 3 numbers from -1e+06 to 1e+06"
+
 
 def commands(environment):
     return environment.task.memory.core.desired
@@ -125,14 +127,25 @@ def test_live_commands_of_rows_are_those_of_single_environments():
     envs.close()
 
 
+def test_live_commands_of_rows_add_up_between_two_steps():
+    envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
+    envs.reset(seed=5)
+    for value, mask in ((0.25, [True, True, False]), (0.5, [False, True, True])):
+        envs.command("command", (value, 0.0, 0.0), mask=np.array(mask))
+    blocks = envs.task.split(envs.step(np.zeros(envs.action_space.shape))[0])
+    assert_array_equal(blocks["command"][:, :3], [[0.25, 0, 0], [0.5, 0, 0], [0.5, 0, 0]])
+    envs.close()
+
+
 @pytest.mark.parametrize(
     ("task", "name", "value", "message"),
     [
         ("walk", "command", (1, 0, 0), "command 'command': task walk has no commands"),
         ("steer", "comand", (1, 0, 0), "unknown command 'comand'; did you mean 'command'? (there are: command)"),
-        ("steer", "command", (1, 0), "command 'command': expected 3 finite numbers, got (1, 0)"),
-        ("steer", "command", (1, 0, np.inf), "command 'command': expected 3 finite numbers, got (1, 0, inf)"),
-        ("steer", "command", "go", "command 'command': expected 3 finite numbers, got 'go'"),
+        ("steer", "command", (1, 0), f"{NUMBERS}, got (1, 0)"),
+        ("steer", "command", (1, 0, np.inf), f"{NUMBERS}, got (1, 0, inf)"),
+        ("steer", "command", (1e308, np.nan, 0), f"{NUMBERS}, got (1e+308, nan, 0)"),  # infinite as float32
+        ("steer", "command", "go", f"{NUMBERS}, got 'go'"),
     ],
 )
 def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, message):

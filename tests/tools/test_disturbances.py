@@ -1,4 +1,4 @@
-"""tools/disturbances.py: rows of Markdown for every modifier, or for a task."""
+"""tools/disturbances.py: rows of Markdown for every modifier."""
 
 import pathlib
 import re
@@ -32,14 +32,6 @@ def test_a_table_of_every_modifier():
     assert "actuator_failure 3" not in figures, "the right side is mirrored"
     assert figures["none"][0] > figures["motor_strength 0.25"][0]
     assert not any(fell for _, fell in figures.values())
-
-
-def test_a_table_of_a_task():
-    done = programs.run(TOOL, *SHORT, "--task=limp", "--steps=10")
-    assert done.returncode == 0, done.stderr
-    head, _, row = done.stdout.strip().splitlines()
-    assert head == "| limp | zero | steered |"
-    assert re.fullmatch(r"\| tick( \| \d+, \d\.\d\d \(0%\)){2} \|", row)
 
 
 @pytest.mark.parametrize(

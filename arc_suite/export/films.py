@@ -1,0 +1,173 @@
+"""Episodes in pictures: single views, one gait cycle at a glance, films."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import IO
+
+import imageio.v2 as imageio
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from arc_suite import versions
+
+_SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
+
+
+class Footage:
+    """One robot in one episode under a policy, and a camera on it.
+
+    Attributes:
+        robot: its name.
+        earned: sum of the rewards so far.
+        steps: control steps so far.
+        advance: cycles that the gait clock made in the latest step; 0 before the first, or without a gait clock.
+    """
+
+    def __init__(self, robot: str, environment, policy: Callable, camera: str, size: tuple[int, int]):
+        """Start the episode.
+
+        Args:
+            robot: its name.
+            environment: of `arc_suite.load`; the take closes it.
+            policy: maps a `TimeStep` to an action.
+            camera: one of `builder.CAMERAS`.
+            size: width and height of a view in pixels.
+        """
+        self.robot = robot
+        self.earned = 0.0
+        self.steps = 0
+        self.advance = 0.0
+        self._environment, self._policy = environment, policy
+        self._time_step = environment.reset()
+        self._camera, self._size = camera, size
+
+    @property
+    def ended(self) -> bool:
+        """Whether the episode is over; stepping on changes nothing then."""
+        return self._time_step.last()
+
+    @property
+    def phase(self) -> float:
+        """Phase of the gait clock, in cycles from 0 to 1; 0 in a task that has none."""
+        sine, cosine = self._time_step.observation.get("gait_clock", (0.0, 1.0))
+        return float(np.arctan2(sine, cosine) / (2.0 * np.pi) % 1.0)
+
+    @property
+    def control_timestep(self) -> float:
+        """Seconds in a control step."""
+        return self._environment.control_timestep()
+
+    def step(self) -> None:
+        """Advance by one control step."""
+        if self.ended:
+            return
+        before = self.phase
+        self._time_step = self._environment.step(self._policy(self._time_step))
+        self.advance = (self.phase - before) % 1.0
+        self.earned += self._time_step.reward
+        self.steps += 1
+
+    def view(self) -> np.ndarray:
+        """Return what the camera sees: (height, width, 3) uint8."""
+        width, height = self._size
+        return self._environment.physics.render(height, width, self._camera)
+
+    def close(self) -> None:
+        """Free the simulation and its OpenGL context."""
+        self._environment.close()
+
+
+def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:
+    """Yield views of the next whole gait cycle, evenly spaced, captioned with the gait clock's phase.
+
+    Args:
+        footage: whose gait clock advanced in the latest step.
+        count: of views.
+    """
+    while not footage.ended and not (footage.phase + 0.5 * footage.advance) % 1.0 < footage.advance:
+        footage.step()
+    start = footage.steps
+    for i in range(count):
+        while not footage.ended and footage.steps < start + round(i / (count * footage.advance)):
+            footage.step()
+        yield captioned(footage.view(), f"phase {footage.phase:.2f}")
+
+
+def steps_per_frame(control_timestep: float) -> int:
+    """Return how many control steps a frame of a film shows, so that players keep its pace."""
+    return math.ceil(_SHORTEST_FRAME / control_timestep)
+
+
+def captioned(picture: np.ndarray, text: str) -> np.ndarray:
+    """Return the picture with a text in its lower left corner."""
+    image = Image.fromarray(picture)
+    size = max(11, image.height // 22)
+    font = ImageFont.load_default(size)
+    ImageDraw.Draw(image).text((size, image.height - size), text, (235, 240, 245), font, anchor="ls")
+    return np.asarray(image)
+
+
+def grid(pictures: Sequence[np.ndarray], columns: int) -> np.ndarray:
+    """Return pictures of one size side by side, row by row; black fills the last row."""
+    pictures = [*pictures, *(-len(pictures) % columns * [np.zeros_like(pictures[0])])]
+    rows = [np.concatenate(pictures[i : i + columns], axis=1) for i in range(0, len(pictures), columns)]
+    return np.concatenate(rows, axis=0)
+
+
+def write_png(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write the only frame, however many seconds it stands for."""
+    (frame,) = frames
+    Image.fromarray(frame).save(path, optimize=True)
+
+
+def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write a film that any browser plays: H.264, yuv420p, which needs even width and height.
+
+    Args:
+        path: of the file.
+        frames: (height, width, 3) uint8.
+        seconds: that a frame lasts.
+
+    Raises:
+        ValueError: imageio-ffmpeg is not installed.
+    """
+    try:
+        import imageio_ffmpeg  # noqa: F401
+    except ImportError as error:
+        raise versions.MissingExtra("MP4 needs imageio-ffmpeg", "video", error) from None
+    with imageio.get_writer(
+        path,
+        format="FFMPEG",
+        fps=1.0 / seconds,
+        codec="libx264",
+        pixelformat="yuv420p",
+        quality=8,
+        macro_block_size=2,
+        output_params=["-movflags", "+faststart"],
+    ) as writer:
+        for frame in frames:
+            writer.append_data(frame)  # type: ignore[attr-defined]  # imageio names the base of writers and readers
+
+
+def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write a film that plays forever; one palette for all frames, undithered, keeps it small and calm.
+
+    Args:
+        path: of the file, or an open one.
+        frames: (height, width, 3) uint8.
+        seconds: that a frame lasts; the format counts in hundredths, so single frames are off by less than one.
+    """
+    frames = list(frames)
+    sample = Image.fromarray(np.concatenate(frames[:: -(-len(frames) // _GIF_SAMPLES)]))
+    # Of Pillow's methods the octree is the one that keeps small bright spots: eyes and glows.
+    palette = sample.quantize(_GIF_COLOURS, Image.Quantize.FASTOCTREE)
+    first, *others = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
+    ends = [round(100.0 * seconds * count) for count in range(len(frames) + 1)]
+    durations = [10 * (end - start) for start, end in zip(ends, ends[1:], strict=False)]  # ms
+    first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
+
+
+_GIF_COLOURS = 128
+_GIF_SAMPLES = 4  # frames that the palette is made from
+WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif}

@@ -1,0 +1,65 @@
+"""Energy: the positive work of the motors, of which the cost of transport follows.
+
+Work is divided by the body's weight, so its unit is m. The motors do not win back what they brake, as in
+`style.metrics.cost_of_transport`.
+"""
+
+import functools
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.models.sizing import GRAVITY, sized
+from arc_suite.models.standing import standing
+from arc_suite.robots.spec import Body
+
+NOWHERE = 0.05  # share of the path at the target velocity below which a body gets nowhere
+
+
+class Energy(NamedTuple):
+    """Memory of the motors' work.
+
+    Attributes:
+        angles: (..., joints) at the latest reading, rad.
+        step: (...) work of the latest step by weight, m.
+        total: (...) sum of `step` over the steps, m.
+    """
+
+    angles: np.ndarray
+    step: np.ndarray
+    total: np.ndarray
+
+
+def start(joints: int) -> Energy:
+    """Return the memory at the start of an episode."""
+    return Energy(np.zeros(joints), np.float64(0.0), np.float64(0.0))
+
+
+def begin(memory: Energy, angles) -> Energy:
+    """Return the memory from which the first step starts, given the joint angles (..., joints), rad."""
+    return memory._replace(angles=angles + 0.0)  # not a view
+
+
+def after(memory: Energy, body: Body, action, angles) -> Energy:
+    """Return the memory after a control step with an action (..., joints), over which torques are constant."""
+    step = (_torques(body) * action * (angles - memory.angles)).clip(0.0).sum(axis=-1)
+    return Energy(angles + 0.0, step, memory.total + step)
+
+
+def cost_of_transport(memory: Energy, path, target_path):
+    """Return the cost of transport (...): work by weight and path.
+
+    Args:
+        memory: of the episode.
+        path: (...) length of it so far, m.
+        target_path: (...) length at the target velocity, m; a shorter path than a twentieth of it counts as that.
+    """
+    numpy = memory.total.__array_namespace__()
+    return memory.total / numpy.maximum(path, NOWHERE * target_path)
+
+
+@functools.lru_cache(maxsize=256)
+def _torques(body: Body) -> np.ndarray:
+    """(joints,) greatest torques by weight, m."""
+    gears = np.array([joint.motor.gear for leg in sized(body).legs for joint in leg.joints])
+    return gears / (standing(body).mass * GRAVITY)

@@ -1,0 +1,48 @@
+"""Files of the project agree: workflows, hooks of pre-commit, CITATION.cff, setup.cfg, Makefile."""
+
+import configparser
+import pathlib
+import re
+
+import programs
+import pytest
+
+import arc_suite
+
+ROOT = pathlib.Path(__file__).parents[2]
+WORKFLOWS = "\n".join(path.read_text() for path in sorted((ROOT / ".github" / "workflows").glob("*.yml")))
+SETUP = configparser.ConfigParser()
+SETUP.read(ROOT / "setup.cfg")
+
+
+def test_hooks_and_lint_have_the_same_ruff():
+    (pinned,) = re.findall(r"^ruff==(\S+)$", SETUP["options.extras_require"]["lint"], re.MULTILINE)
+    assert re.findall(r"ruff==([\d.]+)", (ROOT / ".pre-commit-config.yaml").read_text()) == [pinned, pinned]
+
+
+def test_the_citation_names_this_version():
+    assert f"\nversion: {arc_suite.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def test_workflows_name_targets_that_exist():
+    targets = re.findall(r"run: make (\S+)", WORKFLOWS)
+    makefile = (ROOT / "Makefile").read_text()
+    assert "test" in targets and "dist" in targets
+    assert [name for name in targets if not re.search(rf"^{name}:", makefile, re.MULTILINE)] == []
+
+
+def test_workflows_run_on_versions_of_python_that_are_supported():
+    versions = set(re.findall(r"\b3\.\d+\b", "".join(re.findall(r"python: (\[.*\])", WORKFLOWS))))
+    assert versions == {"3.11", "3.12", "3.13"}
+    assert all(f"Python :: {version}" in SETUP["metadata"]["classifiers"] for version in versions)
+
+
+@pytest.mark.parametrize("command", sorted(set(re.findall(r"run: (arc-suite .*)", WORKFLOWS))))
+def test_a_command_of_a_workflow_is_understood(command):
+    done = programs.run(*command.split(), "--version", cwd=ROOT)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_tests_that_workflows_name_exist():
+    named = re.findall(r"\btests/\S+\.py", WORKFLOWS)
+    assert named and all((ROOT / name).exists() for name in named)

@@ -1,0 +1,45 @@
+"""tools/results.py: tables of demonstrators, and the marks between which they stand in the page."""
+
+import pathlib
+import re
+
+import programs
+import pytest
+
+from arc_suite.tasks import TASKS
+
+TOOL = pathlib.Path(__file__).parents[2] / "tools" / "results.py"
+CELL = r" \| -?\d+, -?\d\.\d\d(?: \(.*?\))?"
+
+
+@pytest.mark.slow
+def test_a_table_has_a_row_for_each_difficulty():
+    flags = ("--tasks=rough", "--robots=tick", "--presets=zero,steered", "--difficulties=0,1", "--episodes=1")
+    done = programs.run(TOOL, *flags)
+    assert done.returncode == 0, done.stderr
+    head, _, *rows = done.stdout.strip().splitlines()
+    assert head == "| rough | zero | steered |"
+    assert all(
+        re.fullmatch(rf"\| tick {share}({CELL}){{2}} \|", row)
+        for share, row in zip(("0.00", "1.00"), rows, strict=True)
+    )
+
+
+def test_every_task_has_its_table_in_the_page():
+    page = (TOOL.parents[1] / "docs" / "results.md").read_text()
+    for task in TASKS.keys() - {"walk"}:
+        assert re.search(rf"<!-- {task} -->\n\n\| {task} \| zero \|.*?<!-- end -->", page, re.DOTALL), task
+
+
+@pytest.mark.parametrize(
+    ("flag", "line"),
+    [
+        ("--robots=tik", "unknown robot 'tik'; did you mean 'tick'?"),
+        ("--presets=tuned,steerd", "unknown preset 'steerd'; did you mean 'steered'?"),
+        ("--tasks=walk", "unknown task 'walk'"),
+    ],
+)
+def test_an_unknown_name_is_one_line_before_the_table(flag, line):
+    done = programs.run(TOOL, flag)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"results.py: {line}")

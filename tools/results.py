@@ -1,0 +1,126 @@
+"""Measures demonstrators on tasks: the tables between the marks in docs/results.md.
+
+A cell holds the return, the task's metric, and in brackets the share of episodes that ended in a fall or with a
+foot under the ground.
+
+Example:
+  python tools/results.py --tasks rough,steer --robots tick --difficulties 0.5 --episodes 4
+  python tools/results.py --write
+"""
+
+import contextlib
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from absl import flags
+
+from arc_suite import checks, evaluation, policies
+from arc_suite.arenas import terrain
+from arc_suite.cli import program
+from arc_suite.cpg.selection import presets_of
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
+LANES = (*terrain.KINDS, "course")
+
+# Task -> presets to compare; zero stands still.
+PRESETS = {
+    "steer": ("zero", "tuned", "steered", "surefooted"),
+    "shoved": ("zero", "tuned", "steered", "surefooted"),
+    "limp": ("zero", "tuned", "steered", "surefooted"),
+    "roam": ("zero", "steered", "surefooted", "balanced"),
+    "navigate": ("zero", "steered", "planned"),
+    **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),
+}
+METRICS = ("distance", "goals", "tracking")  # the first that a task has
+
+FLAGS = flags.FLAGS
+flags.DEFINE_list("tasks", list(PRESETS), "Which tasks.")
+flags.DEFINE_list("robots", list(ROBOTS), "Who walks.")
+flags.DEFINE_list("presets", None, "Of the demonstrator; zero stands still. [default: those that suit the task]")
+flags.DEFINE_list("difficulties", ["0.3333", "0.6667", "1"], "Of ground, from 0 to 1.")
+flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many of each.", lower_bound=1)
+flags.DEFINE_integer("terrain_seed", 1, "Of what is random in the ground; learners train on others.", lower_bound=0)
+flags.DEFINE_integer("threads", None, "To simulate on. [default: as many as there are cores]", lower_bound=1)
+flags.DEFINE_boolean("write", False, "Write the tables into docs/results.md.")
+
+
+def cell(task: str, robot: str, preset: str, settings: dict) -> str:
+    """Return what a table says of a preset; "-" where the robot has none of that name."""
+    return summary(played(task, robot, preset, settings)) if preset in ("zero", *presets_of(ROBOTS[robot])) else "-"
+
+
+def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.Episode]:
+    """Play the episodes of one cell, all at once."""
+    environment = VectorEnv(robot, task, FLAGS.episodes, FLAGS.threads, "Disabled", task_kwargs=settings)
+    name, presets = ("zero", ()) if preset == "zero" else ("cpg", (preset,))
+    with contextlib.closing(environment):
+        policy = policies.policy(name, robot, presets, FLAGS.episodes, task=environment.task.definition)
+        return evaluation.episodes_in_batch(environment, policy, range(FLAGS.episodes))
+
+
+def summary(episodes: list[evaluation.Episode]) -> str:
+    """Return the return, the metric and the failures of episodes as text."""
+    means = {name: np.mean([e.progress[name] for e in episodes]) for name in episodes[0].progress}
+    metric = next(means[name] for name in METRICS if name in means)
+    total = np.mean([episode.total for episode in episodes])
+    notes = [f"{means[name]:.0%} {name}" for name in ("fell", "sank") if means.get(name)]
+    return f"{total:.0f}, {metric:.2f}" + (f" ({', '.join(notes)})" if notes else "")
+
+
+def rows(task: str) -> Iterator[tuple[str, str, dict]]:
+    """Yield a row's robot, the difficulty of its ground as text, and its settings."""
+    for robot in FLAGS.robots:
+        if task not in LANES:
+            yield robot, "", {}
+            continue
+        for text in FLAGS.difficulties:
+            difficulty = checks.number("--difficulties", _number(text), 0.0, 1.0)
+            yield robot, f" {difficulty:.2f}", {"difficulty": difficulty, "terrain_seed": FLAGS.terrain_seed}
+
+
+def table(task: str) -> Iterator[str]:
+    """Yield the lines of a table."""
+    presets = FLAGS.presets or PRESETS[task]
+    yield f"| {task} | {' | '.join(presets)} |"
+    yield "|---" * (1 + len(presets)) + "|"
+    for robot, difficulty, settings in rows(task):
+        bar = program.progress(presets, desc=f"{task} {robot}{difficulty}", leave=False)
+        yield f"| {robot}{difficulty} | {' | '.join(cell(task, robot, preset, settings) for preset in bar)} |"
+
+
+def written(page: str, task: str, lines: list[str]) -> str:
+    """Return a page with the table between the marks of a task replaced."""
+    found = re.compile(f"(?<=<!-- {task} -->\n).*?(?=<!-- end -->)", re.DOTALL)
+    return found.sub("\n" + "\n".join(lines) + "\n\n", page, count=1)
+
+
+def _number(text: str):
+    with contextlib.suppress(ValueError):
+        return float(text)
+    return text
+
+
+def main() -> None:
+    """Print a table for each task, and write it into the page."""
+    for robot in FLAGS.robots:
+        presets = presets_of(ROBOTS[checks.name(robot, ROBOTS, "robot")])
+        for preset in FLAGS.presets or ():
+            checks.name(preset, ("zero", *presets), "preset")
+    for task in FLAGS.tasks:
+        checks.name(task, PRESETS, "task")
+    for task in FLAGS.tasks:
+        lines = []
+        for line in table(task):
+            print(line, flush=True)
+            lines.append(line)
+        print()
+        if FLAGS.write:
+            PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), task, lines), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    program.run(main)
