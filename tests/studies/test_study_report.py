@@ -188,7 +188,7 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
     committed = COMMITTED
     shutil.copytree(committed, tmp_path / "studies")
     names = [name for name in tables.STUDIES if (committed / name).exists()]
-    assert len(names) == 6 and len(list(committed.glob("*/*/config.json"))) == 49
+    assert len(names) == 6 and len(list(committed.glob("*/*/config.json"))) == 52
     for name in names:
         report.write(name, tables.study(name), tmp_path / "studies" / name)
     for path in (*(f"{name}/README.md" for name in names), "README.md"):
