@@ -68,7 +68,7 @@ def summary(episodes: list[evaluation.Episode]) -> str:
     metric = next(means[name] for name in METRICS if name in means)
     total = np.mean([episode.total for episode in episodes])
     notes = [f"{means[name]:.0%} {name}" for name in ("fell", "sank") if means.get(name)]
-    return f"{total:.0f}, {metric:.2f}" + (f" ({', '.join(notes)})" if notes else "")
+    return f"{total:.0f}, {round(metric, 2) + 0.0:.2f}" + (f" ({', '.join(notes)})" if notes else "")
 
 
 def rows(task: str) -> Iterator[tuple[str, str, dict]]:

@@ -41,7 +41,7 @@ class Configuration:
     def of(
         cls,
         setup: Setup,
-        algorithm: str = "sac",
+        algorithm: str = "ppo",
         hyperparameters: Mapping[str, Any] | None = None,
         seed: int = 0,
         steps: int | None = None,

@@ -3,14 +3,14 @@
 Killed at any moment, the same command resumes, bit-exactly. The folder holds tables of returns and losses, a
 checkpoint, the policy, and a picture of its returns, drawn anew after each evaluation.
 
-  arc-suite train --robot tick --algorithm sac --steps 200000
-  arc-suite train --robot tick --algorithm ppo --minutes 10
+  arc-suite train --robot tick --steps 832000
   arc-suite train --robot queen --task steer --algorithm dagger
+  arc-suite train --robot tick --algorithm sac_parallel --minutes 5
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --spec spider --algorithm speq --hp phase_updates=7500
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
-  arc-suite evaluate --robot tick --policy runs/tick-walk-sac-0
+  arc-suite evaluate --robot tick --policy runs/tick-walk-ppo-0
 """
 
 import contextlib
@@ -35,7 +35,7 @@ define_task()
 _ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
 flags.DEFINE_string(
     "algorithm",
-    "sac",
+    "ppo",
     f"One of {', '.join(algorithms.ALGORITHMS)}, or module:attribute, an Algorithm on Python's path.",
 )
 flags.DEFINE_multi_string("hp", [], "Hyperparameter of the algorithm, name=value; repeat it for several.")

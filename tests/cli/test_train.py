@@ -38,7 +38,10 @@ def one_line(done, line):
     [
         (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
-        (["--hp=batsch=3"], "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'batch'? "),
+        (
+            ["--algorithm=sac", "--hp=batsch=3"],
+            "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'batch'",
+        ),
         (["--hp=batch"], "arc-suite train: --hp batch: expected name=value"),
         (["--config=a.json", "--seed=3"], "arc-suite train: --seed: expected none with --config, which has the whole "),
         (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
