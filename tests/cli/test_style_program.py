@@ -31,6 +31,7 @@ def test_report_of_two_policies(tmp_path):
     figures, folder = tmp_path / "style.json", tmp_path / "pictures" / "leaper"
     done = run(
         "--robot=leaper",
+        "--preset=medium",
         "--compare=own_walkers:frozen",
         "--episodes=2",
         f"--json={figures}",
@@ -118,11 +119,19 @@ def test_other_tasks(tmp_path, task):
     (tmp_path / "staying.py").write_text(fixtures + registering)
     saved, figures, folder = tmp_path / "tick.npz", tmp_path / "style.json", tmp_path / "pictures"
     asked = (f"--task={task}", "--set=time_limit=2", "--set=arena=bumps", "--episodes=1")
-    done = run("--robot=tick", *asked, f"--save={saved}", f"--json={figures}", f"--output={folder}", cwd=tmp_path)
+    done = run(
+        "--robot=tick",
+        "--preset=medium",
+        *asked,
+        f"--save={saved}",
+        f"--json={figures}",
+        f"--output={folder}",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     report = json.loads(figures.read_text(), parse_constant=pytest.fail)
     assert (report["task"], report["task_kwargs"]) == (task, {"time_limit": 2, "arena": "bumps"})
-    recorded = report["robots"]["tick"]["cpg"]
+    recorded = report["robots"]["tick"]["cpg medium"]
     measured = recorded["metrics"].keys()
     assert recorded["length"]["mean"] == 40
     names, rows = ["path.png", "reward.png", "speed.png"], {line[:18].strip() for line in done.stdout.splitlines()}

@@ -72,6 +72,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
     package |= {"arc_suite/export/page.html", "arc_suite/export/web/viewer.js"}
     package |= {"arc_suite_command.py"}
+    package |= {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite" / "policies" / "packaged").iterdir()}
     package |= {f"arc_suite/robots/examples/{name}.json" for name in spec_files.EXAMPLES}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"
     assert {name for name in names if not name.startswith(prefix)} == package
@@ -106,7 +107,7 @@ def test_programs(run):
     assert mujoco.MjModel.from_xml_string(run("arc-suite", "build_model", "--spec", "spider")).nu == 24
     assert run("arc-suite", "--help") == run("python", "-m", "arc_suite", "--help")
     table = run("arc-suite", "evaluate", "--robot", "tick", "--episodes", "1")
-    assert table.splitlines()[-1].startswith("tick ")
+    assert table.splitlines()[-1].startswith("tick, refined ")
     assert "arc-suite doctor" in run("python", "-m", "arc_suite", "doctor", "--help")
 
 
