@@ -96,7 +96,8 @@ def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     data.collect(
         "arc_suite/tick/noisy-v0", data.Settings(Setup.of("tick"), "cpg", ("medium",), 0.2, steps=50), episodes=2
     )
-    done = run("--policy=arc_suite/tick/noisy-v0", "--compare=cpg", "--episodes=2", f"--output={tmp_path}")
+    compare = ("--compare=cpg", "--compare_preset=medium")
+    done = run("--policy=arc_suite/tick/noisy-v0", *compare, "--episodes=2", f"--output={tmp_path}")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[1].split() == ["tick", "unit", "prescribed", "arc_suite/tick/noisy-v0", "cpg", "medium"]
@@ -145,7 +146,13 @@ def test_other_tasks(tmp_path, task):
 
     # What was saved tells its task and settings; the same episode again gives the same figures.
     again = programs.arc_suite(
-        "style", f"--policy={saved}", "--compare=cpg", "--episodes=1", f"--json={figures}", cwd=tmp_path
+        "style",
+        f"--policy={saved}",
+        "--compare=cpg",
+        "--compare_preset=medium",
+        "--episodes=1",
+        f"--json={figures}",
+        cwd=tmp_path,
     )
     if task == "steer":
         assert again.returncode == 0, again.stderr
@@ -157,7 +164,13 @@ def test_other_tasks(tmp_path, task):
         refusal = f"task {task!r}: files import nothing; import 'staying' first"
         assert again.stderr == f"arc-suite style: {saved}: {refusal}\n"
         again = programs.arc_suite(
-            "style", f"--policy={saved}", "--compare=cpg", *asked, f"--json={figures}", cwd=tmp_path
+            "style",
+            f"--policy={saved}",
+            "--compare=cpg",
+            "--compare_preset=medium",
+            *asked,
+            f"--json={figures}",
+            cwd=tmp_path,
         )
         assert again.returncode == 0, again.stderr
         assert list(json.loads(figures.read_text())["robots"]["tick"].values()) == [recorded, recorded]
