@@ -9,6 +9,7 @@ from tiers import never, tiers
 
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
+from arc_suite.robots import generator
 
 FOLDER = pathlib.Path(policies.__file__).with_name("packaged")
 INDEX = json.loads((FOLDER / "policies.json").read_text())
@@ -37,3 +38,8 @@ def test_of_another_robot_or_task():
         ValueError, match=r"^policy ppo: none for tick-gaps \(there are: .*tick-walk.*\); arc-suite train"
     ):
         policies.policy("ppo", "tick", task=Setup.of("tick", "gaps").definition)
+
+
+def test_of_a_body_made_to_order():
+    with pytest.raises(ValueError, match=r"^policy ppo: none for walker_5x2-walk \(there are: "):
+        policies.policy("ppo", generator.generate(5, 2))

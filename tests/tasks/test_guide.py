@@ -71,7 +71,9 @@ def test_commands(package, command, tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     name, program, *arguments = command.split()
     if "--verify=ID" in arguments:
-        made = programs.arc_suite("collect", "--task=crouching:crouch", "--robot=tick", *SHORT["collect"], cwd=tmp_path)
+        made = programs.arc_suite(
+            "collect", "--task=crouching:crouch", "--policy=zero", *SHORT["collect"], cwd=tmp_path
+        )
         arguments[arguments.index("--verify=ID")] = f"--verify={made.stdout.partition(':')[0]}"
     else:
         arguments += SHORT.get(program, [])
