@@ -219,7 +219,7 @@ class AlongLane(Command):
 
     def outcome(self, context: Context, memory: Live, tracking, judged):
         """Return the same share."""
-        return memory.distance / (context.units[0] * context.control_timestep * judged)
+        return memory.distance / (context.pace * judged)
 
 
 class Chain(NamedTuple):
@@ -337,7 +337,7 @@ class ToGoal(Command):
 
 def _gained(context: Context, before, displacement):
     """The leaky mean (...) of progress, given that before the step and the displacement (...) of the step, m."""
-    return (1.0 - context.leak) * before + context.leak * displacement / (context.units[0] * context.control_timestep)
+    return (1.0 - context.leak) * before + context.leak * displacement / context.pace
 
 
 def _bounded(gained):

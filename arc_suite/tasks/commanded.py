@@ -255,8 +255,8 @@ class CommandTask(Task):
             previous_action=core.previous_action,
             schedule_errors=schedule_errors,
             all_schedule_errors=core.all_schedule_errors + schedule_errors,
-            energy=energy.after(core.energy, self.scene.body, core.action, readings.joint_angles),
-            path=core.path + self._pace * numpy.hypot(motion[..., 0], motion[..., 1]),
+            energy=energy.after(core.energy, self._torques, core.action, readings.joint_angles),
+            path=core.path + context.pace * numpy.hypot(motion[..., 0], motion[..., 1]),
             place=place,
             motion=motion,
             desired=followed.desired,
@@ -266,9 +266,8 @@ class CommandTask(Task):
         return Memory(core, followed.memory, ground, health)
 
     @functools.cached_property
-    def _pace(self) -> float:
-        """Displacement of a step at the target velocity, m."""
-        return float(self.context.units[0] * self.context.control_timestep)
+    def _torques(self) -> np.ndarray:
+        return energy.torques(self.scene.body)
 
     def _motion(self, core: Core, place):
         """The mean velocity (..., 3), of steps in the frame of the heading at their start."""
@@ -298,7 +297,7 @@ class CommandTask(Task):
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
             "tracking": core.followed,
             "obedient_gait": core.followed * (1.0 - core.schedule_errors / feet),
-            "transport": core.energy.step / self._pace,
+            "transport": core.energy.step / self.context.pace,
             **self.health.terms(memory.health),
             **self.command.terms(memory.command, memory.health.upright),
         }
@@ -338,7 +337,7 @@ class CommandTask(Task):
             "tracking": core.tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
-            "cost_of_transport": energy.cost_of_transport(core.energy, core.path, self._pace * steps),
+            "cost_of_transport": energy.cost_of_transport(core.energy, core.path, self.context.pace * steps),
             **self.settings.ground.progress(memory.ground),
         }
 

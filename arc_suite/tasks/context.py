@@ -21,6 +21,7 @@ class Context(NamedTuple):
         units: (3,) of commands: the target velocity, twice, m/s, and rad/s at which feet move as fast when turning.
         force_unit: (6,) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
         control_timestep: s.
+        pace: displacement of a control step at the target velocity, m.
         leak: weight of the latest step in leaky means, which reach back over a cycle of the gait.
         steps: control steps over which an episode is judged.
     """
@@ -31,6 +32,7 @@ class Context(NamedTuple):
     units: np.ndarray
     force_unit: np.ndarray
     control_timestep: float
+    pace: float
     leak: float
     steps: int
 
@@ -46,6 +48,7 @@ class Context(NamedTuple):
             units=units,
             force_unit=pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3),
             control_timestep=scene.control_timestep,
+            pace=float(units[0] * scene.control_timestep),
             leak=min(parameters.gait_frequency * scene.control_timestep, 1.0),
             steps=int(min(step_limit, STEPS)),
         )

@@ -4,7 +4,6 @@ Work is divided by the body's weight, so its unit is m. The motors do not win ba
 `style.metrics.cost_of_transport`.
 """
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -40,9 +39,16 @@ def begin(memory: Energy, angles) -> Energy:
     return memory._replace(angles=angles + 0.0)  # not a view
 
 
-def after(memory: Energy, body: Body, action, angles) -> Energy:
-    """Return the memory after a control step with an action (..., joints), over which torques are constant."""
-    step = (_torques(body) * action * (angles - memory.angles)).clip(0.0).sum(axis=-1)
+def after(memory: Energy, torques: np.ndarray, action, angles) -> Energy:
+    """Return the memory after a control step, over which torques are constant.
+
+    Args:
+        memory: before it.
+        torques: (joints,) of the body; see `torques`.
+        action: (..., joints) of the step.
+        angles: (..., joints) of the joints after it, rad.
+    """
+    step = (torques * action * (angles - memory.angles)).clip(0.0).sum(axis=-1)
     return Energy(angles + 0.0, step, memory.total + step)
 
 
@@ -58,8 +64,7 @@ def cost_of_transport(memory: Energy, path, target_path):
     return memory.total / numpy.maximum(path, NOWHERE * target_path)
 
 
-@functools.lru_cache(maxsize=256)
-def _torques(body: Body) -> np.ndarray:
-    """(joints,) greatest torques by weight, m."""
+def torques(body: Body) -> np.ndarray:
+    """Return the greatest torques (joints,) of a body's motors by its weight, m."""
     gears = np.array([joint.motor.gear for leg in sized(body).legs for joint in leg.joints])
     return gears / (standing(body).mass * GRAVITY)

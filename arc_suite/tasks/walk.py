@@ -107,6 +107,10 @@ class Walk(Task):
             p.gait_frequency, p.duty_factor, p.phase_offsets, self.scene.control_timestep, self.step_limit
         )
 
+    @functools.cached_property
+    def _torques(self) -> np.ndarray:
+        return energy.torques(self.scene.body)
+
     @property
     def target_velocity(self) -> float:
         """The target velocity, m/s."""
@@ -148,7 +152,7 @@ class Walk(Task):
             distance=memory.distance + displacement,
             all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
-            energy=energy.after(memory.energy, self.scene.body, memory.action, readings.joint_angles),
+            energy=energy.after(memory.energy, self._torques, memory.action, readings.joint_angles),
         )
 
     def terms(self, memory: Memory, readings: Readings) -> dict:

@@ -132,7 +132,7 @@ def test_a_goal_that_is_reached_counts_and_gives_way_to_the_next():
     assert_allclose(np.hypot(*there.command.to_goal), np.hypot(*(goals[1] - there.core.place[:2])))
     away = moved(environment, start - (goals[0] - start)).command.gained
     far, leak = np.hypot(*(goals[0] - start)), task.context.leak
-    assert away == pytest.approx(-leak * far / task._pace, rel=0.1), "a step back costs its whole displacement"
+    assert away == pytest.approx(-leak * far / task.context.pace, rel=0.1), "a step back costs its whole displacement"
     step = task.context.units[0] * task.scene.control_timestep
     direction = (goals[0] - start) / np.hypot(*memory.command.to_goal)
     assert moved(environment, start + 0.4 * step * direction).command.gained == pytest.approx(0.4 * leak)
