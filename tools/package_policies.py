@@ -1,23 +1,24 @@
-"""Puts policies of runs into the package: float16, with hash, command and return in policies.json.
+"""Puts the policy of a run into the package: float16, with hash, command and return in policies.json.
 
-python tools/package_policies.py runs/tick-walk-ppo-0 runs/queen-walk-ppo-0
+Example:
+  python tools/package_policies.py runs/tick-walk-ppo-0
 """
 
 import dataclasses
 import json
 import shlex
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from arc_suite import evaluation, policies
+from arc_suite import evaluation, files, policies
 from arc_suite.agents import configuration
+from arc_suite.cli import program
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network
+from arc_suite.policies.named import PACKAGED
 
-FOLDER = Path(network.__file__).with_name("packaged")
-INDEX = FOLDER / "policies.json"
+INDEX = PACKAGED / "policies.json"
 
 
 def command(run: configuration.Configuration) -> str:
@@ -32,26 +33,28 @@ def command(run: configuration.Configuration) -> str:
     return shlex.join(["arc-suite", "train", *flags])
 
 
-def main(runs: list[str]) -> None:
-    """Package the policies of some runs."""
-    FOLDER.mkdir(exist_ok=True)
-    index = json.loads(INDEX.read_text(encoding="utf-8")) if INDEX.exists() else {}
-    for run in map(Path, runs):
-        found, known = network.load(run), configuration.read(run / "config.json")
-        layers = [layer._replace(arrays=tuple(a.astype(np.float16) for a in layer.arrays)) for layer in found.layers]
-        name = f"{known.setup.body.name}-{known.setup.task}"
-        path = FOLDER / f"{name}{network.EXTENSION}"
-        network.save(path, found._replace(layers=tuple(layers)))
-        environment = Setup.of(known.setup.body, known.setup.task).make_vec(10, autoreset_mode="Disabled")
-        returns = [episode.total for episode in evaluation.episodes_in_batch(environment, network.load(path))]
-        index[name] = {
-            "command": command(known),
-            "sha256": policies.digest(str(path)),
-            "return": round(float(np.mean(returns)), 1),
-        }
-        print(f"{path}: {path.stat().st_size} bytes, return {index[name]['return']}")
-    INDEX.write_text(json.dumps(index, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+def main(run: str | None = None) -> None:
+    """Package the policy of a run."""
+    if run is None:
+        raise ValueError("expected the folder of a run, got none")
+    found, known = network.load(Path(run)), configuration.read(Path(run) / "config.json")
+    layers = [layer._replace(arrays=tuple(a.astype(np.float16) for a in layer.arrays)) for layer in found.layers]
+    name = f"{known.setup.body.name}-{known.setup.task}"
+    PACKAGED.mkdir(exist_ok=True)
+    path = PACKAGED / f"{name}{network.EXTENSION}"
+    network.save(path, found._replace(layers=tuple(layers)))
+    environment = Setup.of(known.setup.body, known.setup.task).make_vec(10, autoreset_mode="Disabled")
+    returns = [episode.total for episode in evaluation.episodes_in_batch(environment, network.load(path))]
+    entry = {
+        "command": command(known),
+        "return": round(float(np.mean(returns)), 1),
+        "sha256": policies.digest(str(path)),
+    }
+    index = files.read_json(INDEX) if INDEX.exists() else {}
+    with files.writing_json(INDEX) as file:
+        file.update(sorted((index | {name: entry}).items()))
+    print(f"{path}: {path.stat().st_size} bytes, return {entry['return']}")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    program.run(main)

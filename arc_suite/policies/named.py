@@ -21,7 +21,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
 _CHUNK = 256  # control steps that are drawn at once
-_PACKAGED = Path(__file__).with_name("packaged")
+PACKAGED = Path(__file__).with_name("packaged")
 
 
 def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -50,9 +50,9 @@ def _random(body: Body, presets: Sequence[str], num_envs: int, task: Task | None
 
 def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     """A trained policy that comes with the package; `policies.json` holds its command, hash and return."""
-    path = _PACKAGED / f"{body.name}-{task.name if task else 'walk'}{network.EXTENSION}"
+    path = PACKAGED / f"{body.name}-{task.name if task else 'walk'}{network.EXTENSION}"
     if not (is_robot(body) and path.is_file()):
-        there = ", ".join(sorted(each.stem for each in _PACKAGED.glob(f"*{network.EXTENSION}")))
+        there = ", ".join(sorted(each.stem for each in PACKAGED.glob(f"*{network.EXTENSION}")))
         raise ValueError(f"policy ppo: none for {path.stem} (there are: {there}); arc-suite train makes others")
     return _from_file(path, body, task)
 

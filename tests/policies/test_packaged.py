@@ -1,7 +1,6 @@
 """Policies that come with the package: small, the ones that policies.json names, and as good as it says."""
 
 import json
-import pathlib
 
 import numpy as np
 import pytest
@@ -9,14 +8,14 @@ from tiers import never, tiers
 
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
+from arc_suite.policies.named import PACKAGED
 from arc_suite.robots import generator
 
-FOLDER = pathlib.Path(policies.__file__).with_name("packaged")
-INDEX = json.loads((FOLDER / "policies.json").read_text())
+INDEX = json.loads((PACKAGED / "policies.json").read_text())
 
 
 def test_all_are_listed_and_small():
-    files = {path.stem: path for path in FOLDER.glob("*.npz")}
+    files = {path.stem: path for path in PACKAGED.glob("*.npz")}
     assert files.keys() == INDEX.keys()
     assert sum(path.stat().st_size for path in files.values()) < 600_000
     for name, path in files.items():

@@ -32,16 +32,3 @@ def test_a_table_of_every_modifier():
     assert "actuator_failure 3" not in figures, "the right side is mirrored"
     assert figures["none"][0] > figures["motor_strength 0.25"][0]
     assert not any(fell for _, fell in figures.values())
-
-
-@pytest.mark.parametrize(
-    ("flag", "line"),
-    [
-        ("--robots=tik", "unknown robot 'tik'; did you mean 'tick'?"),
-        ("--presets=tuned,steerd", "unknown preset 'steerd'; did you mean 'steered'?"),
-    ],
-)
-def test_an_unknown_name_is_one_line_before_the_table(flag, line):
-    done = programs.run(TOOL, flag)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith(f"disturbances.py: {line}")

@@ -29,17 +29,3 @@ def test_every_task_has_its_table_in_the_page():
     page = (TOOL.parents[1] / "docs" / "results.md").read_text()
     for task in TASKS.keys() - {"walk"}:
         assert re.search(rf"<!-- {task} -->\n\n\| {task} \| zero \|.*?<!-- end -->", page, re.DOTALL), task
-
-
-@pytest.mark.parametrize(
-    ("flag", "line"),
-    [
-        ("--robots=tik", "unknown robot 'tik'; did you mean 'tick'?"),
-        ("--presets=tuned,steerd", "unknown preset 'steerd'; did you mean 'steered'?"),
-        ("--tasks=walk", "unknown task 'walk'"),
-    ],
-)
-def test_an_unknown_name_is_one_line_before_the_table(flag, line):
-    done = programs.run(TOOL, flag)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith(f"results.py: {line}")
