@@ -40,7 +40,7 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         generator: what the file says that it was made by.
     """
     document, (parts, looks) = Document(generator), described(body)
-    meshes = [_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
+    meshes = [part_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
     materials = {name: document.add("materials", _material(name, look)) for name, look in looks.items()}
     root = document.add("nodes", {"name": "root"})
     nodes = [document.add("nodes", _node(part)) for part in parts]
@@ -99,8 +99,8 @@ def _named(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
     return {f"{clip.name}{'' if moves else '_in_place'}{end}": moves for moves in moving}
 
 
-def _meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
-    """The shapes of a part by material, those of one as one mesh in the part's frame."""
+def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
+    """Return the shapes of a part by material, those of one as one mesh in the part's frame."""
     meshes: dict[str, list[Mesh]] = {}
     for shape in part.shapes:
         mesh = shapes.shape(shape.kind, shape.size, tolerance)
