@@ -9,6 +9,7 @@ PROGRAMS = (
     "render",
     "animate",
     "view",
+    "studio",
     "evaluate",
     "style",
     "collect",
