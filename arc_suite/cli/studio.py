@@ -31,11 +31,6 @@ from arc_suite.robots.spec_files import EXAMPLES
 from arc_suite.studio.session import Session
 from arc_suite.studio.sketch import OWN, Sketch, cured
 
-try:
-    from arc_suite.studio.page import serve
-except ImportError as error:
-    raise versions.MissingExtra("the page needs viser", "studio", error) from None
-
 FLAGS = flags.FLAGS
 define_body()
 define_task()
@@ -48,6 +43,10 @@ flags.DEFINE_integer("port", 8080, "Port to listen on; the next free one if it i
 
 def main() -> None:
     """Open the page and step until Ctrl-C."""
+    try:
+        from arc_suite.studio.page import serve
+    except ImportError as error:
+        raise versions.MissingExtra("the studio needs viser", "studio", error) from None
     serve(Session(_sketch()), FLAGS.host, FLAGS.port, lambda url: print(f"the studio is at {url}", flush=True))
 
 
