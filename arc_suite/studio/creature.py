@@ -1,7 +1,7 @@
 """A sketch, opened: its environment, policy and what `check` says of its body."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +9,8 @@ import numpy as np
 from arc_suite import policies
 from arc_suite.envs import dm
 from arc_suite.envs.setup import Setup
+from arc_suite.export.parts import Material, Part
+from arc_suite.export.parts import parts as described
 from arc_suite.models.soundness import Flaw, flaws
 from arc_suite.policies import Policy, alone
 from arc_suite.robots.shaping import link_names
@@ -27,6 +29,8 @@ class Creature(NamedTuple):
         flaws: of the body.
         links: names of the links of its legs.
         unit: standing height of the body before it was scaled, m.
+        parts: that are seen.
+        materials: of the parts, by name.
     """
 
     sketch: Sketch
@@ -36,6 +40,8 @@ class Creature(NamedTuple):
     flaws: tuple[Flaw, ...]
     links: tuple[str, ...]
     unit: float
+    parts: tuple[Part, ...]
+    materials: Mapping[str, Material]
 
 
 def opened(sketch: Sketch) -> Creature:
@@ -46,6 +52,7 @@ def opened(sketch: Sketch) -> Creature:
         OSError: a file cannot be read.
     """
     setup = sketches.setup(sketch)
+    parts, materials = described(setup.body)
     environment = load(setup, time_limit=math.inf, on_divergence="terminate")
     return Creature(
         sketch=sketch,
@@ -55,6 +62,8 @@ def opened(sketch: Sketch) -> Creature:
         flaws=tuple(flaws(setup.body)),
         links=link_names(setup.body),
         unit=setup.body.torso.standing_height / sketch.scale,
+        parts=tuple(parts),
+        materials=materials,
     )
 
 

@@ -9,7 +9,6 @@ import viser
 from arc_suite import rotations
 from arc_suite.export import shapes
 from arc_suite.export.creatures import part_meshes
-from arc_suite.export.parts import parts as described
 from arc_suite.export.scenery import ground
 from arc_suite.export.shapes import Mesh
 from arc_suite.markers import Marker
@@ -35,14 +34,13 @@ class View:
     def show(self, creature: Creature) -> None:
         """Take the creature of the one before, in its pose of now."""
         self._creature, self._unit = creature, creature.unit
-        found, materials = described(creature.setup.body)
-        colours = {name: _rgb(material.colour) for name, material in materials.items()}
+        colours = {name: _rgb(material.colour) for name, material in creature.materials.items()}
         with self._server.atomic():
             self._server.scene.remove_by_name("/world")
             self._world = self._server.scene.add_frame("/world", show_axes=False)
             names: list[str] = []
             self._frames = []
-            for part in found:
+            for part in creature.parts:
                 names.append(f"{'/world' if part.parent is None else names[part.parent]}/{part.name}")
                 frame = self._server.scene.add_frame(
                     names[-1], show_axes=False, position=part.place / self._unit, wxyz=part.quaternion
@@ -50,9 +48,9 @@ class View:
                 self._frames.append(frame)
                 for material, mesh in part_meshes(part, _TOLERANCE * self._unit).items():
                     self._add(f"{names[-1]}/{material}", mesh, colours[material])
-            self._hinges = [(index, part.joint) for index, part in enumerate(found) if part.joint is not None]
-            self._standing = np.array([found[index].quaternion for index, _ in self._hinges])
-            self._axes = np.array([found[index].axis for index, _ in self._hinges])
+            self._hinges = [(index, part.joint) for index, part in enumerate(creature.parts) if part.joint is not None]
+            self._standing = np.array([creature.parts[index].quaternion for index, _ in self._hinges])
+            self._axes = np.array([creature.parts[index].axis for index, _ in self._hinges])
             self._height = 0.0
             self._draw_ground()
             self._arrows, self._cylinders = None, {}
@@ -92,9 +90,11 @@ class View:
         environment = self._creature.environment
         self._arena = environment.task.definition.scene.arena
         self._middle, self._obstacles = environment.physics.data.qpos[:2] / self._unit, self._mocap()
-        reach = _AROUND * self._unit
-        found = ground(environment, self._unit * self._middle - reach, self._unit * self._middle + reach)
-        self._endless = not (found["fields"] or found["solids"])
+        self._endless = self._arena.is_level and not len(self._obstacles)
+        found: dict = {"planes": [0.0], "fields": [], "solids": []}
+        if not self._endless:
+            reach, middle = _AROUND * self._unit, self._unit * self._middle
+            found = ground(environment, middle - reach, middle + reach)
         self._server.scene.remove_by_name("/world/ground")
         self._server.scene.add_frame("/world/ground", show_axes=False)
         for index, height in enumerate(found["planes"]):
@@ -113,11 +113,14 @@ class View:
             )
         for index, field in enumerate(found["fields"]):
             self._add(f"/world/ground/field{index}", _surface(field), _GROUND)
-        for index, solid in enumerate(found["solids"]):
+        solids: dict[tuple[int, int, int], list[Mesh]] = {}
+        for solid in found["solids"]:
             mesh = shapes.shape(solid["kind"], solid["size"], _TOLERANCE * self._unit)
-            colour = solid["colour"]
-            rgb = tuple(round(solid["shade"] * part) for part in _STEPS) if colour is None else _rgb(colour)
-            self._add(f"/world/ground/solid{index}", mesh.moved(solid["place"], np.eye(3)), rgb)
+            shaded = [solid["shade"] * part for part in _STEPS]
+            rgb = _rgb([part / 255.0 for part in shaded] if solid["colour"] is None else solid["colour"])
+            solids.setdefault(rgb, []).append(mesh.moved(solid["place"], np.eye(3)))
+        for index, (rgb, meshes) in enumerate(solids.items()):
+            self._add(f"/world/ground/solid{index}", shapes.joined(meshes), rgb)
 
     def _mark(self, markers: list[Marker]) -> None:
         """Move arrows and cylinders, or draw them anew where there are others."""
