@@ -44,7 +44,7 @@ class Live(Episodes):
         elif key == glfw.KEY_BACKSPACE:
             self.restart()
         elif key in _ARROWS:
-            self.command((np.zeros(3) if self.wanted is None else self.wanted) + _ARROWS[key])
+            self.command((np.zeros(3) if self.desired is None else self.desired) + _ARROWS[key])
 
     def pose(self, share: float) -> None:
         """Pose the picture at a share, 0 to 1, of the latest control step."""
@@ -55,8 +55,8 @@ class Live(Episodes):
     def text(self) -> str:
         """Return a line about the episode."""
         told = [f"return {self.earned:.0f} in {self.steps * self.control_timestep:.1f} s"]
-        if self.wanted is not None:
-            told.append("forward {:+.2f}, turn {:+.2f}".format(*self.wanted[[0, 2]]))
+        if self.desired is not None:
+            told.append("forward {:+.2f}, turn {:+.2f}".format(*self.desired[[0, 2]]))
         return ", ".join(told + ["paused"] * self.paused)
 
 

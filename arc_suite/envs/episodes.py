@@ -17,7 +17,7 @@ class Episodes:
     Attributes:
         environment: of `arc_suite.load`.
         commanded: whether the task has a command of velocities.
-        wanted: (3,) command that a person has set; None for that of the task.
+        desired: (3,) command that a person has set; None for that of the task.
         timestep: the latest.
         earned: sum of the rewards of the present episode.
         steps: control steps of the present episode.
@@ -33,7 +33,7 @@ class Episodes:
         """
         self.environment, self._act = environment, act
         self.commanded = environment.task.definition.commands.get("command") == 3
-        self.wanted: np.ndarray | None = None
+        self.desired: np.ndarray | None = None
         self.control_timestep = environment.control_timestep()
         self.restart()
 
@@ -43,10 +43,10 @@ class Episodes:
         self._command()
         self._before, self._markers = self._qpos(), 2 * (self._asked(),)
 
-    def command(self, wanted: Sequence[float] | None) -> None:
+    def command(self, desired: Sequence[float] | None) -> None:
         """Set the command, clipped to [-1, 1], or leave it to the task; a task without a command ignores it."""
         if self.commanded:
-            self.wanted = None if wanted is None else np.clip(wanted, -1.0, 1.0)
+            self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
             self._command()
 
     def step(self, forces: np.ndarray | float = 0.0) -> None:
@@ -85,7 +85,7 @@ class Episodes:
 
     def _command(self) -> None:
         if self.commanded:
-            self.environment.command("command", self.wanted)
+            self.environment.command("command", self.desired)
 
     def _asked(self) -> list[Marker]:
         return self.environment.task.markers(self.environment.physics)

@@ -26,7 +26,7 @@ class Charts:
         with gui.add_folder("Speed, m/s"):
             nothing = np.zeros(1)
             series = ({"label": "s"}, *_series({"torso": BLUE, "command": VERMILION}))
-            self._speed = gui.add_uplot((nothing, nothing, nothing), series, height=_HEIGHT, scales=_SCALES)
+            self._speed = gui.add_uplot((nothing, nothing, nothing), series, height=_HEIGHT, **_OPTIONS)
 
     def update(self, history: History, names: tuple[str, ...]) -> None:
         """Draw the last steps.
@@ -44,9 +44,10 @@ class Charts:
                 self._reward.remove()
             series, empty = ({"label": "s"}, *_series(of_terms(terms))), (np.zeros(1),) * (1 + len(terms))
             with self._folder:
-                self._reward = self._gui.add_uplot(empty, series, height=_HEIGHT + 60, scales=_SCALES)
+                self._reward = self._gui.add_uplot(empty, series, height=_HEIGHT + 60, **_OPTIONS)
         self._reward.data = (times, *terms.values())
-        self._speed.data = (times, history.speeds(), history.desired())
+        speeds, desired = history.speeds(), history.desired()
+        self._speed.data = (times, speeds, np.where(np.isnan(desired), speeds, desired))  # without a command, one line
         self._contacts.image = contacts_image(history.contacts(), names)
 
 
@@ -79,7 +80,7 @@ def contacts_image(contacts: tuple[np.ndarray, np.ndarray] | None, names: tuple[
     return np.asarray(picture)
 
 
-_SCALES = {"x": {"time": False}}
+_OPTIONS: dict = {"scales": {"x": {"time": False}}, "legend": {"live": False}}
 
 
 def _series(colours: dict[str, str]) -> list[dict]:

@@ -87,12 +87,13 @@ class History:
         return np.array([m.stance for m in self._moments]), np.array([m.schedule for m in self._moments])
 
     def speeds(self) -> np.ndarray:
-        """Return the speeds (steps,) of the torso over the ground, a mean of up to a second, m/s."""
-        places = np.array([moment.place for moment in self._moments])
-        count = max(1, round(1.0 / self._episodes.control_timestep))
-        first = np.maximum(np.arange(len(places)) - count, 0)
-        seconds = self._episodes.control_timestep * np.maximum(np.arange(len(places)) - first, 1)
-        return np.linalg.norm(places - places[first], axis=1) / seconds
+        """Return the speeds (steps,) of the torso over the ground, m/s: means over a second, or less at the start."""
+        step, places = self._episodes.control_timestep, np.array([moment.place for moment in self._moments])
+        count = min(max(1, round(1.0 / step)), len(places) - 1)
+        if count < 1:
+            return np.zeros(len(places))
+        means = np.linalg.norm(places[count:] - places[:-count], axis=1) / (count * step)
+        return np.concatenate([np.full(count, means[0]), means])
 
     def desired(self) -> np.ndarray:
         """Return the speeds (steps,) that the command asks for, m/s; NaN where there is no command."""

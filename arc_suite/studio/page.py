@@ -241,11 +241,11 @@ class Page:
 
     def _save(self, file: saving.File, event: viser.GuiEvent) -> None:
         """Make a file, and send it to the visitor who asks for it."""
-        creature, wanted = self._session.creature, self._session.wanted
+        creature, desired = self._session.creature, self._session.desired
         name, client = saving.name(creature, file), event.client
         note = client.add_notification(f"Making {name}", "", loading=True)
         try:
-            content = file.content(creature, creature.environment.physics.data.qpos.copy(), wanted)
+            content = file.content(creature, creature.environment.physics.data.qpos.copy(), desired)
         except (ValueError, OSError, RenderingUnavailable) as error:
             client.add_notification(f"No {name}", " ".join(str(error).split()), color="red")
         else:

@@ -43,18 +43,18 @@ def name(creature: Creature, file: File) -> str:
     return f"{creature.setup.body.name}{file.extension}"
 
 
-def spec(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> bytes:
+def spec(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return the spec as JSON."""
     return body_to_json(creature.setup.body).encode()
 
 
-def mjcf(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> bytes:
+def mjcf(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return the model, on the ground of the task, as MuJoCo loads it."""
     arena = creature.environment.task.definition.scene.arena
     return models.assemble(creature.setup.body, arena).to_xml_string().encode()
 
 
-def glb(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> bytes:
+def glb(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return animation clips as binary glTF; see `export.clips`.
 
     Raises:
@@ -67,7 +67,7 @@ def glb(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> byte
     )
 
 
-def page(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> bytes:
+def page(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return a page that plays an episode.
 
     Raises:
@@ -76,13 +76,13 @@ def page(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> byt
     pages.viewer()  # finds out at once whether there is one
     environment = load(creature.setup)
     with contextlib.closing(environment):
-        act = _commanded(environment, creature.sketch, wanted)
+        act = _commanded(environment, creature.sketch, desired)
         acting = Individuals(lambda: act, 1, len(creature.setup.body.joint_names))
         track = style.record(environment, acting, 0, _PAGE_STEPS)
     return pages.page({creature.setup.body.name: track}).encode()
 
 
-def image(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> bytes:
+def image(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return a picture of the creature where it stands, as PNG.
 
     Raises:
@@ -94,14 +94,14 @@ def image(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> by
     return imageio.imwrite("<bytes>", view, extension=".png")
 
 
-def film(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> bytes:
+def film(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return a film of an episode, as MP4.
 
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
     environment = load(creature.setup)
-    act = _commanded(environment, creature.sketch, wanted)
+    act = _commanded(environment, creature.sketch, desired)
     footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
     stride = films.steps_per_frame(footage.control_timestep)
 
@@ -117,13 +117,13 @@ def film(creature: Creature, qpos: np.ndarray, wanted: np.ndarray | None) -> byt
         return path.read_bytes()
 
 
-def _commanded(environment: Environment, sketch: Sketch, wanted: np.ndarray | None):
+def _commanded(environment: Environment, sketch: Sketch, desired: np.ndarray | None):
     """Return the policy of a sketch as a function of a `TimeStep`, which sets the command at the start of episodes."""
     act = alone(policy(sketch, environment))
 
     def acting(timestep):
         if timestep.first() and environment.task.definition.commands.get("command") == 3:
-            environment.command("command", wanted)
+            environment.command("command", desired)
         return act(timestep)
 
     return acting

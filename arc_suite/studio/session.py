@@ -29,7 +29,7 @@ class Session:
         episodes: of the creature.
         history: of the episodes.
         error: one line, why the latest sketch made no creature; empty if it did.
-        wanted: (3,) command that visitors have set; None for that of the task.
+        desired: (3,) command that visitors have set; None for that of the task.
         paused: whether time stands still.
         pace: simulated seconds a second, of late.
         states: shown a second, of late.
@@ -43,7 +43,7 @@ class Session:
         self._asked = self._tried = sketch
         self.error, self.paused, self.open = "", False, True
         self.pace, self.states = 1.0, 0.0
-        self.wanted: np.ndarray | None = np.array((1.0, 0.0, 0.0))
+        self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
         self._replace(opened(sketch))
 
     def ask(self, sketch: Sketch) -> None:
@@ -55,12 +55,12 @@ class Session:
         """Have the loop call something between two control steps, from any thread."""
         self._calls.put(call)
 
-    def command(self, wanted: Sequence[float] | None) -> None:
+    def command(self, desired: Sequence[float] | None) -> None:
         """Set the command, now and for later creatures, from any thread; None leaves it to the task."""
 
         def change():
-            self.wanted = None if wanted is None else np.array(wanted)
-            self.episodes.command(self.wanted)
+            self.desired = None if desired is None else np.array(desired)
+            self.episodes.command(self.desired)
 
         self.do(change)
 
@@ -136,5 +136,5 @@ class Session:
     def _replace(self, creature: Creature) -> None:
         self.creature, self.error = creature, ""
         self.episodes = Episodes(creature.environment, creature.act)
-        self.episodes.command(self.wanted)
+        self.episodes.command(self.desired)
         self.history = History(self.episodes)

@@ -143,10 +143,10 @@ class View:
         elif arrows:
             self._arrows.points = points
         cylinders = [marker for marker in markers if marker.shape == "cylinder"]
-        wanted = {self._style(index, marker): marker for index, marker in enumerate(cylinders)}
-        for style in self._cylinders.keys() - wanted.keys():
+        shown = {self._style(index, marker): marker for index, marker in enumerate(cylinders)}
+        for style in self._cylinders.keys() - shown.keys():
             self._cylinders.pop(style).remove()
-        for style, marker in wanted.items():
+        for style, marker in shown.items():
             middle = 0.5 * (marker.start + marker.end) / self._unit
             if style not in self._cylinders:
                 index, radius, height, rgb = style

@@ -132,10 +132,10 @@ def test_the_command_is_followed(served, tab):
     open_tab(tab, "Command")
     press(tab, "Turn", "ArrowRight", 10)
     press(tab, "Forward", "Home")
-    served.until(lambda: np.allclose(served.session.wanted, (-1.0, 0.0, 0.5)))
+    served.until(lambda: np.allclose(served.session.desired, (-1.0, 0.0, 0.5)))
     tab.evaluate("document.activeElement.blur()")  # keys go to the page, and not to a widget
     tab.keyboard.press("i")
-    served.until(lambda: np.allclose(served.session.wanted, (-0.75, 0.0, 0.5)))
+    served.until(lambda: np.allclose(served.session.desired, (-0.75, 0.0, 0.5)))
     served.until(lambda: served.session.episodes.timestep.observation["command"][0] == -0.75)
 
 

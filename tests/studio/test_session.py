@@ -52,6 +52,7 @@ def running(sketch=Sketch(legs=6, links=2)):  # noqa: B008
         thread.join()
 
 
+@pytest.mark.slow
 def test_it_walks_as_the_command_says():
     with running() as (session, shown):
         shown.steps(60)
@@ -62,7 +63,7 @@ def test_it_walks_as_the_command_says():
         assert session.history.speeds()[-1] < 0.1 * asked and session.history.desired()[-1] == 0.0
         assert session.history.contacts()[1][-1].all()  # at a stop all feet are scheduled on the ground
         session.command(None)
-        shown.until(lambda: session.episodes.wanted is None)
+        shown.until(lambda: session.episodes.desired is None)
 
 
 def test_another_creature_walks_under_the_same_command():
@@ -75,6 +76,7 @@ def test_another_creature_walks_under_the_same_command():
         assert shown.states[-1][0] == "walker_4x3" and len(shown.states[-1][3]) == 7 + 12
 
 
+@pytest.mark.slow
 def test_of_several_sketches_the_last_is_made():
     with running() as (session, shown):
         for legs in (4, 5, 7, 8, 10):
