@@ -1,11 +1,13 @@
-"""Measures demonstrators on tasks: the tables between the marks in docs/results.md.
+"""Measures demonstrators on tasks: the tables between the marks in docs/results.md, and the anchors of scores.
 
 A cell holds the return, the task's metric, and in brackets the share of episodes that ended in a fall or with a
-foot under the ground.
+foot under the ground. Anchors are standing still and the best of the presets, in tasks with default settings; they
+go into the package.
 
 Example:
   python tools/results.py --tasks rough,steer --robots tick --difficulties 0.5 --episodes 4
   python tools/results.py --write
+  python tools/results.py --anchors
 """
 
 import contextlib
@@ -19,9 +21,12 @@ from absl import flags
 from arc_suite import checks, evaluation, policies
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
-from arc_suite.cpg.selection import presets_of
+from arc_suite.cpg.selection import presets_of, suited_presets
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
 LANES = (*terrain.KINDS, "course")
@@ -35,6 +40,8 @@ PRESETS = {
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),
 }
+# Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.
+WALK = ("zero", "medium", "tuned", "refined")
 METRICS = ("distance", "goals", "tracking")  # the first that a task has
 
 FLAGS = flags.FLAGS
@@ -46,6 +53,7 @@ flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many of each.", lower
 flags.DEFINE_integer("terrain_seed", 1, "Of what is random in the ground; learners train on others.", lower_bound=0)
 flags.DEFINE_integer("threads", None, "To simulate on. [default: as many as there are cores]", lower_bound=1)
 flags.DEFINE_boolean("write", False, "Write the tables into docs/results.md.")
+flags.DEFINE_boolean("anchors", False, "Measure anchors in place of tables, and write them into the package.")
 
 
 def cell(task: str, robot: str, preset: str, settings: dict) -> str:
@@ -98,6 +106,17 @@ def written(page: str, task: str, lines: list[str]) -> str:
     return found.sub("\n" + "\n".join(lines) + "\n\n", page, count=1)
 
 
+def anchor(robot: str, task: str) -> anchors.Returns:
+    """Return the returns of standing still and of the best preset of a robot in a task with default settings."""
+    setup, presets = Setup.of(robot, task), presets_of(ROBOTS[robot])
+    names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets)]
+    names = dict.fromkeys([*names, *suited_presets(setup.definition)])
+    bar = program.progress(names, desc=f"{task} {robot}", leave=False)
+    found = {name: anchors.played(setup, name) for name in bar}
+    best = anchors.of_returns(found).preset
+    return {name: found[name] for name in (anchors.ZERO, best)}
+
+
 def _number(text: str):
     with contextlib.suppress(ValueError):
         return float(text)
@@ -105,13 +124,16 @@ def _number(text: str):
 
 
 def main() -> None:
-    """Print a table for each task, and write it into the page."""
+    """Print a table for each task, and write it into the page; or write the anchors."""
     for robot in FLAGS.robots:
         presets = presets_of(ROBOTS[checks.name(robot, ROBOTS, "robot")])
         for preset in FLAGS.presets or ():
             checks.name(preset, ("zero", *presets), "preset")
     for task in FLAGS.tasks:
         checks.name(task, PRESETS, "task")
+    if FLAGS.anchors:
+        table = {str(Setup.of(robot, task)): anchor(robot, task) for task in TASKS for robot in ROBOTS}
+        return anchors.write(anchors.TABLE, table)
     for task in FLAGS.tasks:
         lines = []
         for line in table(task):
