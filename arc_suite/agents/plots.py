@@ -146,13 +146,13 @@ def _finish(axis, title: str, lines: Mapping[str, float], finals: Mapping[str, f
         axis.annotate(
             f"{name} {value:.0f}",
             xy=(1.0, value),
-            xytext=(1.03, height),
+            xytext=(1.04, height),
             xycoords=("axes fraction", "data"),
             textcoords=("axes fraction", "data"),
             va="center",
             fontsize=8,
             color=colour,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 0.0},
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0},
         )
     axis.set_xlabel("environment steps")
     axis.set_title(title, loc="left", fontweight="bold")
