@@ -99,7 +99,7 @@ def earned(run: Configuration, folder: Path) -> str:
     result, scale = returns.mean(), anchors.anchors(run.setup)
     levels = f"standing still {scale.zero:.1f}"
     if scale.demonstrator is not None:
-        levels = f"score {scale.score(result):.2f} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
+        levels = f"score {scale.score(result):z.2f} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
     return f"finished, return {result:.1f} +- {returns.std():.1f}, {levels}"
 
 

@@ -167,4 +167,4 @@ def _cells(scores: Sequence[Score]) -> list[str]:
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
         *(f"{results.size(np.array([getattr(each, name) for each in scores])):.3f}" for name in STYLE),
     ]
-    return shown + [f"{np.mean(stratum):.2f}" if stratum else NOT_RUN for stratum in strata]
+    return shown + [f"{np.mean(stratum):z.2f}" if stratum else NOT_RUN for stratum in strata]

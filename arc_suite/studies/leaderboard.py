@@ -93,7 +93,7 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
             "algorithm": name,
             "seeds": "1",
             "return": f"{totals.mean():.1f}",
-            "score": f"{score:.2f}" if np.isfinite(score) else "-",
+            "score": f"{score:z.2f}" if np.isfinite(score) else "-",
             "metric": f"{figure} {figures[figure]:.3f}",
             STYLE[0]: compliance,
             "study": f"[entry]({ENTRIES}/{copied.name})",
