@@ -11,6 +11,7 @@ Example:
 """
 
 import contextlib
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,10 +19,10 @@ from pathlib import Path
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, evaluation, policies
+from arc_suite import checks, evaluation, files, policies
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
-from arc_suite.cpg.selection import presets_of, suited_presets
+from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.evaluation import anchors
@@ -45,7 +46,7 @@ WALK = ("zero", "medium", "tuned", "refined")
 METRICS = ("distance", "goals", "tracking")  # the first that a task has
 
 FLAGS = flags.FLAGS
-flags.DEFINE_list("tasks", list(PRESETS), "Which tasks.")
+flags.DEFINE_list("tasks", None, "Which tasks. [default: all]")
 flags.DEFINE_list("robots", list(ROBOTS), "Who walks.")
 flags.DEFINE_list("presets", None, "Of the demonstrator; zero stands still. [default: those that suit the task]")
 flags.DEFINE_list("difficulties", ["0.3333", "0.6667", "1"], "Of ground, from 0 to 1.")
@@ -110,11 +111,19 @@ def anchor(robot: str, task: str) -> anchors.Returns:
     """Return the returns of standing still and of the best preset of a robot in a task with default settings."""
     setup, presets = Setup.of(robot, task), presets_of(ROBOTS[robot])
     names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets)]
-    names = dict.fromkeys([*names, *suited_presets(setup.definition)])
     bar = program.progress(names, desc=f"{task} {robot}", leave=False)
     found = {name: anchors.played(setup, name) for name in bar}
-    best = anchors.of_returns(found).preset
-    return {name: found[name] for name in (anchors.ZERO, best)}
+    return {name: found[name] for name in (anchors.ZERO, anchors.of_returns(found).preset)}
+
+
+def write_anchors(tasks: list[str]) -> None:
+    """Measure anchors, and write each into the package; those of other places stay."""
+    order = [str(Setup.of(robot, task)) for task in TASKS for robot in ROBOTS]
+    for task, robot in itertools.product(tasks, FLAGS.robots):
+        known = anchors.read(anchors.TABLE) if anchors.TABLE.exists() else {}
+        known[str(Setup.of(robot, task))] = anchor(robot, task)
+        with files.writing(anchors.TABLE) as temporary:
+            anchors.write(temporary, {place: known[place] for place in order if place in known})
 
 
 def _number(text: str):
@@ -129,12 +138,12 @@ def main() -> None:
         presets = presets_of(ROBOTS[checks.name(robot, ROBOTS, "robot")])
         for preset in FLAGS.presets or ():
             checks.name(preset, ("zero", *presets), "preset")
-    for task in FLAGS.tasks:
-        checks.name(task, PRESETS, "task")
+    tasks = FLAGS.tasks or list(TASKS if FLAGS.anchors else PRESETS)
+    for task in tasks:
+        checks.name(task, TASKS if FLAGS.anchors else PRESETS, "task")
     if FLAGS.anchors:
-        table = {str(Setup.of(robot, task)): anchor(robot, task) for task in TASKS for robot in ROBOTS}
-        return anchors.write(anchors.TABLE, table)
-    for task in FLAGS.tasks:
+        return write_anchors(tasks)
+    for task in tasks:
         lines = []
         for line in table(task):
             print(line, flush=True)
