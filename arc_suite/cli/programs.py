@@ -15,6 +15,7 @@ PROGRAMS = (
     "tune_cpg",
     "train",
     "study",
+    "benchmark",
     "enter",
     "export",
     "survey",
