@@ -18,6 +18,7 @@ PROGRAMS = (
     "enter",
     "export",
     "survey",
+    "design",
     "doctor",
 )
 

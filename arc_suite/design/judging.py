@@ -1,0 +1,197 @@
+"""Judging of bodies: a demonstrator, fitted to each, walks it; a goal says what the walk is worth."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from arc_suite import evaluation, policies, registry, rotations
+from arc_suite.design.genes import Budget
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation.survey import MOST_TILT_COSINE
+from arc_suite.models.sizing import GRAVITY
+from arc_suite.models.soundness import flaws
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import energy
+
+_TERMINATING = {"on_divergence": "terminate"}  # counts as a fall
+LEAST_WAY = 0.7  # share of what is commanded, below which a cost of transport counts for nothing
+
+
+class Walk(NamedTuple):
+    """Means over episodes.
+
+    Attributes:
+        speed: along world x, m/s; a body that has fallen rests.
+        achieved: share of what is commanded: tracking, or in tasks that lead along x the way by that at the target
+            velocity.
+        tracking: mean over all steps, 0 after a fall; NaN in a task without.
+        cost_of_transport: positive work of the motors by weight and path.
+        power: mean positive power of the motors until the end of an episode, W/kg.
+        falls: share of the episodes that ended early in a fall.
+    """
+
+    speed: float
+    achieved: float
+    tracking: float
+    cost_of_transport: float
+    power: float
+    falls: float
+
+
+class Goal(NamedTuple):
+    """What bodies are searched for.
+
+    Attributes:
+        figure: of a walk, named as in `Walk`.
+        sign: 1 for a figure to be raised, -1 for one to be lowered.
+        task: by default.
+        preset: of the demonstrator; None for the one that suits task and body.
+        may_fall: whether a fall only lowers the figure, and does not exclude the body.
+        unit: of the figure.
+    """
+
+    figure: str
+    sign: float
+    task: str
+    preset: str | None = None
+    may_fall: bool = False
+    unit: str = ""
+
+    def value(self, walk: Walk) -> float:
+        """Return the figure as a number to be raised."""
+        return self.sign * getattr(walk, self.figure)
+
+
+GOALS: Mapping[str, Goal] = {
+    "transport": Goal("cost_of_transport", -1.0, "walk"),
+    "speed": Goal("speed", 1.0, "walk", preset="fast", unit=" m/s"),
+    "progress": Goal("speed", 1.0, "stairs", unit=" m/s"),
+    "obedience": Goal("tracking", 1.0, "steer"),
+    "robustness": Goal("tracking", 1.0, "shoved", may_fall=True),
+}
+
+
+class Round(NamedTuple):
+    """Episodes of a judgement.
+
+    Attributes:
+        settings: of the task.
+        seeds: of the episodes.
+        steps: control steps of each.
+    """
+
+    settings: Mapping[str, Any]
+    seeds: Sequence[int]
+    steps: int
+
+
+class Trial(NamedTuple):
+    """How a body is judged.
+
+    Attributes:
+        task: its name.
+        goal: a name of `GOALS`.
+        budget: that the body keeps.
+        first: of all bodies.
+        second: of those that challenge the elite of their cell.
+    """
+
+    task: str
+    goal: str
+    budget: Budget
+    first: Round
+    second: Round
+
+    @classmethod
+    def of(cls, task: str, settings: Mapping[str, Any], goal: str, budget: Budget, steps: int) -> "Trial":
+        """Return the trial whose second judgement has other seeds, twice the steps and the ground's next seed."""
+        ground = getattr(registry.task_of(task), "ground", None)
+        other = dict(settings)
+        if ground is not None and "terrain_seed" in ground.settings:
+            other["terrain_seed"] = settings.get("terrain_seed", ground.terrain_seed) + 1
+        return cls(task, goal, budget, Round(settings, (0,), steps), Round(other, (1, 2), 2 * steps))
+
+
+class Judgement(NamedTuple):
+    """What a body came to.
+
+    Attributes:
+        reason: why it is excluded; empty if it is not.
+        first: its walk; None for a body that was not let walk.
+        second: on other seeds and other ground, twice as long; None for one that did not challenge its cell's elite.
+    """
+
+    reason: str = ""
+    first: Walk | None = None
+    second: Walk | None = None
+
+
+def judge(trial: Trial, body: Body | str, elite: float) -> Judgement:
+    """Judge a body, and a second time if the first figure is above that of the elite of its cell.
+
+    Args:
+        trial: how.
+        body: to judge, or in its place the reason why there is none.
+        elite: value of the elite's figure; see `Goal.value`.
+    """
+    if isinstance(body, str):
+        return Judgement(body)
+    if found := flaws(body):
+        return Judgement(f"unsound: {found[0].text}")
+    goal = GOALS[trial.goal]
+    try:
+        first = walk(body, trial.task, trial.first, goal)
+        reason = excluded(goal, trial.budget, first)
+        if reason or goal.value(first) <= elite:
+            return Judgement(reason, first)
+        second = walk(body, trial.task, trial.second, goal)
+    except ValueError as error:
+        return Judgement(f"refused: {error}")
+    reason = excluded(goal, trial.budget, second)
+    return Judgement(f"judged again: {reason}" if reason else "", first, second)
+
+
+def excluded(goal: Goal, budget: Budget, walk: Walk) -> str:
+    """Return why a walk counts for nothing; empty if it counts."""
+    if walk.falls and not goal.may_fall:
+        return "fell"
+    if walk.power > budget.power:
+        return f"power {walk.power:.3g} W/kg"
+    if goal.figure == "cost_of_transport" and walk.achieved < LEAST_WAY:
+        return f"way {walk.achieved:.2f} of the target"
+    return "" if math.isfinite(goal.value(walk)) else "no finite figure"
+
+
+def walk(body: Body, task: str, episodes: Round, goal: Goal) -> Walk:
+    """Let the demonstrator walk a body and return means over the episodes.
+
+    Raises:
+        ValueError: a setting that does not fit, or a body that no demonstrator walks.
+    """
+    environment = Setup.of(body, task, _TERMINATING | episodes.settings).load()
+    try:
+        policy = policies.policy("cpg", body, goal.preset, task=environment.task.definition)
+        walks = [_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
+    finally:
+        environment.close()
+    return Walk(*map(float, np.mean(walks, axis=0)))
+
+
+def _episode(environment, policy, seed: int, steps: int) -> Walk:
+    data, task = environment.physics.data.ptr, environment.task.definition
+    body, seconds = task.scene.body, steps * task.scene.control_timestep
+    torques, spent = energy.torques(body), energy.start(len(body.joint_names))
+    for timestep in evaluation.rollout(environment, policy, seed, steps):
+        if timestep.first():
+            start, length, spent = data.qpos[0], 0, energy.begin(spent, data.qpos[7:])
+        else:
+            length, spent = length + 1, energy.after(spent, torques, data.ctrl, data.qpos[7:])
+    progress, way = environment.task.progress, data.qpos[0] - start
+    tracking = progress.get("tracking", math.nan) * length / steps
+    target = task.parameters.target_velocity * seconds
+    achieved = way / target if "distance" in progress or math.isnan(tracking) else tracking
+    fell = timestep.discount == 0.0 or rotations.upright(data.qpos[3:7]) < MOST_TILT_COSINE
+    power = spent.total * GRAVITY / (length * task.scene.control_timestep)
+    return Walk(way / seconds, achieved, tracking, progress.get("cost_of_transport", math.nan), power, fell)
