@@ -29,8 +29,8 @@ from arc_suite.cli.program import progress, use_one_thread
 from arc_suite.design import axes, gallery
 from arc_suite.design.axes import Map
 from arc_suite.design.genes import Around, Budget, Made, extent
-from arc_suite.design.judging import GOALS, Judgement, Trial, judge, walk
 from arc_suite.design.search import BATCH, Batch, Search
+from arc_suite.design.trials import GOALS, Outcome, Trial, evaluate, walk
 from arc_suite.export import pages
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import MAX_LENGTH, MAX_NAME, Body
@@ -43,7 +43,7 @@ _STEM = MAX_NAME - 7  # of the names of variants, before an underscore and a num
 
 FLAGS = flags.FLAGS
 flags.DEFINE_enum("goal", "transport", list(GOALS), "What to search for: see docs/design.md.")
-flags.DEFINE_string("task", None, "Task in which bodies are judged. [default: that of the goal]")
+flags.DEFINE_string("task", None, "Task in which bodies are evaluated. [default: that of the goal]")
 flags.DEFINE_multi_string("set", [], "Setting of the task, name=value; repeat it for several.")
 flags.DEFINE_string("around", None, f"A creature whose variants are searched: {ROBOT_HELP}, or a spec file.")
 flags.DEFINE_float(
@@ -57,9 +57,9 @@ flags.DEFINE_list(
     "map", None, f"One or two axes of the map: {axes.HELP}. [default: legs,links, with --around height,width]"
 )
 flags.DEFINE_integer(
-    "bodies", 260, f"Bodies to judge, rounded up to batches of {BATCH}; more make a finished search go on.", 1, MOST
+    "bodies", 260, f"Bodies to evaluate, rounded up to batches of {BATCH}; more make a finished search go on.", 1, MOST
 )
-flags.DEFINE_integer("steps", 240, "Control steps of the first judgement; the second takes twice as many.", 10, 500)
+flags.DEFINE_integer("steps", 240, "Control steps of the first evaluation; the second takes twice as many.", 10, 500)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 2**32 - 1)
 flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
 flags.DEFINE_bool("pages", True, "Write pages on which the best walk.")
@@ -80,14 +80,14 @@ def budget(around: Body | None) -> Budget:
 
 
 @contextlib.contextmanager
-def judges(processes: int | None) -> Iterator[Callable[[Iterable[tuple]], list[Judgement]]]:
-    """Open processes that judge bodies: yields a map of `judging.judge` over its arguments, in order."""
+def evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]], list[Outcome]]]:
+    """Open processes that evaluate bodies: yields a map of `trials.evaluate` over its arguments, in order."""
     if processes == 1:
-        yield lambda jobs: list(itertools.starmap(judge, jobs))
+        yield lambda jobs: list(itertools.starmap(evaluate, jobs))
         return
     # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
     with multiprocessing.get_context("spawn").Pool(processes, _begin) as pool:
-        yield lambda jobs: pool.starmap(judge, jobs, chunksize=1)
+        yield lambda jobs: pool.starmap(evaluate, jobs, chunksize=1)
 
 
 def _begin() -> None:
@@ -110,11 +110,11 @@ def search(folder: pathlib.Path, course: Search, known: Mapping[str, Any]) -> No
         if done >= batches:
             return
         with (
-            judges(FLAGS.processes) as judged,
+            evaluators(FLAGS.processes) as evaluated,
             progress(total=BATCH * batches, initial=BATCH * done, desc=FLAGS.goal, unit="body") as bar,
         ):
             for _ in range(done, batches):
-                journal.append(course.batch(judged))
+                journal.append(course.batch(evaluated))
                 bar.set_postfix_str(f"{len(course.elites)} cells")
                 bar.update(BATCH)
 
@@ -149,10 +149,10 @@ def main() -> None:
     gallery.write_table(folder / "bodies.csv", course, cells)
     gallery.write_specs(folder / "bodies", best)
     with files.writing_json(folder / "design.json") as report:
-        report.update(known, bodies=len(course.judged), elites=[elite.to_dict() for elite in best])
+        report.update(known, bodies=len(course.candidates), elites=[elite.to_dict() for elite in best])
     if not best:
-        reasons = collections.Counter(one.judgement.reason.split(":")[0] for one in course.judged)
-        raise ValueError(f"none of {len(course.judged)} bodies counts; most often: {reasons.most_common(1)[0][0]}")
+        reasons = collections.Counter(one.outcome.reason.split(":")[0] for one in course.candidates)
+        raise ValueError(f"none of {len(course.candidates)} bodies counts; most often: {reasons.most_common(1)[0][0]}")
     views = gallery.pictures(progress(best, "rendering", unit="body", leave=False), cells, trial)
     gallery.write_picture(folder / "gallery.png", views)
     if FLAGS.pages:
@@ -166,7 +166,7 @@ def check(trial: Trial, body: Body | str) -> None:
     """Let one body take a step.
 
     Raises:
-        ValueError: no body within the budget, a setting that does not fit, or a task that does not measure the figure.
+        ValueError: no body within the budget, a setting that does not fit, or a task that does not measure the metric.
     """
     if isinstance(body, str):
         raise ValueError(body)
@@ -174,14 +174,14 @@ def check(trial: Trial, body: Body | str) -> None:
     for episodes in (trial.first, trial.second):
         tried = walk(body, trial.task, episodes._replace(steps=1), goal)
     if math.isnan(goal.value(tried)):
-        raise ValueError(f"--goal={trial.goal}: task {trial.task} does not measure {goal.figure}")
+        raise ValueError(f"--goal={trial.goal}: task {trial.task} does not measure {goal.metric}")
 
 
 def print_table(best: Iterable[gallery.Elite], trial: Trial) -> None:
-    """Print a row for each cell: its body, and the figure on judging twice."""
+    """Print a row for each cell: its body, and the metric in both evaluations."""
     goal = GOALS[trial.goal]
     line = "{:<24} {:>6} {:>12} {:>12} {:>12}"
-    print(line.format("cell", "body", goal.figure[:12], "judged again", "power, W/kg"))
+    print(line.format("cell", "body", goal.metric[:12], "evaluated again", "power, W/kg"))
     for elite in best:
-        first, second = (f"{getattr(walk, goal.figure):.3f}" for walk in (elite.first, elite.second))
+        first, second = (f"{getattr(walk, goal.metric):.3f}" for walk in (elite.first, elite.second))
         print(line.format(elite.label, elite.number, first, second, f"{elite.second.power:.1f}"))

@@ -1,1 +1,1 @@
-"""Creatures found by search: bodies from genes, goals by which demonstrators judge them, and an archive of the best."""
+"""Creatures found by search: bodies from genes, goals, trials by demonstrators, and an archive of the best."""

@@ -1,6 +1,6 @@
 """The files of a search: specs of the best, a table of all, a picture, and pages on which the best walk.
 
-All follow from the judgements, so that a search that was broken off leaves the same files in the end.
+All follow from the outcomes, so that a search that was broken off leaves the same files in the end.
 """
 
 import base64
@@ -17,9 +17,8 @@ from PIL import Image
 
 from arc_suite import files, policies, style
 from arc_suite.design.axes import Map
-from arc_suite.design.judging import GOALS, Trial, Walk
 from arc_suite.design.search import Search
-from arc_suite.envs.setup import Setup
+from arc_suite.design.trials import GOALS, Trial, Walk, opened
 from arc_suite.export import films, pages
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
@@ -66,7 +65,7 @@ class Elite(NamedTuple):
         cell: of the map.
         number: of the body in the table.
         body: the body.
-        first, second: its walks; see `judging.Judgement`.
+        first, second: its walks; see `trials.Outcome`.
     """
 
     label: str
@@ -85,19 +84,19 @@ def elites(search: Search, cells: Map) -> list[Elite]:
     """Return the best bodies, in the order of their cells."""
     found = []
     for cell, number in sorted(search.elites.items()):
-        one = search.judged[number]
+        one = search.candidates[number]
         body = search.body(one.genes, number)
-        found.append(Elite(cells.label(cell), cell, number, body, one.judgement.first, one.judgement.second))
+        found.append(Elite(cells.label(cell), cell, number, body, one.outcome.first, one.outcome.second))
     return found
 
 
 def write_table(path: Path, search: Search, cells: Map) -> None:
-    """Write a row for every body judged, CSV: cell, why it is excluded, figures of both judgements, genes."""
+    """Write a row for every body evaluated, CSV: cell, why it is excluded, metrics of both evaluations, genes."""
     best, none = set(search.elites.values()), [""] * len(Walk._fields)
     with files.writing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*_FIELDS, *search.genes])
-        for number, (numbers, cell, (reason, first, second)) in enumerate(search.judged):
+        for number, (numbers, cell, (reason, first, second)) in enumerate(search.candidates):
             label = "" if cell is None else cells.label(cell)
             walks = [*(first or none), *(second or none)]
             table.writerow([number, label, int(number in best), reason, *walks, *numbers])
@@ -112,9 +111,9 @@ def write_specs(folder: Path, best: Iterable[Elite]) -> None:
 
 
 def caption(elite: Elite, cells: Map, goal: str) -> str:
-    """Return the cell of an elite and its figure on judging again."""
+    """Return the cell of an elite and its metric in its second evaluation."""
     names = ", ".join(f"{number} {name}" for name, number in zip(cells.names, elite.cell, strict=True))
-    return f"{names}: {getattr(elite.second, GOALS[goal].figure):.3g}{GOALS[goal].unit}"
+    return f"{names}: {getattr(elite.second, GOALS[goal].metric):.3g}{GOALS[goal].unit}"
 
 
 def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int, ...], np.ndarray]:
@@ -125,8 +124,10 @@ def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int,
     """
     views = {}
     for elite in best:
-        environment, policy = _opened(elite, trial)
-        footage = films.Footage(elite.label, environment, policies.alone(policy, _seed(trial)), "portrait", _SIZE)
+        environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
+        footage = films.Footage(
+            elite.label, environment, policies.alone(policy, trial.first.seeds[0]), "portrait", _SIZE
+        )
         for _ in range(_BEFORE_PICTURE):
             footage.step()
         views[elite.cell] = films.captioned(footage.view(), caption(elite, cells, trial.goal))
@@ -135,7 +136,7 @@ def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int,
 
 
 def write_picture(path: Path, views: Mapping[tuple[int, ...], np.ndarray]) -> None:
-    """Write pictures as one, in rows of the map's first axis and columns of its second."""
+    """Write pictures as one, in columns of the map's first axis and rows of its second."""
     shown, columns = _arranged(views)
     nothing = np.zeros((*_SIZE[::-1], 3), np.uint8)
     with files.writing(path) as temporary:
@@ -150,8 +151,8 @@ def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -
     """
     _emptied(folder, ".html")
     for elite in best:
-        environment, policy = _opened(elite, trial)
-        track = style.record(environment, policy, _seed(trial), STEPS)
+        environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
+        track = style.record(environment, policy, trial.first.seeds[0], STEPS)
         environment.close()
         with files.writing(folder / f"{elite.label}.html") as temporary:
             temporary.write_text(pages.page({caption(elite, cells, trial.goal): track}), encoding="utf-8")
@@ -179,20 +180,10 @@ def write_page(path: Path, views: Mapping[tuple[int, ...], np.ndarray], cells: M
 
 def _arranged(views: Mapping[tuple[int, ...], np.ndarray]) -> tuple[list[tuple[int, ...]], int]:
     """Return the cells to show, row by row, and how many columns there are."""
-    rows, columns = sorted({cell[0] for cell in views}), sorted({cell[1:] for cell in views})
+    columns, rows = sorted({cell[0] for cell in views}), sorted({cell[1:] for cell in views})
     if len(rows) == 1 or len(columns) == 1:
         return sorted(views), min(4, len(views))
-    return [(row, *column) for row in rows for column in columns], len(columns)
-
-
-def _opened(elite: Elite, trial: Trial):
-    environment = Setup.of(elite.body, trial.task, trial.first.settings).load(_seed(trial))
-    preset = GOALS[trial.goal].preset
-    return environment, policies.policy("cpg", elite.body, preset, task=environment.task.definition)
-
-
-def _seed(trial: Trial) -> int:
-    return trial.first.seeds[0]
+    return [(column, *row) for row in rows for column in columns], len(columns)
 
 
 def _emptied(folder: Path, extension: str) -> None:

@@ -203,16 +203,16 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
 
 
 def deformations(body: Body) -> int:
-    """Return how many numbers `deformed` takes: for every leg without a mirror image before it, its links and one."""
+    """Return how many changes `deformed` takes: for every leg without a mirror image before it, its links and one."""
     return sum(len(leg.links) + 1 for leg, _ in _with_images(body))
 
 
-def deformed(body: Body, numbers: np.ndarray) -> Body:
+def deformed(body: Body, changes: np.ndarray) -> Body:
     """Return a body with legs of other lengths and headings; mirrored legs stay mirrored, and feet at their height.
 
     Args:
         body: to change.
-        numbers: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
+        changes: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
             leg about the vertical, rad.
 
     Returns:
@@ -224,7 +224,7 @@ def deformed(body: Body, numbers: np.ndarray) -> Body:
     legs, first = {}, 0
     for leg, images in _with_images(body):
         last = first + len(leg.links)
-        legs[leg.name] = changed = _deformed_leg(leg, numbers[first:last, None], float(numbers[last]))
+        legs[leg.name] = changed = _deformed_leg(leg, changes[first:last, None], float(changes[last]))
         legs |= {name: changed.mirrored(name) for name in images}
         first = last + 1
     return _changed(body, "mutated", legs=tuple(legs[leg.name] for leg in body.legs))

@@ -1,4 +1,4 @@
-"""Judging of bodies: a demonstrator, fitted to each, walks it; a goal says what the walk is worth."""
+"""Evaluation of bodies: a demonstrator, fitted to each, walks it; a goal says what the walk is worth."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,17 +6,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from arc_suite import evaluation, policies, registry, rotations
+from arc_suite import checks, evaluation, policies, registry, rotations
 from arc_suite.design.genes import Budget
+from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation.survey import MOST_TILT_COSINE
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.soundness import flaws
+from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import energy
 
 _TERMINATING = {"on_divergence": "terminate"}  # counts as a fall
-LEAST_WAY = 0.7  # share of what is commanded, below which a cost of transport counts for nothing
+_SEEDS = 2**32  # of a ground
+LEAST_SHARE = 0.7  # share of what is commanded, below which a cost of transport counts for nothing
 
 
 class Walk(NamedTuple):
@@ -24,8 +27,8 @@ class Walk(NamedTuple):
 
     Attributes:
         speed: along world x, m/s; a body that has fallen rests.
-        achieved: share of what is commanded: tracking, or in tasks that lead along x the way by that at the target
-            velocity.
+        achieved: share of what is commanded: tracking, or in tasks that lead along x the displacement by that at the
+            target velocity.
         tracking: mean over all steps, 0 after a fall; NaN in a task without.
         cost_of_transport: positive work of the motors by weight and path.
         power: mean positive power of the motors until the end of an episode, W/kg.
@@ -44,15 +47,15 @@ class Goal(NamedTuple):
     """What bodies are searched for.
 
     Attributes:
-        figure: of a walk, named as in `Walk`.
-        sign: 1 for a figure to be raised, -1 for one to be lowered.
+        metric: of a walk, named as in `Walk`.
+        sign: 1 for a metric to be raised, -1 for one to be lowered.
         task: by default.
         preset: of the demonstrator; None for the one that suits task and body.
-        may_fall: whether a fall only lowers the figure, and does not exclude the body.
-        unit: of the figure.
+        may_fall: whether a fall only lowers the metric, and does not exclude the body.
+        unit: of the metric.
     """
 
-    figure: str
+    metric: str
     sign: float
     task: str
     preset: str | None = None
@@ -60,21 +63,21 @@ class Goal(NamedTuple):
     unit: str = ""
 
     def value(self, walk: Walk) -> float:
-        """Return the figure as a number to be raised."""
-        return self.sign * getattr(walk, self.figure)
+        """Return the metric as a number to be raised."""
+        return self.sign * getattr(walk, self.metric)
 
 
 GOALS: Mapping[str, Goal] = {
     "transport": Goal("cost_of_transport", -1.0, "walk"),
     "speed": Goal("speed", 1.0, "walk", preset="fast", unit=" m/s"),
     "progress": Goal("speed", 1.0, "stairs", unit=" m/s"),
-    "obedience": Goal("tracking", 1.0, "steer"),
+    "tracking": Goal("tracking", 1.0, "steer"),
     "robustness": Goal("tracking", 1.0, "shoved", may_fall=True),
 }
 
 
 class Round(NamedTuple):
-    """Episodes of a judgement.
+    """Episodes of an evaluation.
 
     Attributes:
         settings: of the task.
@@ -88,7 +91,7 @@ class Round(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """How a body is judged.
+    """How a body is evaluated.
 
     Attributes:
         task: its name.
@@ -106,15 +109,16 @@ class Trial(NamedTuple):
 
     @classmethod
     def of(cls, task: str, settings: Mapping[str, Any], goal: str, budget: Budget, steps: int) -> "Trial":
-        """Return the trial whose second judgement has other seeds, twice the steps and the ground's next seed."""
+        """Return the trial whose second evaluation has other seeds, twice the steps and the ground's next seed."""
         ground = getattr(registry.task_of(task), "ground", None)
         other = dict(settings)
         if ground is not None and "terrain_seed" in ground.settings:
-            other["terrain_seed"] = settings.get("terrain_seed", ground.terrain_seed) + 1
+            seed = settings.get("terrain_seed", ground.terrain_seed)
+            other["terrain_seed"] = (checks.integer("terrain_seed", seed, 0, _SEEDS - 1) + 1) % _SEEDS
         return cls(task, goal, budget, Round(settings, (0,), steps), Round(other, (1, 2), 2 * steps))
 
 
-class Judgement(NamedTuple):
+class Outcome(NamedTuple):
     """What a body came to.
 
     Attributes:
@@ -128,29 +132,29 @@ class Judgement(NamedTuple):
     second: Walk | None = None
 
 
-def judge(trial: Trial, body: Body | str, elite: float) -> Judgement:
-    """Judge a body, and a second time if the first figure is above that of the elite of its cell.
+def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
+    """Evaluate a body, and a second time if the first value is above that of the elite of its cell.
 
     Args:
         trial: how.
-        body: to judge, or in its place the reason why there is none.
-        elite: value of the elite's figure; see `Goal.value`.
+        body: to evaluate, or in its place the reason why there is none.
+        elite: value of the elite's metric; see `Goal.value`.
     """
     if isinstance(body, str):
-        return Judgement(body)
+        return Outcome(body)
     if found := flaws(body):
-        return Judgement(f"unsound: {found[0].text}")
+        return Outcome(f"unsound: {found[0].text}")
     goal = GOALS[trial.goal]
     try:
         first = walk(body, trial.task, trial.first, goal)
         reason = excluded(goal, trial.budget, first)
         if reason or goal.value(first) <= elite:
-            return Judgement(reason, first)
+            return Outcome(reason, first)
         second = walk(body, trial.task, trial.second, goal)
     except ValueError as error:
-        return Judgement(f"refused: {error}")
+        return Outcome(f"refused: {error}")
     reason = excluded(goal, trial.budget, second)
-    return Judgement(f"judged again: {reason}" if reason else "", first, second)
+    return Outcome(f"evaluated again: {reason}" if reason else "", first, second)
 
 
 def excluded(goal: Goal, budget: Budget, walk: Walk) -> str:
@@ -158,10 +162,10 @@ def excluded(goal: Goal, budget: Budget, walk: Walk) -> str:
     if walk.falls and not goal.may_fall:
         return "fell"
     if walk.power > budget.power:
-        return f"power {walk.power:.3g} W/kg"
-    if goal.figure == "cost_of_transport" and walk.achieved < LEAST_WAY:
-        return f"way {walk.achieved:.2f} of the target"
-    return "" if math.isfinite(goal.value(walk)) else "no finite figure"
+        return f"power: {walk.power:.3g} W/kg"
+    if goal.metric == "cost_of_transport" and walk.achieved < LEAST_SHARE:
+        return f"slow: {walk.achieved:.2f} of the command"
+    return "" if math.isfinite(goal.value(walk)) else "no finite metric"
 
 
 def walk(body: Body, task: str, episodes: Round, goal: Goal) -> Walk:
@@ -170,13 +174,22 @@ def walk(body: Body, task: str, episodes: Round, goal: Goal) -> Walk:
     Raises:
         ValueError: a setting that does not fit, or a body that no demonstrator walks.
     """
-    environment = Setup.of(body, task, _TERMINATING | episodes.settings).load()
+    environment, policy = opened(body, task, episodes, goal)
     try:
-        policy = policies.policy("cpg", body, goal.preset, task=environment.task.definition)
         walks = [_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
     finally:
         environment.close()
     return Walk(*map(float, np.mean(walks, axis=0)))
+
+
+def opened(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
+    """Open an environment and fit the demonstrator.
+
+    Raises:
+        ValueError: as `walk`.
+    """
+    environment = Setup.of(body, task, {**episodes.settings, **_TERMINATING}).load(episodes.seeds[0])
+    return environment, policies.policy("cpg", body, goal.preset, task=environment.task.definition)
 
 
 def _episode(environment, policy, seed: int, steps: int) -> Walk:
