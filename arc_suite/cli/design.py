@@ -38,11 +38,11 @@ from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tuning import Journal
 
 MASS, SPAN = 12.0, 1.5  # of a budget, kg and m
-_BOUNDS = {"mass": (1e-6, 1e6), "span": (1e-3, MAX_LENGTH), "height": (1e-3, MAX_LENGTH), "power": (0.0, 1e6)}
+_BOUNDS = {"mass": (1e-6, 1e6), "span": (0.05, MAX_LENGTH), "height": (0.02, MAX_LENGTH), "power": (0.0, 1e6)}
 _STEM = MAX_NAME - 7  # of the names of variants, before an underscore and a number
 
 FLAGS = flags.FLAGS
-flags.DEFINE_enum("goal", "transport", list(GOALS), "What to search for: see docs/design.md.")
+flags.DEFINE_string("goal", "transport", f"{', '.join(GOALS)}; docs/design.md describes them.")
 flags.DEFINE_string("task", None, "Task in which bodies are evaluated. [default: that of the goal]")
 flags.DEFINE_multi_string("set", [], "Setting of the task, name=value; repeat it for several.")
 flags.DEFINE_string("around", None, f"A creature whose variants are searched: {ROBOT_HELP}, or a spec file.")
@@ -124,10 +124,11 @@ def main() -> None:
     use_one_thread()
     if not FLAGS.output:
         raise ValueError("no folder to write to; say --output=FOLDER")
+    goal = GOALS[checks.name(FLAGS.goal, GOALS, "goal")]
     around = None if FLAGS.around is None else registry.body_of(FLAGS.around)
     space = Made() if around is None else Around(around, FLAGS.amount)
     cells = Map.of(FLAGS.map or (("legs", "links") if around is None else ("height", "width")), around, FLAGS.amount)
-    task, settings = FLAGS.task or GOALS[FLAGS.goal].task, named_values("set", FLAGS["set"].value)
+    task, settings = FLAGS.task or goal.task, named_values("set", FLAGS["set"].value)
     trial = Trial.of(task, settings, FLAGS.goal, budget(around), FLAGS.steps)
     stem = "design" if around is None else around.name[:_STEM]
     course = Search(space, cells, trial, FLAGS.seed, stem)
@@ -153,12 +154,12 @@ def main() -> None:
     if not best:
         reasons = collections.Counter(one.outcome.reason.split(":")[0] for one in course.candidates)
         raise ValueError(f"none of {len(course.candidates)} bodies counts; most often: {reasons.most_common(1)[0][0]}")
+    print_table(best, trial)
     views = gallery.pictures(progress(best, "rendering", unit="body", leave=False), cells, trial)
     gallery.write_picture(folder / "gallery.png", views)
     if FLAGS.pages:
         gallery.write_walks(folder / "walks", progress(best, "walking", unit="body", leave=False), cells, trial)
         gallery.write_page(folder / "gallery.html", views, cells, f"{FLAGS.goal} in {task}")
-    print_table(best, trial)
     print(f"wrote {folder}")
 
 

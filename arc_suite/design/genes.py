@@ -144,8 +144,10 @@ def within(budget: Budget, space: Genes, genes: np.ndarray, name: str) -> Body:
         ValueError: a length or density out of range.
     """
     shape, share = space.shape(genes), space.size(genes)
-    most = min(budget.span / extent(shape).max(), budget.height / shape.torso.standing_height)
+    most = min(budget.span / float(extent(shape).max()), budget.height / shape.torso.standing_height)
     factor = min(most, 1.0) if share is None else share * most
-    body = (generator.scaled(shape, factor) if factor != 1.0 else shape).replace(name=name)
-    ballast = sum(weight.mass for weight in body.ballast)
-    return body.replace(density=body.density * (budget.mass - ballast) / (standing(body).mass - ballast))
+    # The density comes first: small parts of a light body would be refused.
+    ballast = sum(weight.mass for weight in shape.ballast)
+    density = shape.density * (budget.mass / factor**3 - ballast) / (standing(shape).mass - ballast)
+    body = shape.replace(density=density)
+    return (generator.scaled(body, factor) if factor != 1.0 else body).replace(name=name)
