@@ -85,14 +85,17 @@ def evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]], li
     if processes == 1:
         yield lambda jobs: list(itertools.starmap(evaluate, jobs))
         return
-    # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
-    with multiprocessing.get_context("spawn").Pool(processes, _begin) as pool:
+    # Processes inherit that they ignore Ctrl-C, which the parent answers. Spawned, not forked: a fork would share
+    # whatever OpenGL or threads the caller has open.
+    answer = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    pool = multiprocessing.get_context("spawn").Pool(processes, _begin)
+    signal.signal(signal.SIGINT, answer)
+    with pool:
         yield lambda jobs: pool.starmap(evaluate, jobs, chunksize=1)
 
 
 def _begin() -> None:
-    """Leave Ctrl-C to the parent process, and end when it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """End this process when its parent ends."""
 
     def follow() -> None:
         multiprocessing.parent_process().join()
