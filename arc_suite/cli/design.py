@@ -59,7 +59,7 @@ flags.DEFINE_list(
 flags.DEFINE_integer(
     "bodies", 260, f"Bodies to evaluate, rounded up to batches of {BATCH}; more make a finished search go on.", 1, MOST
 )
-flags.DEFINE_integer("steps", 240, "Control steps of the first evaluation; the second takes twice as many.", 10, 500)
+flags.DEFINE_integer("steps", 200, "Control steps of the first evaluation; the second takes twice as many.", 10, 500)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 2**32 - 1)
 flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
 flags.DEFINE_bool("pages", True, "Write pages on which the best walk.")

@@ -109,13 +109,13 @@ class Trial(NamedTuple):
 
     @classmethod
     def of(cls, task: str, settings: Mapping[str, Any], goal: str, budget: Budget, steps: int) -> "Trial":
-        """Return the trial whose second evaluation has other seeds, twice the steps and the ground's next seed."""
+        """Return the trial whose second evaluation has another seed, twice the steps and the ground's next seed."""
         ground = getattr(registry.task_of(task), "ground", None)
         other = dict(settings)
         if ground is not None and "terrain_seed" in ground.settings:
             seed = settings.get("terrain_seed", ground.terrain_seed)
             other["terrain_seed"] = (checks.integer("terrain_seed", seed, 0, _SEEDS - 1) + 1) % _SEEDS
-        return cls(task, goal, budget, Round(settings, (0,), steps), Round(other, (1, 2), 2 * steps))
+        return cls(task, goal, budget, Round(settings, (0,), steps), Round(other, (1,), 2 * steps))
 
 
 class Outcome(NamedTuple):
@@ -124,7 +124,7 @@ class Outcome(NamedTuple):
     Attributes:
         reason: why it is excluded; empty if it is not.
         first: its walk; None for a body that was not let walk.
-        second: on other seeds and other ground, twice as long; None for one that did not challenge its cell's elite.
+        second: from another seed and on other ground, twice as long; None for one that did not challenge its cell's elite.
     """
 
     reason: str = ""
