@@ -104,6 +104,23 @@ def _begin() -> None:
     threading.Thread(target=follow, daemon=True).start()
 
 
+def settled(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
+    """Return what determines a search, as JSON holds it: lists in place of tuples."""
+    values = {
+        "task": trial.task,
+        "goal": trial.goal,
+        "budget": trial.budget._asdict(),
+        "first": trial.first._asdict(),
+        "second": trial.second._asdict(),
+        "map": cells._asdict(),
+        "around": around and body_to_json(around),
+        "amount": around and FLAGS.amount,
+        "seed": FLAGS.seed,
+        "versions": versions.recorded(),
+    }
+    return json.loads(json.dumps(values))
+
+
 def search(folder: pathlib.Path, course: Search, known: Mapping[str, Any]) -> None:
     """Search behind a progress bar, or go on."""
     with contextlib.closing(Journal(folder / "journal.jsonl", known, Batch.restored)) as journal:
@@ -139,15 +156,7 @@ def main() -> None:
     if FLAGS.pages:
         pages.viewer()  # finds out at once whether there is one
     folder = files.folder(FLAGS.output)
-    known = {
-        **trial._asdict(),
-        "map": [*cells],
-        "around": around and body_to_json(around),
-        "amount": around and FLAGS.amount,
-        "seed": FLAGS.seed,
-        "versions": versions.recorded(),
-    }
-    known = json.loads(json.dumps(known))  # as the journal holds it: lists in place of tuples
+    known = settled(trial, cells, around)
     search(folder, course, known)
     best = gallery.elites(course, cells)
     gallery.write_table(folder / "bodies.csv", course, cells)

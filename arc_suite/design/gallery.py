@@ -103,8 +103,8 @@ def write_table(path: Path, search: Search, cells: Map) -> None:
 
 
 def write_specs(folder: Path, best: Iterable[Elite]) -> None:
-    """Write the spec of every elite, named by its cell; specs of other searches in the folder are deleted."""
-    _emptied(folder, ".json")
+    """Write the spec of every elite, named by its cell."""
+    files.folder(folder)
     for elite in best:
         with files.writing(folder / f"{elite.label}.json") as temporary:
             temporary.write_text(body_to_json(elite.body), encoding="utf-8")
@@ -149,7 +149,7 @@ def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -
     Raises:
         ValueError: the viewer has not been built.
     """
-    _emptied(folder, ".html")
+    files.folder(folder)
     for elite in best:
         environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
         track = style.record(environment, policy, trial.first.seeds[0], STEPS)
@@ -184,9 +184,3 @@ def _arranged(views: Mapping[tuple[int, ...], np.ndarray]) -> tuple[list[tuple[i
     if len(rows) == 1 or len(columns) == 1:
         return sorted(views), min(4, len(views))
     return [(column, *row) for row in rows for column in columns], len(columns)
-
-
-def _emptied(folder: Path, extension: str) -> None:
-    """Make a folder, and delete what an earlier search has left there."""
-    for path in files.folder(folder).glob(f"*{extension}"):
-        path.unlink()

@@ -124,7 +124,8 @@ class Outcome(NamedTuple):
     Attributes:
         reason: why it is excluded; empty if it is not.
         first: its walk; None for a body that was not let walk.
-        second: from another seed and on other ground, twice as long; None for one that did not challenge its cell's elite.
+        second: from another seed and on other ground, twice as long; None for one that did not challenge its cell's
+            elite.
     """
 
     reason: str = ""
