@@ -19,6 +19,7 @@ PROGRAMS = (
     "enter",
     "export",
     "survey",
+    "design",
     "doctor",
 )
 
