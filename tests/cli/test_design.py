@@ -63,7 +63,7 @@ def test_processes_make_no_difference(found, tmp_path):
 def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     straight, broken = tmp_path / "straight", tmp_path / "broken"
     arguments = ("--goal=speed", "--map=legs", "--processes=2")
-    done = design(*arguments, "--bodies=60", f"--output={straight}")
+    done = design(*arguments, "--bodies=40", f"--output={straight}")
     command = [sys.executable, "-m", "arc_suite", "design", *QUICK, *arguments, "--bodies=2000", f"--output={broken}"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     journal = broken / "journal.jsonl"
@@ -74,7 +74,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     process.wait()
     lines = journal.read_bytes().splitlines(keepends=True)
     journal.write_bytes(b"".join(lines[:2]) + lines[1][:300])  # a batch, and one that was being written
-    again = design(*arguments, "--bodies=60", f"--output={broken}")
+    again = design(*arguments, "--bodies=40", f"--output={broken}")
     assert again.stdout.replace("broken", "straight") == done.stdout
     assert contents(broken) == contents(straight)
 
