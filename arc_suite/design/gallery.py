@@ -9,8 +9,10 @@ import html
 import io
 import string
 from collections.abc import Iterable, Mapping
+from importlib import resources
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import numpy as np
 from PIL import Image
@@ -27,34 +29,6 @@ STEPS = 200  # control steps of a walk on a page
 _BEFORE_PICTURE = 60
 _SIZE = (300, 225)  # pixels of a cell of the picture
 _FIELDS = ("number", "cell", "elite", "reason", *(f"{name}_{turn}" for turn in (1, 2) for name in Walk._fields))
-
-_PAGE = string.Template("""\
-<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,">
-<title>$title</title>
-<style>
-body { margin: 0; padding: 12px; background: #1d232b; color: #d7dde5; font: 14px system-ui, sans-serif; }
-h1 { font-size: 16px; }
-main { display: grid; grid-template-columns: repeat($columns, minmax(0, 300px)); gap: 6px; }
-figure { margin: 0; }
-img { display: block; width: 100%; }
-figcaption { padding: 2px 4px; }
-a { color: #8fb7e0; }
-</style>
-</head>
-<body>
-<h1>$title</h1>
-<p>A picture leads to the page on which the body walks, a name to its spec.</p>
-<main>
-$items
-</main>
-</body>
-</html>
-""")
 
 
 class Elite(NamedTuple):
@@ -161,21 +135,25 @@ def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -
 def write_page(path: Path, views: Mapping[tuple[int, ...], np.ndarray], cells: Map, title: str) -> None:
     """Write a page of all pictures, each a link to the page on which the body walks, with a link to its spec."""
     shown, columns = _arranged(views)
-    items = []
-    for cell in shown:
-        label, buffer = cells.label(cell), io.BytesIO()
-        if cell in views:
-            Image.fromarray(views[cell]).save(buffer, "JPEG", quality=85)
-            data = base64.b64encode(buffer.getvalue()).decode()
-            picture = f'<a href="walks/{label}.html"><img alt="{label}" src="data:image/jpeg;base64,{data}"></a>'
-            items.append(
-                f'<figure>{picture}<figcaption><a href="bodies/{label}.json">{label}.json</a></figcaption></figure>'
-            )
-        else:
-            items.append("<figure></figure>")
-    text = _PAGE.substitute(title=html.escape(title), columns=columns, items="\n".join(items))
+    frame = string.Template(resources.files("arc_suite.design").joinpath("gallery.html").read_text(encoding="utf-8"))
+    items = "\n".join(_item(cells.label(cell), views.get(cell)) for cell in shown)
+    text = frame.substitute(title=html.escape(title), columns=columns, items=items)
     with files.writing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _item(label: str, view: np.ndarray | None) -> str:
+    """Return the figure of a cell as HTML; an empty one without a picture."""
+    figure = ElementTree.Element("figure")
+    if view is not None:
+        buffer = io.BytesIO()
+        Image.fromarray(view).save(buffer, "JPEG", quality=85)
+        source = f"data:image/jpeg;base64,{base64.b64encode(buffer.getvalue()).decode()}"
+        walk = ElementTree.SubElement(figure, "a", href=f"walks/{label}.html")
+        ElementTree.SubElement(walk, "img", alt=label, src=source)
+        name = ElementTree.SubElement(ElementTree.SubElement(figure, "figcaption"), "a", href=f"bodies/{label}.json")
+        name.text = f"{label}.json"
+    return ElementTree.tostring(figure, encoding="unicode", method="html")
 
 
 def _arranged(views: Mapping[tuple[int, ...], np.ndarray]) -> tuple[list[tuple[int, ...]], int]:
