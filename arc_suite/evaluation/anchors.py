@@ -1,7 +1,7 @@
 """Anchors of a score: what standing still and the best demonstrator earn with a robot, a task and settings.
 
-`anchors.csv` holds both for the robots of the suite and tasks with default settings: the returns of the evaluation
-protocol's episodes, written by `python tools/results.py --anchors`. In other cases they are measured.
+`anchors.csv` holds both for robots of the suite in tasks with default settings: the returns of the protocol's episodes,
+written by `python tools/results.py --anchors`. In places that it lacks they are measured.
 """
 
 import contextlib
