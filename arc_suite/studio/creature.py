@@ -54,11 +54,13 @@ def opened(sketch: Sketch) -> Creature:
     setup = sketches.setup(sketch)
     parts, materials = described(setup.body)
     environment = load(setup, time_limit=math.inf, on_divergence="terminate")
+    act = alone(policy(sketch, environment))
+    act(load(setup).reset())  # finds out at once whether the policy knows the observation
     return Creature(
         sketch=sketch,
         setup=setup,
         environment=environment,
-        act=alone(policy(sketch, environment)),
+        act=act,
         flaws=tuple(flaws(setup.body)),
         links=link_names(setup.body),
         unit=setup.body.torso.standing_height / sketch.scale,

@@ -2,12 +2,12 @@
 
 import contextlib
 import functools
-import html
 import io
 import math
 import random
+import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import viser
@@ -18,7 +18,7 @@ from arc_suite.policies import POLICIES
 from arc_suite.robots import gaits, generator
 from arc_suite.robots.spec_files import MAX_BYTES
 from arc_suite.simulation.opengl import RenderingUnavailable
-from arc_suite.studio import saving
+from arc_suite.studio import saving, texts
 from arc_suite.studio import sketch as sketches
 from arc_suite.studio.charts import Charts
 from arc_suite.studio.creature import Creature
@@ -30,7 +30,6 @@ from arc_suite.tasks import TASKS
 _CHARTS_EVERY = 0.25  # s
 _PRESS = 0.25  # of the body's own speed, by which a key changes the command
 _LINKS = 8  # sliders of links, at most
-_REAL = 0.97  # of real time, from which the pace is called so
 _PROPORTIONS = (
     ("scale", "Size", 0.25, 4.0, 0.05),
     ("length", "Torso length", 0.5, 2.0, 0.05),
@@ -64,7 +63,14 @@ def serve(session: Session, host: str, port: int, tell: Callable[[str], None]) -
         host: address to listen on.
         port: to listen on; the next free one if it is taken.
         tell: called with the address of the page.
+
+    Raises:
+        ValueError: nothing can listen on the address.
     """
+    try:
+        socket.create_server((host, 0)).close()  # viser would wait forever
+    except OSError as error:
+        raise ValueError(f"host {host}: cannot listen there: {(error.strerror or str(error)).lower()}") from None
     with contextlib.redirect_stdout(io.StringIO()):  # viser's own banner
         server = _Server(host=host, port=port, label="arc_suite studio", verbose=False)
     try:
@@ -116,14 +122,15 @@ class Page:
         self._view.pose(session.episodes.qpos(share), session.episodes.markers(share))
         if time.monotonic() - self._drawn > _CHARTS_EVERY:
             self._drawn = time.monotonic()
-            self._status.content = status(session)
+            self._status.content = texts.status(session)
             self._charts.update(session.history, tuple(leg.name for leg in session.creature.setup.body.legs))
 
     def _add_body(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets
         self._check = gui.add_folder("Check")
-        listed = [*sketches.sources(), FILE] if first.source == FILE else sketches.sources()
-        widgets["source"] = gui.add_dropdown("Body", listed, initial_value=first.source)
+        widgets["source"] = gui.add_dropdown(
+            "Body", _listed(first.source, sketches.sources()), initial_value=first.source
+        )
         widgets["legs"] = gui.add_slider("Legs", *generator.LEGS, 1, first.legs)
         widgets["links"] = gui.add_slider("Links", *generator.LINKS, 1, first.links)
         widgets["layout"] = gui.add_dropdown("Layout", [OWN, *generator.LAYOUTS], initial_value=first.layout)
@@ -136,15 +143,16 @@ class Page:
 
     def _add_task(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets
-        widgets["task"] = gui.add_dropdown("Task", list(TASKS), initial_value=first.task)
-        widgets["ground"] = gui.add_dropdown("Ground", list(ARENAS), initial_value=first.ground)
+        widgets["task"] = gui.add_dropdown("Task", _listed(first.task, TASKS), initial_value=first.task)
+        widgets["ground"] = gui.add_dropdown("Ground", _listed(first.ground, ARENAS), initial_value=first.ground)
         widgets["gait"] = gui.add_dropdown("Gait", [OWN, *gaits.NAMES], initial_value=first.gait)
         widgets["speed"] = gui.add_slider("Speed", 0.2, 2.0, 0.05, first.speed, hint="Multiple of the body's own")
-        widgets["kicks"] = gui.add_slider("Kicks", 0.0, 3.0, 0.1, first.kicks, hint="At most, sqrt(g h)")
+        widgets["kicks"] = gui.add_slider(
+            "Kicks", 0.0, max(3.0, first.kicks), 0.1, first.kicks, hint="At most, sqrt(g h)"
+        )
         widgets["settings"] = gui.add_text("Settings", first.settings, hint="Of the task, as a JSON object")
-        listed = list(dict.fromkeys((first.policy, *POLICIES)))
-        widgets["policy"] = gui.add_dropdown("Policy", listed, initial_value=first.policy)
-        presets = list(dict.fromkeys((OWN, first.preset, *preset_names())))
+        widgets["policy"] = gui.add_dropdown("Policy", _listed(first.policy, POLICIES), initial_value=first.policy)
+        presets = _listed(first.preset, (OWN, *preset_names()))
         widgets["preset"] = gui.add_dropdown("Preset", presets, initial_value=first.preset)
 
     def _add_command(self) -> None:
@@ -159,7 +167,7 @@ class Page:
         for label, key, change in _KEYS:
             command = gui.add_command(label, hotkey=key)
             command.on_trigger(functools.partial(self._press, change))
-        gui.add_html(f"<p>Keys: {html.escape(_KEYS_TOLD)}</p>")
+        gui.add_html(texts.line(f"Keys: {_KEYS_TOLD}"))
         gui.add_button("Kick").on_click(lambda event: self._session.kick(random.uniform(-math.pi, math.pi)))
         gui.add_button("Restart").on_click(lambda event: self._session.restart())
         gui.add_checkbox("Pause", False).on_update(lambda event: self._session.pause(event.target.value))
@@ -173,20 +181,20 @@ class Page:
     def _fit(self, creature: Creature) -> None:
         """Show the choices, the check and the lines that belong to a creature."""
         body, widgets = creature.setup.body, self._widgets
-        widgets["gait"].options = tuple(dict.fromkeys((OWN, creature.sketch.gait, *gaits.fitting(body))))
-        widgets["preset"].options = tuple(dict.fromkeys((OWN, creature.sketch.preset, *presets_of(body))))
+        widgets["gait"].options = _listed(creature.sketch.gait, (OWN, *gaits.fitting(body)))
+        widgets["preset"].options = _listed(creature.sketch.preset, (OWN, *presets_of(body)))
         self._show_what_applies(creature.sketch)
         self._fit_links(creature)
         for handle in self._cures:
             handle.remove()
         with self._check:
-            self._cures = [self._gui.add_html(checked(creature))]
+            self._cures = [self._gui.add_html(texts.checked(creature))]
             for flaw in creature.flaws:
                 if flaw.cure is not None:
                     button = self._gui.add_button(f"Apply: {flaw.text.rpartition(': ')[2]}")
                     button.on_click(functools.partial(self._apply, cured(creature.sketch, flaw.cure)))
                     self._cures.append(button)
-        self._lines.content = lines(creature.sketch)
+        self._lines.content = texts.copied(creature.sketch)
 
     def _fit_links(self, creature: Creature) -> None:
         """Add a slider for each link's name."""
@@ -254,36 +262,6 @@ class Page:
             note.remove()
 
 
-def status(session: Session) -> str:
-    """Return lines about the creature and the machine, as HTML; the first is the error, if there is one."""
-    creature, episodes, history = session.creature, session.episodes, session.history
-    speed = history.speeds()[-1] if len(history) else 0.0
-    cost = history.cost_of_transport()
-    pace = "paused" if session.paused else "real time" if session.pace > _REAL else f"{session.pace:.2f} of real time"
-    rows = {
-        "walks": f"{creature.setup.body.name}, {creature.setup.kind.name}, {speed:.2f} m/s",
-        "cost of transport": "-" if math.isnan(cost) else f"{cost:.2f}",
-        "return": f"{episodes.earned:.0f} in {episodes.steps * episodes.control_timestep:.1f} s",
-        "pace": f"{pace}, {session.states:.0f} states a second",
-    }
-    error = f'<p role="alert" style="color:#b3261e">{html.escape(session.error)}</p>' if session.error else ""
-    cells = "".join(f"<tr><td>{name}</td><td>{html.escape(value)}</td></tr>" for name, value in rows.items())
-    return f'<div style="font-size:0.85em;padding:0 1em">{error}<table id="status">{cells}</table></div>'
-
-
-def checked(creature: Creature) -> str:
-    """Return what `arc-suite check` says of the body, as HTML."""
-    texts = [flaw.text for flaw in creature.flaws] or [f"{creature.setup.body.name} stands and can take steps"]
-    return f'<ul id="check" style="font-size:0.85em">{"".join(f"<li>{html.escape(text)}</li>" for text in texts)}</ul>'
-
-
-def lines(sketch: Sketch) -> str:
-    """Return the Python lines and the command line that make the same, with buttons that copy them, as HTML."""
-    copy = "const text = this.nextElementSibling; getSelection().selectAllChildren(text);"
-    copy += "navigator.clipboard?.writeText(text.textContent)"  # browsers have it on this machine's own pages alone
-    texts = {"Python": sketches.python_lines(sketch), "command": sketches.command_line(sketch)}
-    return "".join(
-        f'<button onclick="{copy}" style="min-height:24px">Copy {name}</button>'
-        f'<pre style="white-space:pre-wrap;font-size:0.8em">{html.escape(text)}</pre>'
-        for name, text in texts.items()
-    )
+def _listed(chosen: str, names: Iterable[str]) -> list[str]:
+    """Return names for a list to choose from, with the chosen one."""
+    return list(dict.fromkeys((*names, chosen)))

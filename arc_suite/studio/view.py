@@ -18,6 +18,7 @@ _TOLERANCE = 0.01  # of the unit, by which a face may cut into a round shape
 _AROUND = 14.0  # units of ground to each side of the torso, where it is not endless
 _NEAR = 6.0  # units from the edge of that ground, at which it is drawn anew
 _FOLLOW = 0.1  # of the difference, by which the camera follows the height of the ground in a picture
+_SAME = 0.02  # units, by which an arrow may be off
 _GROUND, _LINES, _STEPS = (214, 219, 226), (176, 184, 194), (196, 203, 212)
 
 
@@ -53,6 +54,7 @@ class View:
             self._axes = np.array([creature.parts[index].axis for index, _ in self._hinges])
             self._height = 0.0
             self._draw_ground()
+            self._anchor = self._server.scene.add_frame("/world/markers", show_axes=False)
             self._arrows, self._cylinders = None, {}
 
     def pose(self, qpos: np.ndarray, markers: list[Marker]) -> None:
@@ -74,7 +76,8 @@ class View:
             self._frames[0].position, self._frames[0].wxyz = place, qpos[3:7]
             for (index, _), wxyz in zip(self._hinges, turned, strict=True):
                 self._frames[index].wxyz = wxyz
-            self._mark(markers)
+            self._anchor.position = place * (1.0, 1.0, 0.0)
+            self._mark(markers, place * (1.0, 1.0, 0.0))
 
     def _add(self, name: str, mesh: Mesh, colour: tuple[int, int, int]):
         return self._server.scene.add_mesh_simple(name, mesh.points / self._unit, mesh.triangles, color=colour)
@@ -122,10 +125,13 @@ class View:
         for index, (rgb, meshes) in enumerate(solids.items()):
             self._add(f"/world/ground/solid{index}", shapes.joined(meshes), rgb)
 
-    def _mark(self, markers: list[Marker]) -> None:
-        """Move arrows and cylinders, or draw them anew where there are others."""
+    def _mark(self, markers: list[Marker], anchor: np.ndarray) -> None:
+        """Move arrows and cylinders, or draw them anew where there are others.
+
+        They hang on an anchor (3,), as browsers show a frame's position at once and new points of arrows later.
+        """
         arrows = [marker for marker in markers if marker.shape == "arrow"]
-        points = np.array([(marker.start, marker.end) for marker in arrows]).reshape(-1, 2, 3) / self._unit
+        points = np.array([(marker.start, marker.end) for marker in arrows]).reshape(-1, 2, 3) / self._unit - anchor
         if self._arrows is None or len(self._arrows.points) != len(arrows):
             if self._arrows is not None:
                 self._arrows.remove()
@@ -133,25 +139,25 @@ class View:
             if arrows:
                 radius = arrows[0].radius / self._unit
                 self._arrows = self._server.scene.add_arrows(
-                    "/world/arrows",
+                    "/world/markers/arrows",
                     points,
                     np.array([_rgb(marker.colour[:3]) for marker in arrows]),
                     shaft_radius=radius,
                     head_radius=2.0 * radius,
                     head_length=3.0 * radius,
                 )
-        elif arrows:
+        elif arrows and abs(self._arrows.points - points).max() > _SAME:
             self._arrows.points = points
         cylinders = [marker for marker in markers if marker.shape == "cylinder"]
         shown = {self._style(index, marker): marker for index, marker in enumerate(cylinders)}
         for style in self._cylinders.keys() - shown.keys():
             self._cylinders.pop(style).remove()
         for style, marker in shown.items():
-            middle = 0.5 * (marker.start + marker.end) / self._unit
+            middle = 0.5 * (marker.start + marker.end) / self._unit - anchor
             if style not in self._cylinders:
                 index, radius, height, rgb = style
                 self._cylinders[style] = self._server.scene.add_cylinder(
-                    f"/world/cylinder{index}", radius, height, color=rgb, opacity=0.7, position=middle
+                    f"/world/markers/cylinder{index}", radius, height, color=rgb, opacity=0.7, position=middle
                 )
             self._cylinders[style].position = middle
 

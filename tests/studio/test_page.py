@@ -109,6 +109,12 @@ def test_it_listens_on_this_machine_alone_and_never_asks_for_a_public_address(se
     assert pages._Server.request_share_url is not viser.ViserServer.request_share_url
 
 
+def test_an_address_of_another_machine_is_refused():
+    for host in ("192.0.2.1", "no-such-machine.invalid"):
+        with pytest.raises(ValueError, match=f"^host {host}: cannot listen there: [^\n]+$"):
+            pages.serve(None, host, 8180, print)
+
+
 def test_a_slider_changes_the_creature(served, tab):
     press(tab, "Legs", "ArrowLeft", 2)
     served.until(lambda: served.session.creature.setup.body == generator.generate(6, 2))

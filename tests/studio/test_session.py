@@ -10,6 +10,7 @@ import pytest
 from arc_suite import style
 from arc_suite.envs.episodes import Episodes
 from arc_suite.studio import session as sessions
+from arc_suite.studio import texts
 from arc_suite.studio.creature import load, opened, policy
 from arc_suite.studio.history import History
 from arc_suite.studio.session import Session
@@ -97,6 +98,19 @@ def test_a_bad_combination_is_told_and_the_creature_walks_on():
         session.ask(Sketch(legs=5, links=2))
         shown.until(lambda: session.creature is not before)
         assert session.error == ""
+
+
+def test_texts_of_the_page():
+    """Whatever an error quotes is text, and no markup."""
+    with running() as (session, shown):
+        shown.steps(2)
+        session.ask(Sketch(settings='{"<img src=x>": 1}'))
+        shown.until(lambda: session.error)
+        told = texts.status(session)
+        assert 'role="alert"' in told and "&lt;img src=x&gt;" in told and "<img" not in told
+        assert "walker_6x2, steer" in told and "real time" in told
+        assert "walker_6x2 stands and can take steps" in texts.checked(session.creature)
+        assert "arc-suite view --legs 6 --links 2 --task steer" in texts.copied(session.creature.sketch)
 
 
 def test_a_mistake_of_ours_is_told_too(monkeypatch, capsys):

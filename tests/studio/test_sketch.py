@@ -139,6 +139,7 @@ def test_what_check_says_can_be_applied():
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
         (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
         (Sketch(task="walk", preset="balanced"), "unknown preset 'balanced'"),
+        (Sketch(preset="sighted"), "observation: expected a block scan, as the task rough has"),
         (Sketch(policy="ppo"), "policy ppo: none for walker_8x3-steer"),
     ],
 )
