@@ -31,9 +31,9 @@ def define_body() -> None:
     )
 
 
-def define_task() -> None:
+def define_task(default: str = "walk") -> None:
     """Define --task and --set, for programs that take any task."""
-    flags.DEFINE_string("task", "walk", f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
+    flags.DEFINE_string("task", default, f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
     flags.DEFINE_multi_string(
         "set",
         [],
