@@ -45,6 +45,8 @@ flags.DEFINE_string(
     "both",
     "moving: the root goes as the body walks; in_place: it stays; both: each clip twice.",
 )
+flags.DEFINE_bool("straight", False, "Loops that do not turn go exactly where they are to, and do not veer.")
+flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by inverse kinematics, and do not slide.")
 flags.DEFINE_string("output", None, "File to write, .glb. Required.", short_name="o")
 
 
@@ -66,6 +68,8 @@ def main() -> None:
             FLAGS.preset,
             FLAGS.fps,
             lambda recordings: progress(recordings, "recording", unit="clip", leave=False),
+            straight=FLAGS.straight,
+            plant=FLAGS.plant,
         )
         temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
         metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)

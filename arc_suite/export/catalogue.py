@@ -1,7 +1,11 @@
 """The clips that a body can have, by name."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
+
+from arc_suite.export import acting
+from arc_suite.export.root_motion import Motion, Pose
+from arc_suite.robots.spec import Body
 
 
 class Walk(NamedTuple):
@@ -9,9 +13,11 @@ class Walk(NamedTuple):
 
     Attributes:
         command: forward, left and turning, in units of the task: the body's own speed.
+        failing: index of a leg whose motors fail; None for a sound body.
     """
 
     command: tuple[float, float, float]
+    failing: int | None = None
 
 
 class Passage(NamedTuple):
@@ -28,6 +34,18 @@ class Passage(NamedTuple):
 
 class Idle(NamedTuple):
     """Rest: a breath."""
+
+
+class Acted(NamedTuple):
+    """A motion simulated from rest.
+
+    Attributes:
+        play: makes it of the body and its pose at rest.
+        ends: those at which it has the first pose of idle: 0 and -1.
+    """
+
+    play: Callable[[Body, Pose], Motion]
+    ends: tuple[int, ...]
 
 
 class Showcase(NamedTuple):
@@ -56,10 +74,15 @@ CLIPS = {
     "start": Passage(starts=True, cycles=2),
     "stop": Passage(starts=False, cycles=3),
     "idle": Idle(),
+    "hit": Acted(acting.hit, (0, -1)),
+    "limp": Walk((1.0, 0.0, 0.0), failing=0),
+    "rise": Acted(acting.rise, (-1,)),
+    "death": Acted(acting.death, (0,)),
     "tuned": Showcase("tuned"),
     "refined": Showcase("refined"),
 }
 DEFAULT = ("walk", "slow", "fast", "turn_left", "turn_right", "start", "stop", "idle")
+ADDITIVE = ("hit", "limp")  # to the first pose of idle
 FASTER = {"slow": -1.0, "fast": 1.0}  # than the walk; the sign of the difference that their names promise
 ALL = "all"  # in place of all names
 REST = "rest"  # the recording of a stop, of rest and of a start
@@ -71,6 +94,8 @@ def sources(names: Sequence[str]) -> dict[str, list[str]]:
     for name in names:
         recorded = isinstance(CLIPS[name], Walk | Showcase)
         found.setdefault(name if recorded else REST, []).append(name)
-        if isinstance(CLIPS[name], Passage) or name in FASTER:
+        if isinstance(CLIPS[name], Passage) or name in FASTER or name == "limp":
             found.setdefault("walk", [])
+        if name == "limp":
+            found.setdefault(REST, []).append(name)
     return found

@@ -28,6 +28,7 @@ class Clip(NamedTuple):
         loops: whether the last pose is the first one.
         cycles: of the gait.
         foot_contacts: events, in the order of time.
+        feet: names of all feet.
     """
 
     name: str
@@ -35,6 +36,7 @@ class Clip(NamedTuple):
     loops: bool
     cycles: int
     foot_contacts: tuple[FootContact, ...]
+    feet: tuple[str, ...]
 
     @property
     def times(self) -> np.ndarray:
@@ -54,6 +56,8 @@ def clips(
     preset: str | None = None,
     fps: float = FPS,
     progress: Callable[[Iterable[str]], Iterable[str]] = iter,
+    straight: bool = False,
+    plant: bool = False,
 ) -> list[Clip]:
     """Make clips of a body, all of them by one policy, except the showcases of presets.
 
@@ -74,7 +78,10 @@ def clips(
         policy: see `policies.policy`.
         preset: of the policy; None for the one that suits the task and the body.
         fps: frames a second.
-        progress: wraps the names, such as `tqdm`.
+        progress: wraps the recordings, such as `tqdm`.
+        straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
+            does.
+        plant: whether inverse kinematics keeps feet in stance where they are; without it, they slide as in the physics.
 
     Raises:
         ValueError: no name, an unknown one, a value out of range, a policy that does not fit, or no clip that can be
@@ -89,7 +96,7 @@ def clips(
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
     recorder, left_out = Recorder(setup, policy, preset), {}
-    made = drafts(recorder, names, progress, left_out)
+    made = drafts(recorder, names, progress, left_out, straight, plant)
     told = {name: f"{setup.body.name}, clip {name}" for name in names if name in left_out}
     if len(told) == len(names):
         name = names[0]
@@ -111,4 +118,5 @@ def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
         loops=draft.loops,
         cycles=draft.cycles,
         foot_contacts=tuple(draft.contacts(body)[1]),
+        feet=body.foot_names,
     )

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.export import in_place, loops, root_motion
-from arc_suite.export.catalogue import CLIPS, FASTER, REST, Passage, Showcase, Walk, sources
+from arc_suite import rotations
+from arc_suite.export import in_place, loops, planting, root_motion
+from arc_suite.export.catalogue import CLIPS, FASTER, REST, Acted, Passage, Showcase, Walk, sources
 from arc_suite.export.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
 from arc_suite.export.recorder import Recorded, Recorder, Transition
 from arc_suite.export.root_motion import Motion, Pose
@@ -28,12 +29,14 @@ class Draft(NamedTuple):
         cycles: of the gait; 0 without a gait.
         cycle: s.
         loops: whether its last pose is its first one.
+        stands: whether there is nothing to tell of feet.
     """
 
     motion: Motion
     cycles: int = 0
     cycle: float = math.nan
     loops: bool = True
+    stands: bool = False
 
     @property
     def start(self) -> Pose:
@@ -43,10 +46,14 @@ class Draft(NamedTuple):
     def contacts(self, body: Body) -> tuple[float, list[FootContact]]:
         """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
         heights = sole_heights(compiled(body), body, self.motion.qpos())
-        if not self.cycles:
+        if self.stands:
             return float(np.median(heights)), []
         found, stance = foot_contacts(self.motion, body, heights, self.cycle, self.loops)
         return float(np.median(heights[stance])) if stance.any() else 0.0, found
+
+    def planted(self, body: Body) -> "Draft":
+        """Return the draft with feet in stance that do not slide; see `planting.planted`."""
+        return self._replace(motion=planting.planted(body, self.motion, self.cycle, self.loops))
 
     def grounded(self, body: Body) -> "Draft":
         """Return the draft with soles in stance on the ground."""
@@ -58,6 +65,8 @@ def drafts(
     names: Sequence[str],
     progress: Callable[[Iterable], Iterable],
     left_out: MutableMapping[str, str],
+    straight: bool = False,
+    plant: bool = False,
 ) -> dict[str, Draft]:
     """Record what clips need and return their drafts by name, and those of clips that these connect to.
 
@@ -66,6 +75,8 @@ def drafts(
         names: of `catalogue.CLIPS`.
         progress: wraps the recordings.
         left_out: takes the reasons why clips cannot be made, by name.
+        straight: whether loops that do not turn go exactly where their commands say.
+        plant: whether feet in stance do not slide.
     """
     body, recorded = recorder.body, _recordings(recorder, names, progress, left_out)
     gaits = {name: each for name, each in recorded.items() if name != REST}
@@ -75,8 +86,16 @@ def drafts(
         found |= _in_step(body, {name: gaits[name]}, _MOST_ALONE, loops.CLOSED, left_out)
     _check_commands(found, recorder.units, left_out)
     _check_speeds(found, left_out)
+    if straight:
+        found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}
+    if plant:
+        found = {name: draft.planted(body) for name, draft in found.items()}
     if REST in recorded:
-        found |= _connected(body, recorded[REST], names, found.get("walk"), left_out)
+        found |= _connected(body, recorded[REST], names, found.get("walk"), plant, left_out)
+    if "limp" in found and not {"walk", "idle"} <= found.keys():
+        left_out.setdefault("limp", "there is no walk that it differs from")
+    elif "limp" in found:
+        found["limp"] = _difference(found["limp"], found["walk"], found["idle"].start)
     return found
 
 
@@ -97,7 +116,7 @@ def _recording(recorder: Recorder, source: str) -> Recorded | Transition:
     spec = CLIPS[source]
     if isinstance(spec, Showcase):
         return recorder.showcase(spec.preset)
-    return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(spec.command)
+    return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(spec.command, spec.failing)
 
 
 def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: float, left_out) -> dict[str, Draft]:
@@ -115,6 +134,13 @@ def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: flo
         begin = _first_touchdown(body, draft) if each.phase is None else each.wait(first)
         found[name] = draft._replace(motion=draft.motion.begun(begin)).grounded(body)
     return found
+
+
+def _straight(name: str, motion: Motion) -> Motion:
+    """Return a loop that goes where its command says, unless that is a turn."""
+    spec = CLIPS[name]
+    forward, left, turning = spec.command if isinstance(spec, Walk) else (1.0, 0.0, 0.0)
+    return motion if turning else loops.straightened(motion, math.atan2(left, forward))
 
 
 def _first_touchdown(body: Body, draft: Draft) -> int:
@@ -148,24 +174,63 @@ def _check_speeds(found: dict[str, Draft], left_out) -> None:
 
 
 def _connected(
-    body: Body, transition: Transition, names: Sequence[str], walk: Draft | None, left_out
+    body: Body, transition: Transition, names: Sequence[str], walk: Draft | None, plant: bool, left_out
 ) -> dict[str, Draft]:
-    """Return the draft of idle, and of stop and start where they are asked for, which meet the walk and idle."""
+    """Return the draft of idle, and of the clips that connect to it where they are asked for."""
+    rest = root_motion.standing(transition.recorded.recording, transition.start, 1).pose(0)
+    idle = Draft(in_place.idle(body, rest), stands=True).grounded(body)
+    found = {"idle": idle}
+    for name in names:
+        try:
+            match CLIPS[name]:
+                case Acted() as spec:
+                    found[name] = _acted(body, spec, rest, idle.start)
+                case Passage() as spec:
+                    draft = _passage(body, spec, transition, idle.start, walk)
+                    found[name] = draft.planted(body) if plant else draft
+        except ValueError as error:
+            left_out[name] = str(error)
+    return found
+
+
+def _acted(body: Body, spec: Acted, rest: Pose, idle: Pose) -> Draft:
+    """Return a motion simulated from the pose at rest, which meets idle; see `Acted`."""
+    motion = spec.play(body, rest).lowered(rest.position[2] - idle.position[2])
+    for end in spec.ends:
+        motion = motion.ending(idle, end, len(motion.joints) // 3)
+    return Draft(motion, loops=False, stands=True)
+
+
+def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk: Draft | None) -> Draft:
+    """Return a stop or a start, which meets idle and the walk.
+
+    Raises:
+        ValueError: there is no walk.
+    """
+    if walk is None:
+        raise ValueError("there is no walk that it connects to")
     recorded = transition.recorded
     cycle = round(recorded.cycle / recorded.recording.step)
-    rest = root_motion.standing(recorded.recording, transition.start, 1).pose(0)
-    found = {"idle": Draft(in_place.idle(body, rest)).grounded(body)}
-    for name in names:
-        spec = CLIPS[name]
-        if isinstance(spec, Passage) and walk is None:
-            left_out[name] = "there is no walk that it connects to"
-        elif isinstance(spec, Passage):
-            first = transition.start if spec.starts else transition.stop
-            samples = spec.cycles * cycle - transition.late * spec.starts
-            motion = root_motion.passage(recorded.recording, first, samples, cycle)
-            draft = Draft(motion, spec.cycles, recorded.cycle, loops=False).grounded(body)
-            ends = {0 if spec.starts else -1: found["idle"].start, -1 if spec.starts else 0: walk.start}
-            for end, pose in ends.items():
-                draft = draft._replace(motion=draft.motion.meeting(pose, end, cycle))
-            found[name] = draft
-    return found
+    first = transition.start if spec.starts else transition.stop
+    samples = spec.cycles * cycle - transition.late * spec.starts
+    motion = root_motion.passage(recorded.recording, first, samples, cycle)
+    draft = Draft(motion, spec.cycles, recorded.cycle, loops=False).grounded(body)
+    still, going = (0, -1) if spec.starts else (-1, 0)
+    motion = draft.motion.meeting(idle, still, cycle).meeting(walk.start, going, cycle)
+    return draft._replace(motion=motion)
+
+
+def _difference(draft: Draft, usual: Draft, pose: Pose) -> Draft:
+    """Return how a loop differs from another in step with it, added to a pose; its root stays."""
+    times = np.linspace(0.0, usual.motion.seconds, len(usual.motion.joints))
+    motion, same = draft.motion.at(times * draft.motion.seconds / usual.motion.seconds), usual.motion
+    turns = rotations.product(motion.quaternions, same.quaternions * (1.0, -1.0, -1.0, -1.0))
+    motion = motion._replace(
+        step=same.step,
+        root=np.zeros_like(same.root),
+        positions=pose.position + motion.positions - same.positions,
+        quaternions=rotations.product(turns, np.broadcast_to(pose.quaternion, turns.shape)),
+        joints=pose.joints + motion.joints - same.joints,
+        twist=np.zeros(3),
+    )
+    return draft._replace(motion=motion, cycle=usual.cycle, stands=True)

@@ -119,12 +119,23 @@ class Motion(NamedTuple):
         from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
         error = relative(self.root[end], wanted) * (1.0, 1.0, 0.0)
         error[2] = rotations.wrapped(wanted[2] - self.root[end, 2])
-        root = after(self.root, _fading(from_end / (count - 1))[:, None] * error)
+        root = after(self.root, fading(from_end / (count - 1))[:, None] * error)
         motion = self.on_root(root)
-        motion = motion._replace(root=relative(root[0], root))
-        difference = pose.relative(motion.pose(end))
-        met = motion.moved(difference, _fading(from_end / samples))
-        return met._replace(twist=logarithm(met.root[-1]) / met.seconds, seam=max(self.seam, seam(difference)))
+        root = relative(root[0], root)
+        return motion._replace(root=root, twist=logarithm(root[-1]) / motion.seconds).ending(pose, end, samples)
+
+    def ending(self, pose: Pose, end: int, samples: int) -> Self:
+        """Return the motion with a pose at one of its ends, on the same path of the root.
+
+        Args:
+            pose: to end with.
+            end: 0 or -1.
+            samples: next to the end, over which the difference of the poses fades.
+        """
+        count, difference = len(self.joints), pose.relative(self.pose(end))
+        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
+        met = self.moved(difference, fading(from_end / samples))
+        return met._replace(seam=max(self.seam, seam(difference)))
 
     def part(self, first: int, samples: int) -> "Motion":
         """Return a part of the motion, `samples` after the first one, whose root starts at 0."""
@@ -162,6 +173,12 @@ def seam(difference: Pose) -> float:
     """Return the size of a difference of poses, rad: the largest of joint angles and the torso's turn."""
     turn = 2.0 * np.arctan2(np.linalg.norm(difference.quaternion[1:]), abs(difference.quaternion[0]))
     return float(max(abs(difference.joints).max(), turn))
+
+
+def fading(share: np.ndarray) -> np.ndarray:
+    """Return weights that fall smoothly from 1 at 0 to 0 at 1 and beyond."""
+    share = share.clip(0.0, 1.0)
+    return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
 def places(qpos) -> np.ndarray:
@@ -211,12 +228,6 @@ def on_root(step: float, qpos, root, local) -> Motion:
 def _place(pose: Pose) -> np.ndarray:
     """Return where the torso is in the root's frame, seen from above, (3,)."""
     return np.append(pose.position[:2], rotations.yaw(pose.quaternion))
-
-
-def _fading(share: np.ndarray) -> np.ndarray:
-    """Return weights that fall smoothly from 1 at 0 to 0 at 1 and beyond."""
-    share = share.clip(0.0, 1.0)
-    return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
 def _inverse(quaternion) -> np.ndarray:

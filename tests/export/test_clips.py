@@ -283,6 +283,43 @@ def test_clips_connect(robot):
 
 
 @pytest.mark.parametrize("robot", EACH)
+def test_the_sidecar_has_blend_spaces_and_tells_missing_steps(robot):
+    body, clips = ROBOTS[robot], list(made(robot).values())
+    told = export.sidecar(body, clips)
+    for space, axis in (("turning", "turn_rate"), ("strafing", "left_speed")):
+        assert told["blend"][space]["axes"] == [axis, "forward_speed"]
+        for point in told["blend"][space]["points"]:
+            figures = told["clips"][point["animation"]]
+            assert point["at"] == [figures[axis], figures["forward_speed"]]
+    names = {space: [each["animation"] for each in found["points"]] for space, found in told["blend"].items()}
+    assert names == {"turning": ["walk_loop", "turn_left_loop", "idle_loop"], "strafing": ["walk_loop", "idle_loop"]}
+    assert told["clips"]["walk_loop"]["missing_steps"] == {}
+    walk = made(robot)["walk"]
+    lame = walk._replace(foot_contacts=tuple(e for e in walk.foot_contacts if e.foot != body.foot_names[1]))
+    assert export.sidecar(body, [lame])["clips"]["walk_loop"]["missing_steps"] == {body.foot_names[1]: 1}
+
+
+@pytest.mark.slow
+def test_what_is_played_from_rest_begins_or_ends_with_idle():
+    clips = made("tick", "idle", "hit", "limp", "rise", "death")
+    rest, body = clips["idle"].motion.pose(0), ROBOTS["tick"]
+    for name, ends in (("hit", (0, -1)), ("rise", (-1,)), ("death", (0,))):
+        for end in ends:
+            for one, other in zip(clips[name].motion.pose(end), rest, strict=True):
+                np.testing.assert_allclose(one, other, atol=1e-6)
+        assert not clips[name].loops and not clips[name].moves
+    heights = {name: clip.motion.positions[:, 2] / rest.position[2] for name, clip in clips.items()}
+    assert heights["death"][-1] < 0.6 and heights["rise"][0] < 0.6
+    assert np.ptp(clips["hit"].motion.positions[:, 0]) > 0.05 * body.torso.standing_height
+    told = export.sidecar(body, list(clips.values()))["clips"]
+    assert {name for name, figures in told.items() if "additive_to" in figures} == {"hit", "limp_loop"}
+    # The failing leg moves less than it does in the walk, so that the difference undoes its steps.
+    walk, limp = made("tick")["walk"].motion.joints, clips["limp"].motion.joints
+    swing = [np.ptp(joints[:, :3], axis=0).max() for joints in (walk, walk + limp[: len(walk)] - rest.joints)]
+    assert swing[1] < 0.5 * swing[0]
+
+
+@pytest.mark.parametrize("robot", EACH)
 def test_clips_last_whole_frames(robot):
     for clip in made(robot).values():
         assert clip.motion.seconds * 30.0 == pytest.approx(round(clip.motion.seconds * 30.0), abs=1e-9)
