@@ -12,7 +12,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
 from arc_suite.robots import ROBOTS, generator, spec_files
-from arc_suite.robots.spec import Body
+from arc_suite.robots.spec import PALETTES, Body
 from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
@@ -22,13 +22,19 @@ ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
 
 
 def define_body() -> None:
-    """Define --spec, --legs and --links, for programs that take any body."""
+    """Define --spec, --legs, --links, --length and --palette, for programs that take any body."""
     examples = ", ".join(spec_files.EXAMPLES)
     flags.DEFINE_string("spec", None, f"A body in place of a robot: a JSON file, or one of {examples}.")
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
     flags.DEFINE_integer(
         "links", None, "Actuated links of each leg of a body made to order. [default: 3]", *generator.LINKS
     )
+    flags.DEFINE_multi_string(
+        "length",
+        [],
+        "Factor on the length of a link of a spec or body made to order: --length lower=1.5; repeatable.",
+    )
+    flags.DEFINE_string("palette", None, f"Colours of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
 
 
 def define_task(default: str = "walk") -> None:
@@ -81,19 +87,29 @@ def policy_name(name: str) -> str:
 
 
 def made_body() -> Body | None:
-    """Return the body that --spec or --legs ask for, or None.
+    """Return the body that --spec or --legs ask for, as --length and --palette shape it, or None.
 
     Raises:
-        ValueError: both are given, or --links without --legs, or no body in the file.
+        ValueError: both are given, or --links, --length or --palette without them, or no body in the file.
         OSError: the file cannot be read.
     """
     if FLAGS.spec is not None and FLAGS.legs is not None:
         raise ValueError("expected one of --spec and --legs, got both")
     if FLAGS.links is not None and FLAGS.legs is None:
         raise ValueError(f"--links={FLAGS.links}: goes with --legs")
+    if FLAGS.spec is None and FLAGS.legs is None:
+        for name in ("length", "palette"):
+            if FLAGS[name].present:
+                raise ValueError(f"--{name}: goes with --spec or --legs")
+        return None
     if FLAGS.spec is not None:
-        return spec_files.load_body(FLAGS.spec)
-    return FLAGS.legs and generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
+        body = spec_files.load_body(FLAGS.spec)
+    else:
+        body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
+    if FLAGS.length:
+        body = generator.stretched(body, named_values("length", FLAGS.length))
+    palette = FLAGS.palette
+    return body if palette is None else body.replace(palette=int(palette) if palette.isdecimal() else palette)
 
 
 def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
@@ -115,8 +131,8 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
         return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
     if robot.present:
         raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
-    for flaw in flaws(body) if FLAGS.spec is not None else ():
-        warnings.warn(f"{FLAGS.spec}: {flaw.text}", stacklevel=2)
+    for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
+        warnings.warn(f"{FLAGS.spec or body.name}: {flaw.text}", stacklevel=2)
     return {body.name: body}
 
 
