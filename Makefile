@@ -11,7 +11,7 @@
 # make web     bundles the viewer that pages are made of, and three.js; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
-# make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
+# make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3; the sample project is linted
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
 # make check-agents-release  the same for every algorithm, and for studies that are killed
@@ -152,6 +152,10 @@ check-blender: $(INSTALLED)
 	.venv-blender/bin/python tests/engines/blender.py $(ENGINES)
 
 check-godot: $(INSTALLED)
+	tools/ensure_venv.sh .venv-godot
+	.venv-godot/bin/python -m pip install -q gdtoolkit==4.5.0
+	.venv-godot/bin/gdlint examples/godot
+	.venv-godot/bin/gdformat --check examples/godot
 	command -v godot3-server >/dev/null || tools/ensure_packages.sh godot3-server
 	$(PYTHON) tests/engines/make_files.py $(ENGINES) few
 	$(PYTHON) tests/engines/godot.py $(ENGINES)
