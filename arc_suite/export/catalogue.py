@@ -71,7 +71,7 @@ CLIPS = {
     "strafe_left": Walk((0.0, 0.5, 0.0)),
     "strafe_right": Walk((0.0, -0.5, 0.0)),
     "back": Walk((-0.5, 0.0, 0.0)),
-    "start": Passage(starts=True, cycles=2),
+    "start": Passage(starts=True, cycles=3),
     "stop": Passage(starts=False, cycles=3),
     "idle": Idle(),
     "hit": Acted(acting.hit, (0, -1)),

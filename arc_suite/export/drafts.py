@@ -18,6 +18,7 @@ from arc_suite.simulation.model import compiled
 _MOST_CYCLES = 4  # of loops that stay in step
 _MOST_ALONE = 12  # of a loop with a gait of its own
 _FOLLOWS = 0.25  # of its command's velocity, that a loop has at least
+_FAR = np.radians(20.0)  # from the pose of a clip, from which a stop or a start is not made to meet it
 _APART = 1.1  # ratio of the speeds of two clips, one of which is called faster
 
 
@@ -205,7 +206,7 @@ def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk
     """Return a stop or a start, which meets idle and the walk.
 
     Raises:
-        ValueError: there is no walk.
+        ValueError: there is no walk, or its pose is far from that of the passage.
     """
     if walk is None:
         raise ValueError("there is no walk that it connects to")
@@ -217,6 +218,8 @@ def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk
     draft = Draft(motion, spec.cycles, recorded.cycle, loops=False).grounded(body)
     still, going = (0, -1) if spec.starts else (-1, 0)
     motion = draft.motion.meeting(idle, still, cycle).meeting(walk.start, going, cycle)
+    if motion.seam > _FAR:
+        raise ValueError(f"its pose is {np.degrees(motion.seam):.0f} degrees from that of the walk or of idle")
     return draft._replace(motion=motion)
 
 

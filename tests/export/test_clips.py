@@ -14,7 +14,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite import export, policies
 from arc_suite.envs.setup import Setup
-from arc_suite.export import foot_contacts, recordings
+from arc_suite.export import drafts, foot_contacts, recordings
 from arc_suite.export.catalogue import CLIPS, Walk
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import policy
@@ -317,6 +317,14 @@ def test_what_is_played_from_rest_begins_or_ends_with_idle():
     walk, limp = made("tick")["walk"].motion.joints, clips["limp"].motion.joints
     swing = [np.ptp(joints[:, :3], axis=0).max() for joints in (walk, walk + limp[: len(walk)] - rest.joints)]
     assert swing[1] < 0.5 * swing[0]
+
+
+@pytest.mark.slow
+def test_what_is_too_far_from_the_walk_is_left_out(monkeypatch):
+    monkeypatch.setattr(drafts, "_FAR", 1e-6)
+    with pytest.warns(UserWarning, match="^tick, clip stop is left out: its pose is 0 degrees from that of the walk"):
+        (walk,) = export.clips(Setup.of("tick", "steer"), ["walk", "stop"])
+    assert walk.name == "walk"
 
 
 @pytest.mark.parametrize("robot", EACH)
