@@ -28,6 +28,7 @@ TASKED = (
     "tune_cpg",
     "train",
     "survey",
+    "design",
     "enter",
 )
 WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export", "design")
