@@ -21,19 +21,19 @@ LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
 # elevation above the horizontal in degrees. The first link sweeps, the others bend.
-_PROFILES = {
+PROFILES = {
     1: ((1.0, -50.0),),
     2: ((0.3, 5.0), (0.7, -55.0)),
     3: ((0.25, 10.0), (0.35, -30.0), (0.4, -80.0)),
     4: ((0.2, 10.0), (0.25, 15.0), (0.25, -35.0), (0.3, -80.0)),
 }
-_LINK_NAMES = {
+LINK_NAMES = {
     1: ("upper",),
     2: ("upper", "lower"),
     3: ("upper", "middle", "lower"),
     4: ("upper", "middle", "lower", "toe"),
 }
-_JOINT_NAMES = ("hip", "knee", "ankle", "toe")
+JOINT_NAMES = ("hip", "knee", "ankle", "toe")
 
 _HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-45.0, 45.0))
 _BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
@@ -53,7 +53,7 @@ class _Proportions(NamedTuple):
         half_length, half_width: of the torso, m.
         thickness: half of it, of the height.
         fan: degrees by which the first pair of legs points forward and the last one backward.
-        profile: of every leg; see `_PROFILES`.
+        profile: of every leg; see `PROFILES`.
         reaches: of each pair, or of each leg around a torso: from mount to foot, seen from above, of
             the height.
     """
@@ -90,7 +90,7 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
         half_length = half_width = _SPACING * _HEIGHT * legs / (2.0 * math.pi)
     else:
         half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
-    proportions = _Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, _PROFILES[links], (_REACH,) * legs)
+    proportions = _Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
     return _body(f"walker_{legs}x{links}", legs, layout, proportions)
 
 
@@ -141,7 +141,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         fan=random.uniform(15.0, 45.0),
         profile=[
             (share * random.uniform(0.8, 1.2), elevation + random.uniform(-8.0, 8.0))
-            for share, elevation in _PROFILES[links]
+            for share, elevation in PROFILES[links]
         ],
         reaches=tuple(map(float, reaches)),
     )
@@ -242,33 +242,43 @@ def _check_layout(layout: str | None, legs: int) -> str:
 def _body(name: str, legs: int, layout: str, proportions: _Proportions) -> Body:
     p = proportions
     if layout == "radial":
-        all_legs = _around(legs, p)
+        places = around(legs, 0.8 * p.half_length, 0.8 * p.half_width)
+        all_legs = tuple(_leg(f"leg{i + 1}", *place, p.reaches[i], p) for i, place in enumerate(places))
     else:
-        left = _left_side(legs // 2, p)
+        places = left_side(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
+        left = tuple(_leg(f"l{i + 1}", *place, p.reaches[i], p) for i, place in enumerate(places))
         all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
     size = (p.half_length, p.half_width, p.thickness * p.height)
     chassis = Solid(name="chassis", shape="ellipsoid", size=size)
     return Body(name=name, torso=Torso(standing_height=p.height, solids=(chassis,)), legs=all_legs)
 
 
-def _left_side(pairs: int, p: _Proportions) -> tuple[Leg, ...]:
-    legs = []
-    for i in range(pairs):
-        along = 1.0 - 2.0 * i / (pairs - 1)  # 1 for the first leg, -1 for the last one
-        mount = (0.8 * p.half_length * along, 0.6 * p.half_width, 0.0)
-        legs.append(_leg(f"l{i + 1}", mount, 90.0 - p.fan * along, p.reaches[i], p))
-    return tuple(legs)
+def left_side(pairs: int, along: float, across: float, fan: float) -> list[tuple[Vector, float]]:
+    """Return mounts and headings, degrees, of the legs on the left of a long torso, the first in front.
+
+    Args:
+        pairs: number of legs, at least 2.
+        along: of the first mount in front of the middle, m.
+        across: of the mounts left of it, m.
+        fan: degrees by which the first leg points forward and the last one backward.
+    """
+    shares = [1.0 - 2.0 * i / (pairs - 1) for i in range(pairs)]
+    return [((along * share, across, 0.0), 90.0 - fan * share) for share in shares]
 
 
-def _around(legs: int, p: _Proportions) -> tuple[Leg, ...]:
-    # An even number leaves the front free, so that both sides have as many.
+def around(legs: int, along: float, across: float) -> list[tuple[Vector, float]]:
+    """Return mounts and headings, degrees, of legs all around a torso, counter-clockwise.
+
+    An even number leaves the front free, so that both sides have as many.
+
+    Args:
+        legs: their number.
+        along: half-axis forward of the ellipse of mounts, m.
+        across: the same to the left.
+    """
     start = 0.0 if legs % 2 else 180.0 / legs
-    all_legs = []
-    for i in range(legs):
-        heading = (start + 360.0 * i / legs + 180.0) % 360.0 - 180.0
-        mount = (0.8 * p.half_length * _cos(heading), 0.8 * p.half_width * _sin(heading), 0.0)
-        all_legs.append(_leg(f"leg{i + 1}", mount, heading, p.reaches[i], p))
-    return tuple(all_legs)
+    headings = [(start + 360.0 * i / legs + 180.0) % 360.0 - 180.0 for i in range(legs)]
+    return [((along * _cos(heading), across * _sin(heading), 0.0), heading) for heading in headings]
 
 
 def _leg(name: str, mount: Vector, heading: float, reach: float, p: _Proportions) -> Leg:
@@ -281,9 +291,9 @@ def _leg(name: str, mount: Vector, heading: float, reach: float, p: _Proportions
     for i, (share, elevation) in enumerate(p.profile):
         # Links lie in the y-z plane of the first link's frame, which the leg's yaw turns outwards.
         end = (0.0, out * share * _cos(elevation), down * share * _sin(elevation))
-        joint = (_HIP if i == 0 else _BEND).replace(name=_JOINT_NAMES[i])
+        joint = (_HIP if i == 0 else _BEND).replace(name=JOINT_NAMES[i])
         radius = 0.8 * foot_radius * (1.0 + 0.35 * (links - 1 - i))  # thinner than the foot, so that the foot touches
-        chain.append(Link(name=_LINK_NAMES[links][i], end=end, radius=radius, joint=joint))
+        chain.append(Link(name=LINK_NAMES[links][i], end=end, radius=radius, joint=joint))
     return Leg(name=name, mount=mount, links=tuple(chain), foot=Foot(radius=foot_radius), yaw_deg=heading - 90.0)
 
 

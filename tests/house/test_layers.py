@@ -52,6 +52,7 @@ THIRD_PARTY = {
     "robots": set(),
     "robots.generator": {"numpy"},
     "robots.mirror": {"numpy"},
+    "robots.varied": {"numpy"},
     "arenas": {"numpy", "dm_control"},
     "arenas.arena": {"dm_control"},
     "models": {"numpy", "mujoco", "dm_control"},
