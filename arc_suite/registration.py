@@ -20,6 +20,8 @@ from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
 
+BODIES = "bodies"  # in place of a robot in ids of environments of different bodies
+
 
 def register(
     *,
@@ -99,6 +101,8 @@ def _task_name(task) -> str:
 def _register_body(body, parameters, presets, visuals) -> None:
     if not isinstance(body, Body):
         raise ValueError(f"body: expected a spec.Body, got {body!r}")
+    if body.name == BODIES:
+        raise ValueError(f"robot {BODIES!r}: ids of environments of different bodies have this name; choose another")
     if ROBOTS.get(body.name, body) != body:
         raise ValueError(f"robot {body.name!r} is already registered")
     for task, given in parameters.items():
@@ -131,7 +135,8 @@ def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, An
 def register_ids() -> None:
     """Register `arc_suite/<robot>-<task>-v<version>` with Gymnasium for every pair that has no id yet.
 
-    The adapters are imported when an environment is made.
+    `bodies` in place of a robot is for `gymnasium.make_vec` alone: environments of different bodies. The adapters
+    are imported when an environment is made.
     """
     for domain_name, task_name in registry.all_tasks():
         env_id = registry.env_id(domain_name, TASKS[task_name])
@@ -145,4 +150,12 @@ def register_ids() -> None:
                     "domain_name": registry.importable("domain", domain_name),
                     "task_name": registry.importable("task", task_name),
                 },
+            )
+    for task_name, task in TASKS.items():
+        env_id = registry.env_id(BODIES, task)
+        if env_id not in gymnasium.registry:
+            gymnasium.register(
+                env_id,
+                vector_entry_point="arc_suite.envs.bodies:BodiesEnv",
+                kwargs={"task_name": registry.importable("task", task_name)},
             )

@@ -223,13 +223,17 @@ class Task(ABC):
 
     def cleared(self, readings: Readings) -> np.ndarray:
         """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
-        radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
-        clear = radii + _CLEAR * self.scene.body.torso.standing_height
         numpy = readings.foot_heights.__array_namespace__()
-        rise = (clear - readings.foot_heights).max(axis=-1).clip(0.0)
+        rise = (self.clearances - readings.foot_heights).max(axis=-1).clip(0.0)
         x, y, z = (readings.torso_position[..., i] for i in range(3))
         position = numpy.stack([x, y, z + rise], axis=-1)
         return numpy.concatenate([position, readings.torso_quaternion, readings.joint_angles], axis=-1)
+
+    @functools.cached_property
+    def clearances(self) -> np.ndarray:
+        """(legs,) heights of the feet's centres at which a start leaves them clear of the ground, m."""
+        radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
+        return radii + _CLEAR * self.scene.body.torso.standing_height
 
     @abstractmethod
     def begin(self, memory, readings: Readings) -> Any:
