@@ -2,65 +2,22 @@
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks, registry
-from arc_suite.envs import snapshots, stacked
+from arc_suite.envs import snapshots
 from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.groups import Group, Member, Place, grouped, scatter
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.together import Together
-from arc_suite.envs.vector import VectorEnv
-from arc_suite.simulation.batch import layout
-from arc_suite.tasks import Task, tokens
+from arc_suite.tasks import tokens
 from arc_suite.tasks.tokens import Description, Tokens
-
-
-class Member(NamedTuple):
-    """The task of an environment, and the model of its simulation."""
-
-    task: Task
-    model: mujoco.MjModel
-
-
-class Group(VectorEnv):
-    """Environments in one batch: of one body, or of bodies whose models have one layout and whose tasks can be stacked.
-
-    Each is bit-equal to an environment of its body in a `VectorEnv`.
-    """
-
-    def __init__(self, members: Sequence[Member], task_name: str, **options):
-        """Allocate an environment for each member; for the options see `VectorEnv`."""
-        self._members = members
-        super().__init__(None, task_name, len(members), **options)
-
-    def _prepared(self):
-        tasks, models = zip(*self._members, strict=True)
-        self._stacked = any(task is not tasks[0] for task in tasks)
-        if not self._stacked:
-            return tasks[0], list(tasks), models[0]
-        return stacked.stacked(tasks), list(tasks), list(models)
-
-    def _part(self, mask: np.ndarray) -> Task:
-        return stacked.part(self._task, np.flatnonzero(mask)) if self._stacked and not mask.all() else self._task
-
-
-class Place(NamedTuple):
-    """A group, with the indices of its environments among all, and how their observations become tokens."""
-
-    group: Group
-    indices: np.ndarray
-    tokens: Tokens
-
-    def observed(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the tokens of observation vectors of all environments of the group."""
-        return self.tokens.observed(self.group.task.split(vectors))
 
 
 class BodiesEnv(Together):
@@ -121,11 +78,12 @@ class BodiesEnv(Together):
         given = bodies if isinstance(bodies, list | tuple) else [bodies]
         found = list(itertools.chain.from_iterable(map(registry.bodies_of, given)))
         num_envs = checks.integer("num_envs", num_envs, 1)
-        if not 1 <= len(found) <= num_envs:
+        if not found:
+            raise ValueError(f"bodies: expected at least one, got {bodies!r}")
+        if len(found) > num_envs:
             raise ValueError(f"num_envs: expected at least one for each of {len(found)} bodies, got {num_envs}")
         for body in found:
             tokens.slots(body)
-        self.bodies = tuple(itertools.islice(itertools.cycle(found), num_envs))
         settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
         checks.name(settings["actions"], ["position"], "actions of different bodies")
         seed = settings.pop("random", None)
@@ -139,16 +97,18 @@ class BodiesEnv(Together):
             "height": height,
             "camera_id": camera_id,
         }
-        members = {body: Member(*prepared(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
-        self.tasks = tuple(members[body].task for body in self.bodies)
-        self.num_envs = num_envs
-        for indices in _grouped([members[body] for body in self.bodies]):
-            group = Group([members[self.bodies[index]] for index in indices], task_name, **options)
-            self._places.append(Place(group, np.array(indices), Tokens.of([self.tasks[i] for i in indices])))
+        made = {body: Member(*prepared(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
+        which_body = [index % len(found) for index in range(num_envs)]
+        members = [made[body] for body in found]
+        self.num_envs, self.bodies = num_envs, tuple(found[which] for which in which_body)
+        self.tasks = tuple(members[which].task for which in which_body)
+        for indices in grouped([members[which] for which in which_body]):
+            group = Group([members[which_body[index]] for index in indices], task_name, **options)
+            self._places.append(Place(group, np.array(indices), Tokens.of([self.tasks[index] for index in indices])))
         first = self._places[0].group
         self.autoreset_mode, self.metadata, self.render_mode = first.autoreset_mode, first.metadata, render_mode
-        described = {body: tokens.described(member.task) for body, member in members.items()}
-        columns = zip(*(described[body] for body in self.bodies), strict=True)
+        described = [tokens.described(member.task) for member in members]
+        columns = zip(*(described[which] for which in which_body), strict=True)
         self.description = Description(*map(np.stack, columns))
         sizes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
         boxes = {name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()}
@@ -198,8 +158,8 @@ class BodiesEnv(Together):
                 place.tokens.actions(actions[indices])
             )
             if "final_obs" in own:
-                own["final_obs"] = _final(place, own["final_obs"])
-            _scatter(info, own, indices, self.num_envs)
+                own["final_obs"] = place.last(own["final_obs"])
+            scatter(info, own, indices, self.num_envs)
         return self._observed(), reward, terminated, truncated, info
 
     def own_observations(self) -> tuple[np.ndarray, ...]:
@@ -346,39 +306,6 @@ class FlatBodies(gymnasium.vector.VectorWrapper):
 def _of_tasks(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings of a task, without that of its driver."""
     return {name: value for name, value in settings.items() if name != "on_divergence"}
-
-
-def _grouped(members: Sequence[Member]) -> list[list[int]]:
-    """Indices of environments that share a batch."""
-    groups: dict[Any, list[int]] = {}
-    keys: dict[int, Any] = {}
-    for index, (task, model) in enumerate(members):
-        if id(task) not in keys:
-            kind = stacked.kind(task)
-            keys[id(task)] = id(task) if kind is None else (kind, layout(model))
-        groups.setdefault(keys[id(task)], []).append(index)
-    return list(groups.values())
-
-
-def _final(place: Place, vectors: np.ndarray) -> np.ndarray:
-    """Last observations of episodes, objects (environments,), as tokens by name."""
-    found = np.full(len(vectors), None, object)
-    for index, vector in enumerate(vectors):
-        if vector is not None:
-            blocks = place.group.task.split(vector[None])
-            found[index] = {name: array[0] for name, array in place.tokens.part([index]).observed(blocks).items()}
-    return found
-
-
-def _scatter(info: dict, own: Mapping[str, Any], indices: np.ndarray, count: int) -> None:
-    """Put the info of some environments into that of all."""
-    for name, value in own.items():
-        if isinstance(value, dict):
-            _scatter(info.setdefault(name, {}), value, indices, count)
-            continue
-        if name not in info:
-            info[name] = np.full(count, None, object) if value.dtype == object else np.zeros(count, value.dtype)
-        info[name][indices] = value
 
 
 def _flat(array: np.ndarray) -> np.ndarray:

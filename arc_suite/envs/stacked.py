@@ -14,16 +14,6 @@ from arc_suite.envs import trees
 from arc_suite.tasks.clock import Clock, Clocks
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.modified import Modified
-from arc_suite.tasks.suite import Limp, Shoved, Steer
-from arc_suite.tasks.walk import Walk
-
-# Cached attributes that follow from the body, of classes of tasks. A class that is not here is not stacked: one that
-# inherits from them may add others.
-_FROM_BODY: dict[type[Task], tuple[str, ...]] = {
-    Walk: ("clock", "clearances", "_torques"),
-    **dict.fromkeys((Steer, Shoved, Limp), ("clock", "clearances", "_torques", "context")),
-    Modified: ("gains", "reach", "noises"),
-}
 
 _EQUAL = ("weights",)  # fields that tasks of one kind share
 _AGAINST_FEET = ("stance_threshold",)  # numbers that are compared with those of every foot
@@ -32,7 +22,7 @@ _AGAINST_FEET = ("stance_threshold",)  # numbers that are compared with those of
 def kind(task: Task) -> Hashable | None:
     """Return what tasks have in common that can be stacked; None for a task that cannot."""
     inner = task.task if isinstance(task, Modified) else task
-    if type(inner) not in _FROM_BODY or type(task) not in _FROM_BODY:
+    if not all(vars(type(each)).get("from_body") for each in (task, inner)):  # of the class itself
         return None
     scene = task.scene
     return type(task), type(inner), repr(scene.layout), scene.arena, tuple(task.settings.weights.items())
@@ -57,7 +47,7 @@ def part(task: Task, indices: np.ndarray) -> Task:
 
 def _names(task: Task) -> tuple[str, ...]:
     inner = ("task",) if isinstance(task, Modified) else ()
-    return ("settings", "step_limit", "standing", "control_timestep", *inner, *_FROM_BODY[type(task)])
+    return ("settings", "step_limit", "standing", "control_timestep", *inner, *task.from_body)
 
 
 def _value(task: Task, name: str) -> Any:
@@ -69,7 +59,7 @@ def _with_values(task: Task, values: dict[str, Any]) -> Task:
     fields = {field.name for field in dataclasses.fields(task)}
     made = dataclasses.replace(task, scene=scene, **{name: values[name] for name in values if name in fields})
     # In the places of cached properties, which would follow from one body.
-    made.__dict__.update({name: values[name] for name in _FROM_BODY[type(task)]})
+    made.__dict__.update({name: values[name] for name in task.from_body})
     return made
 
 

@@ -122,6 +122,9 @@ class Task(ABC):
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
+        from_body: cached attributes with numbers that follow from the body. With these and the settings stacked along a
+            leading axis, its functions serve a batch of different bodies. A class that inherits declares its own, as
+            it may have further ones; without it, each body has a batch of its own.
     """
 
     scene: Scene
@@ -136,6 +139,7 @@ class Task(ABC):
     modifiers: ClassVar[Mapping[str, Any]] = {}
     actions: ClassVar[str] = "torque"
     demonstrators: ClassVar[tuple[str, ...]] = ()
+    from_body: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     @abstractmethod

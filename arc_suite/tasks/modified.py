@@ -132,6 +132,8 @@ class Modified(Task):
         changes: what is changed of it.
     """
 
+    from_body = ("gains", "reach", "noises")
+
     task: Task = dataclasses.field(kw_only=True)
     changes: Modifiers = dataclasses.field(kw_only=True)
 

@@ -70,7 +70,7 @@ class Memory(NamedTuple):
 class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
-    name = "walk"
+    name, from_body = "walk", ("clock", "clearances", "_torques")
 
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:

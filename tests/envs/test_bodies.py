@@ -53,9 +53,9 @@ def actions_of(env, count, seed=0):
     return np.random.RandomState(seed).uniform(-1.0, 1.0, (count, *env.action_space.shape)).astype(np.float32)
 
 
-def assert_each_alone(env, singles, actions, start=()):
+def assert_each_alone(env, singles, actions):
     """Steps both, and compares everything; returns how many episodes ended by termination and by truncation."""
-    ends = np.zeros(2, int)
+    ends, of_each = np.zeros(2, int), [tokens.Tokens.of([task]) for task in env.tasks]
     for action in actions:
         observation, reward, terminated, truncated, info = env.step(action)
         own = env.own_observations()
@@ -65,8 +65,7 @@ def assert_each_alone(env, singles, actions, start=()):
             result = own[index][None], reward[[index]], terminated[[index]], truncated[[index]]
             assert same(result, expected[:4]), index
             assert_infos_equal(info, expected[4], index, env)
-            of_one = tokens.Tokens.of([env.tasks[index]])
-            observed = of_one.observed(single.task.split(expected[0]))
+            observed = of_each[index].observed(single.task.split(expected[0]))
             assert same({name: array[[index]] for name, array in observation.items()}, observed), index
             ends += expected[2][0], expected[3][0]
     return ends
@@ -85,7 +84,7 @@ def assert_infos_equal(info, expected, index, env):
             assert same(np.asarray(info[name][index]), np.asarray(value[0])), name
 
 
-def assert_rows(bodies, task, mode, threads, settings=SHORT, steps=50):
+def assert_rows(bodies, task, mode, threads, settings=SHORT, steps=40):
     env = make(bodies, task, autoreset_mode=mode, num_threads=threads, task_kwargs=settings)
     singles = alone(env, task, mode, settings)
     env.reset(seed=3)
@@ -107,7 +106,7 @@ def test_modifiers_change_the_model_of_each(task):
 
 @pytest.mark.slow
 def test_tasks_with_a_ground_have_a_batch_for_each_body():
-    assert assert_rows(FEW[:2], "rough", "SameStep", 1, steps=25).sum() > 0
+    assert assert_rows(FEW[:2], "rough", "SameStep", 1, {"time_limit": 0.3}, steps=20).sum() > 0
 
 
 @pytest.mark.release
@@ -271,7 +270,7 @@ def test_flat_vectors_for_plain_learners():
         assert_array_equal(vector[:, 162:654], env.description.legs.reshape(5, -1))
         for last in info.get("final_obs", ()):
             ends += last is not None and last.shape == (664,)
-    assert ends >= 5
+    assert ends >= 3
     with pytest.raises(ValueError, match=r"^action: expected shape \(5, 12, 4\), got \(5, 47\)$"):
         flat.step(np.zeros((5, 47)))
 
@@ -290,7 +289,7 @@ def test_pictures_show_each_body():
     ("kwargs", "message"),
     [
         ({"bodies": "varied:0-9", "num_envs": 4}, "num_envs: expected at least one for each of 10 bodies, got 4"),
-        ({"bodies": [], "num_envs": 4}, "num_envs: expected at least one for each of 0 bodies, got 4"),
+        ({"bodies": [], "num_envs": 4}, "bodies: expected at least one, got []"),
         ({"bodies": "vared:0-9"}, "domain '0-9': cannot import vared: No module named 'vared'"),
         ({"bodies": ["queen", 3]}, "unknown domain 3 (there are: queen, bastion, tick, leaper)"),
         ({"task_kwargs": {"actions": "torque"}}, "unknown actions of different bodies 'torque' (there are: position)"),

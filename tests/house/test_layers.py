@@ -212,7 +212,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
-    contract |= {"tasks.parameters", "tasks.sensors"}
+    contract |= {"tasks.parameters", "tasks.sensors", "tasks.tokens"}
     particular = texts - contract
     assert {"tasks.walk", "tasks.commanded", "tasks.suite"} <= particular
     for name in modules():
