@@ -102,9 +102,10 @@ class BodiesEnv(Together):
         members = [made[body] for body in found]
         self.num_envs, self.bodies = num_envs, tuple(found[which] for which in which_body)
         self.tasks = tuple(members[which].task for which in which_body)
+        self._tokens = Tokens.of(self.tasks)
         for indices in grouped([members[which] for which in which_body]):
             group = Group([members[which_body[index]] for index in indices], task_name, **options)
-            self._places.append(Place(group, np.array(indices), Tokens.of([self.tasks[index] for index in indices])))
+            self._places.append(Place(group, np.array(indices), self._tokens.part(indices)))
         first = self._places[0].group
         self.autoreset_mode, self.metadata, self.render_mode = first.autoreset_mode, first.metadata, render_mode
         described = [tokens.described(member.task) for member in members]
@@ -256,11 +257,10 @@ class BodiesEnv(Together):
         return tuple(found)
 
     def _observed(self) -> dict[str, np.ndarray]:
-        found = {name: np.empty(box.shape, np.float32) for name, box in self.observation_space.items()}
-        for place in self._places:
-            for name, array in place.observed(place.group._observation).items():
-                found[name][place.indices] = array
-        return found
+        gathered = np.empty(self._tokens.places.shape, np.float32)
+        for group, indices, own in self._places:
+            gathered[indices] = own.gathered(group._observation)
+        return self._tokens.observed(gathered)
 
 
 class FlatBodies(gymnasium.vector.VectorWrapper):

@@ -43,22 +43,19 @@ class Group(VectorEnv):
 
 
 class Place(NamedTuple):
-    """A group, with the indices of its environments among all, and how their observations become tokens."""
+    """A group, with the indices of its environments among all, and the tokens of these."""
 
     group: Group
     indices: np.ndarray
     tokens: Tokens
 
-    def observed(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the tokens of observation vectors of all environments of the group."""
-        return self.tokens.observed(self.group.task.split(vectors))
-
     def last(self, vectors: np.ndarray) -> np.ndarray:
         """Return the tokens of last observations of episodes, objects (environments,), None where none ended."""
         found = np.full(len(vectors), None, object)
         for index in [i for i, vector in enumerate(vectors) if vector is not None]:
-            blocks = self.group.task.split(vectors[index][None])
-            found[index] = {name: array[0] for name, array in self.tokens.part([index]).observed(blocks).items()}
+            own = self.tokens.part([index])
+            tokens = own.observed(own.gathered(vectors[index][None]))
+            found[index] = {name: array[0] for name, array in tokens.items()}
         return found
 
 

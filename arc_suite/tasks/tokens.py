@@ -5,8 +5,9 @@ policy observes. Everything is a product, a sum or a root of numbers, which roun
 """
 
 import functools
+import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -108,11 +109,12 @@ class Tokens(NamedTuple):
     """How observations of environments become tokens, in float32; all arrays have a leading axis for environments.
 
     Attributes:
-        joints: (environments, 12, 4) index of each joint among the body's own; any where there is none.
-        feet: (environments, 12) index of each foot's upward force in the block `contact_forces`.
+        places: (environments, n) where in the body's own observation vector the torso's posture and velocity (5 + 6),
+            joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command (6, or 0) lie; any
+            place for what is not there.
         mask: (environments, 12, 4) 1 where there is a joint.
         legs: (environments, 12) 1 where there is a leg.
-        height: (environments,) h, m.
+    height: (environments,) h, m.
         speed: (environments,) sqrt(g h), m/s.
         rate: (environments,) sqrt(g / h), rad/s.
         units: (environments, 3) of the command; see `fitting.velocity_units`.
@@ -123,8 +125,7 @@ class Tokens(NamedTuple):
         middle: (environments, 2) sine and cosine of the phase in the middle of stance.
     """
 
-    joints: np.ndarray
-    feet: np.ndarray
+    places: np.ndarray
     mask: np.ndarray
     legs: np.ndarray
     height: np.ndarray
@@ -152,11 +153,10 @@ class Tokens(NamedTuple):
         if not set(BLOCKS) <= task.blocks.keys():
             raise ValueError(f"task {task.name}: expected the blocks {', '.join(BLOCKS)}, got {', '.join(task.blocks)}")
         body, parameters, pose = task.scene.body, task.parameters, standing(task.scene.body)
-        feet = [body.part_names.index(name) for name in body.foot_names]
         # Forces are in N, or in weights where a task has a command.
         weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
         phases = np.zeros(LEGS)
-        phases[: len(feet)] = parameters.phase_offsets
+        phases[: len(body.legs)] = parameters.phase_offsets
         middle = math.pi * parameters.duty_factor
         mask = padded(body, np.ones(len(body.joint_names)))
         units = velocity_units(body, parameters.target_velocity)
@@ -173,13 +173,30 @@ class Tokens(NamedTuple):
             np.stack([np.sin(phases), np.cos(phases)], axis=-1),
             np.array((math.sin(middle), math.cos(middle))),
         )
-        indices = padded(body, np.arange(len(body.joint_names))).astype(int)
-        upward = np.zeros(LEGS, int)
-        upward[: len(feet)] = 6 * np.array(feet) + 5
-        return indices, upward, *(np.asarray(number, np.float32) for number in numbers)
+        return cls._places(task), *(np.asarray(number, np.float32) for number in numbers)
 
-    def observed(self, blocks: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-        """Return the tokens of observed blocks (environments, size).
+    @staticmethod
+    def _places(task: Task) -> np.ndarray:
+        body, ends = task.scene.body, itertools.accumulate(task.blocks.values())
+        first = {name: end - size for (name, size), end in zip(task.blocks.items(), ends, strict=True)}
+        posture, velocities, forces, clock = (first[name] for name in BLOCKS)
+        joints = padded(body, np.arange(len(body.joint_names))).astype(int).ravel()
+        upward = np.zeros(LEGS, int)
+        upward[: len(body.legs)] = [6 * body.part_names.index(name) + 5 for name in body.foot_names]
+        torso = [posture + np.arange(5), velocities + np.arange(6)]
+        command = first["command"] + np.arange(COMMAND) if "command" in first else []
+        parts = [*torso, posture + 5 + joints, velocities + 6 + joints, forces + upward, clock + np.arange(2), command]
+        return np.concatenate(parts).astype(int)
+
+    def gathered(self, vectors: np.ndarray) -> np.ndarray:
+        """Return the numbers (environments, n) of observation vectors (environments, size) that tokens are made from.
+
+        Vectors of bodies with different joints have different sizes; these numbers have one layout.
+        """
+        return np.take_along_axis(vectors, self.places, axis=-1)
+
+    def observed(self, gathered: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the tokens of gathered numbers (environments, n).
 
         Returns:
             legs (environments, 12, 12): joint angles, rad, and velocities (4 + 4), sine and cosine of the leg's phase,
@@ -188,36 +205,31 @@ class Tokens(NamedTuple):
             command (environments, 6): the desired velocity and the present one, as the torso heads, in units of
             the command.
         """
-        posture, velocities, forces, clock = (blocks[name].astype(np.float32) for name in BLOCKS)
-        every = np.arange(len(posture))[:, None]
-        angles = posture[every, 5 + self.joints.reshape(len(every), -1)].reshape(self.joints.shape) * self.mask
-        speeds = velocities[every, 6 + self.joints.reshape(len(every), -1)].reshape(self.joints.shape) * self.mask
+        ends = np.cumsum((5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2))
+        pose, velocities, angles, speeds, forces, clock, command = np.split(gathered.astype(np.float32), ends, axis=-1)
+        angles, speeds = (array.reshape(self.mask.shape) * self.mask for array in (angles, speeds))
         sine = clock[:, :1] * self.offset[..., 1] + clock[:, 1:] * self.offset[..., 0]
         cosine = clock[:, 1:] * self.offset[..., 1] - clock[:, :1] * self.offset[..., 0]
         going = clock.any(axis=-1)[:, None]
         stands = (sine * self.middle[:, :1] + cosine * self.middle[:, 1:] >= self.middle[:, 1:]) | ~going
-        loaded = forces[every, self.feet] >= self.loaded[:, None]
-        phase = (part * self.legs for part in (sine, cosine, stands, loaded))
-        legs = np.concatenate([angles, speeds / self.rate[:, None, None], np.stack(list(phase), axis=-1)], axis=-1)
+        phase = np.stack([sine, cosine, stands, forces >= self.loaded[:, None]], axis=-1) * self.legs[..., None]
+        legs = np.concatenate([angles, speeds / self.rate[:, None, None], phase], axis=-1)
 
-        w, x, y, z = (posture[:, i] for i in range(1, 5))
+        height, w, x, y, z = pose.T
         up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))  # the world's, in the torso
         ahead, aside = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
         level = np.maximum(np.sqrt(ahead * ahead + aside * aside), np.float32(1e-6))
         cos, sin = ahead / level, aside / level
-        vx, vy = velocities[:, 0], velocities[:, 1]
-        linear = [cos * vx + sin * vy, cos * vy - sin * vx, velocities[:, 2]]
-        angular = [velocities[:, i] for i in range(3, 6)]
+        vx, vy, vz, *angular = velocities.T
+        linear = [cos * vx + sin * vy, cos * vy - sin * vx, vz]
         rates = [speed / self.speed for speed in linear] + [speed / self.rate for speed in angular]
-        torso = np.stack([posture[:, 0] / self.height, *up, ahead, aside, *rates], axis=-1)
-        command = blocks.get("command")
-        if command is None:  # along world x, and back into that direction
+        torso = np.stack([height / self.height, *up, ahead, aside, *rates], axis=-1)
+        if not command.shape[-1]:  # along world x, and back into that direction
             turn = (-sin * self.turn).clip(-1.0, 1.0)
             desired = [self.forward * cos, -self.forward * sin, turn]
             motion = [speed / unit for speed, unit in zip((*linear[:2], angular[2]), self.units.T, strict=True)]
             command = np.stack([*desired, *motion], axis=-1)
-        found = {"legs": legs, "torso": torso, "command": command}
-        return {name: array.astype(np.float32) for name, array in found.items()}
+        return {"legs": legs, "torso": torso, "command": command}
 
     def part(self, indices) -> Self:
         """Return the tokens of some environments."""

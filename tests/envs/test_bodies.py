@@ -65,7 +65,7 @@ def assert_each_alone(env, singles, actions):
             result = own[index][None], reward[[index]], terminated[[index]], truncated[[index]]
             assert same(result, expected[:4]), index
             assert_infos_equal(info, expected[4], index, env)
-            observed = of_each[index].observed(single.task.split(expected[0]))
+            observed = of_each[index].observed(of_each[index].gathered(expected[0]))
             assert same({name: array[[index]] for name, array in observation.items()}, observed), index
             ends += expected[2][0], expected[3][0]
     return ends
@@ -77,8 +77,8 @@ def assert_infos_equal(info, expected, index, env):
         if name == "final_info":
             assert_infos_equal(info[name], value, index, env)
         elif name == "final_obs":
-            blocks = env.tasks[index].split(value[0][None])
-            observed = tokens.Tokens.of([env.tasks[index]]).observed(blocks)
+            of_one = tokens.Tokens.of([env.tasks[index]])
+            observed = of_one.observed(of_one.gathered(value[0][None]))
             assert same(info[name][index], {part: array[0] for part, array in observed.items()})
         else:
             assert same(np.asarray(info[name][index]), np.asarray(value[0])), name
