@@ -12,11 +12,14 @@ from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
+from arc_suite.envs import stacked
 from arc_suite.envs.bodies import BodiesEnv, FlatBodies
+from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.families import varied_body
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import tokens
+from arc_suite.tasks.walk import Walk
 
 LAYOUTS = [
     generator.random_body(seed, legs, links)
@@ -133,6 +136,18 @@ def test_bodies_of_one_layout_share_a_batch():
     assert [place.indices.tolist() for place in again._places] == [[0, 1, 2, 3, 4]]
     assert make("random:3-4", num_envs=2).bodies == (generator.random_body(3), generator.random_body(4))
     assert len(make(["varied:0-1", "queen", FEW[0]], num_envs=4).bodies) == 4
+
+
+def test_a_task_that_inherits_shares_a_batch_only_if_it_declares_what_follows_from_the_body():
+    class Saunter(Walk):
+        name = "saunter"
+
+    class Stroll(Walk):
+        name, from_body = "stroll", Walk.from_body
+
+    task, _ = prepared(FEW[0], "walk")
+    kinds = [stacked.kind(each(task.scene, task.settings)) for each in (Walk, Saunter, Stroll)]
+    assert [found is None for found in kinds] == [False, True, False]
 
 
 def test_spaces_and_seeds():
