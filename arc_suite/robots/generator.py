@@ -6,7 +6,7 @@ they stand with every foot on the floor.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -45,7 +45,7 @@ _SPACING = 0.5  # of the height, between neighbouring legs of a side
 _REACH = 0.9  # of the height, from mount to foot
 
 
-class _Proportions(NamedTuple):
+class Proportions(NamedTuple):
     """Proportions of a generated body; lengths of the torso are half-extents.
 
     Attributes:
@@ -90,8 +90,8 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
         half_length = half_width = _SPACING * _HEIGHT * legs / (2.0 * math.pi)
     else:
         half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
-    proportions = _Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
-    return _body(f"walker_{legs}x{links}", legs, layout, proportions)
+    proportions = Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
+    return proportioned(f"walker_{legs}x{links}", legs, layout, proportions)
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
@@ -133,7 +133,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
     width = random.uniform(0.35, 0.7)
     unequal = random.uniform() < 0.4
     reaches = random.uniform(0.7, 1.2) * (random.uniform(0.75, 1.3, legs) if unequal else np.ones(legs))
-    proportions = _Proportions(
+    proportions = Proportions(
         height=height,
         half_length=half_length,
         half_width=half_length * (1.0 if layout == "radial" else width),
@@ -145,7 +145,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         ],
         reaches=tuple(map(float, reaches)),
     )
-    return _body(f"random_{seed}", legs, layout, proportions)
+    return proportioned(f"random_{seed}", legs, layout, proportions)
 
 
 def scaled(body: Body, factor: float) -> Body:
@@ -199,25 +199,56 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         ValueError: a value out of range, or a length grown out of range.
     """
     random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
-    legs: dict[str, Leg] = {}
-    for leg in body.legs:
-        if leg.name in legs:
-            continue
-        legs[leg.name] = changed = _mutated_leg(leg, random, amount)
-        for other in body.legs:
-            if other.name not in legs and leg.mirrored(other.name) == other:
-                legs[other.name] = changed.mirrored(other.name)
+    return deformed(body, amount * random.standard_normal(deformations(body)))
+
+
+def deformations(body: Body) -> int:
+    """Return how many changes `deformed` takes: for every leg without a mirror image before it, its links and one."""
+    return sum(len(leg.links) + 1 for leg, _ in _with_images(body))
+
+
+def deformed(body: Body, changes: np.ndarray) -> Body:
+    """Return a body with legs of other lengths and headings; mirrored legs stay mirrored, and feet at their height.
+
+    Args:
+        body: to change.
+        changes: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
+            leg about the vertical, rad.
+
+    Returns:
+        The body, `<name>_mutated`, to be sized anew.
+
+    Raises:
+        ValueError: a length grown out of range.
+    """
+    legs, first = {}, 0
+    for leg, images in _with_images(body):
+        last = first + len(leg.links)
+        legs[leg.name] = changed = _deformed_leg(leg, changes[first:last, None], float(changes[last]))
+        legs |= {name: changed.mirrored(name) for name in images}
+        first = last + 1
     return _changed(body, "mutated", legs=tuple(legs[leg.name] for leg in body.legs))
 
 
-def _mutated_leg(leg: Leg, random: np.random.Generator, amount: float) -> Leg:
+def _with_images(body: Body) -> Iterator[tuple[Leg, list[str]]]:
+    """Yield every leg without a mirror image before it, and the names of its images behind it."""
+    seen = set()
+    for leg in body.legs:
+        if leg.name not in seen:
+            seen.add(leg.name)
+            images = [other.name for other in body.legs if other.name not in seen and leg.mirrored(other.name) == other]
+            seen.update(images)
+            yield leg, images
+
+
+def _deformed_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:
     ends = np.array([link.end for link in leg.links])
     drop = ends[:, 2].sum()
-    ends *= np.exp(amount * random.standard_normal((len(ends), 1)))
+    ends *= np.exp(logarithms)
     if ends[:, 2].sum() * drop > 0.0:
         ends[:, 2] *= drop / ends[:, 2].sum()
     links = tuple(link.replace(end=tuple(map(float, end))) for link, end in zip(leg.links, ends, strict=True))
-    return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(amount * random.standard_normal()))
+    return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(turn))
 
 
 def _changed(body: Body, how: str, legs: Sequence[Leg], **fields) -> Body:
@@ -239,18 +270,26 @@ def _check_layout(layout: str | None, legs: int) -> str:
     return checks.name(layout, LAYOUTS, "layout")
 
 
-def _body(name: str, legs: int, layout: str, proportions: _Proportions) -> Body:
+def proportioned(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
+    """Return a body of given proportions; checked legs and layout are as in `generate`."""
     p = proportions
     if layout == "radial":
-        places = around(legs, 0.8 * p.half_length, 0.8 * p.half_width)
-        all_legs = tuple(_leg(f"leg{i + 1}", *place, p.reaches[i], p) for i, place in enumerate(places))
+        mounts = around(legs, 0.8 * p.half_length, 0.8 * p.half_width)
+        all_legs = tuple(_leg(f"leg{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
     else:
-        places = left_side(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
-        left = tuple(_leg(f"l{i + 1}", *place, p.reaches[i], p) for i, place in enumerate(places))
+        mounts = left_side(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
+        left = tuple(_leg(f"l{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
         all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
     size = (p.half_length, p.half_width, p.thickness * p.height)
     chassis = Solid(name="chassis", shape="ellipsoid", size=size)
     return Body(name=name, torso=Torso(standing_height=p.height, solids=(chassis,)), legs=all_legs)
+
+
+def places(legs: int, layout: str) -> np.ndarray:
+    """Return how far ahead the legs of `Proportions.reaches` are mounted: from 1, in front, to -1."""
+    if layout == "pairs":
+        return np.linspace(1.0, -1.0, legs // 2)
+    return np.cos(np.radians(_headings(legs)))
 
 
 def left_side(pairs: int, along: float, across: float, fan: float) -> list[tuple[Vector, float]]:
@@ -269,19 +308,23 @@ def left_side(pairs: int, along: float, across: float, fan: float) -> list[tuple
 def around(legs: int, along: float, across: float) -> list[tuple[Vector, float]]:
     """Return mounts and headings, degrees, of legs all around a torso, counter-clockwise.
 
-    An even number leaves the front free, so that both sides have as many.
-
     Args:
         legs: their number.
         along: half-axis forward of the ellipse of mounts, m.
         across: the same to the left.
     """
-    start = 0.0 if legs % 2 else 180.0 / legs
-    headings = [(start + 360.0 * i / legs + 180.0) % 360.0 - 180.0 for i in range(legs)]
+    headings = _headings(legs)
     return [((along * _cos(heading), across * _sin(heading), 0.0), heading) for heading in headings]
 
 
-def _leg(name: str, mount: Vector, heading: float, reach: float, p: _Proportions) -> Leg:
+def _headings(legs: int) -> list[float]:
+    """Return the headings of legs around a torso, degrees."""
+    # An even number leaves the front free, so that both sides have as many.
+    start = 0.0 if legs % 2 else 180.0 / legs
+    return [(start + 360.0 * i / legs + 180.0) % 360.0 - 180.0 for i in range(legs)]
+
+
+def _leg(name: str, mount: Vector, heading: float, reach: float, p: Proportions) -> Leg:
     """Return a leg that points to a heading (degrees, counter-clockwise from forward) and ends on the floor."""
     links = len(p.profile)
     foot_radius = 0.06 * p.height
