@@ -157,7 +157,7 @@ def _check_commands(found: dict[str, Draft], units: np.ndarray | None, left_out)
             command = np.array(spec.command)
             share = command @ (draft.motion.twist / units) / (command @ command)
             if share < _FOLLOWS:
-                left_out[name] = f"the policy moves by {share:.2f} of its command"
+                left_out[name] = f"the policy moves at {round(100.0 * share)} % of its command"
                 del found[name]
 
 

@@ -54,7 +54,7 @@ def test_any_body_as_rigid_parts(tmp_path):
         (("-o", "a.glb", "--robot=all"), "--robot=all: expected one robot"),
         pytest.param(
             ("-o", "a.glb", "--robot=tick", "--clips=walk,stop", "--policy=zero"),
-            "tick, clip walk: the policy moves by 0.00 of its command",
+            "tick, clip walk: the policy moves at 0 % of its command",
             marks=pytest.mark.slow,
         ),
         (("-o", "a.glb", "--clips="), "clips: expected one or more of walk, slow, fast, turn_left, "),
