@@ -30,7 +30,7 @@ TASKED = (
     "survey",
     "enter",
 )
-WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
+WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS} | {"survey": ROOT / "tools" / "walk_census.py"}
 
@@ -125,9 +125,7 @@ def test_help_of_a_program(program):
     assert f"\n  arc-suite {program}" in text
     names = re.findall(r"^(-\S*?):", text, re.MULTILINE)
     assert "--[no]version" in names
-    assert ("-o,--output" in names) == (
-        program in ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
-    )
+    assert ("-o,--output" in names) == (program in WRITING)
     assert "--output" not in names
     assert {"--task", "--set"} & set(names) == ({"--task", "--set"} if program in TASKED else set())
 

@@ -4,7 +4,6 @@ import base64
 import io
 import json
 import re
-import shutil
 import zlib
 
 import mujoco
@@ -130,7 +129,8 @@ def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_pack
 def test_programs_without_a_viewer_write_nothing(tmp_path):
     if built():
         pytest.skip("there is a viewer here")
-    for command in (("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1")):
+    commands = ("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1"), ("play", "-o", "a.html")
+    for command in commands:
         done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
         assert done.returncode == 1 and "make web" in done.stderr and done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
@@ -173,19 +173,6 @@ def test_errors_are_one_line(tmp_path, command, message):
     done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (1, f"arc-suite {command[0]}: {message}\n")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright here: make check-web")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium here: make check-web")
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card needed
-    with playwright.sync_playwright() as running:
-        opened = running.chromium.launch(executable_path=chromium, args=flags)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
