@@ -19,6 +19,15 @@ function sized(canvas) {
 }
 
 const LEFT = 58, RIGHT = 150; // px, for names of legs and for terms
+const NARROW = 420; // px, below which terms stand under their diagram, in columns
+const DIAGRAM = 146, LINE = 16, COLUMNS = 2;
+
+const right = (width) => (width < NARROW ? 8 : RIGHT);
+
+// The height of a diagram of rewards of a width, px.
+export function rewardHeight(width, walk) {
+  return DIAGRAM + (width < NARROW ? LINE * Math.ceil(Object.keys(walk.terms).length / COLUMNS) : 0);
+}
 
 // Bars of stance by leg on the prescribed schedule, some seconds about the cursor.
 export function drawGait(canvas, walk, time) {
@@ -45,11 +54,19 @@ export function drawGait(canvas, walk, time) {
   pen.fillRect(LEFT + (WINDOW / 2) * scale - 0.5, 0, 1, height);
 }
 
+// Where the name and value of a term stand: right of the diagram, or below a narrow one.
+function place(index, count, width) {
+  if (width >= NARROW) return { left: width - RIGHT + 8, end: width - 4, line: 8 + (index * (DIAGRAM - 16)) / Math.max(count - 1, 1) };
+  const column = index % COLUMNS, part = width / COLUMNS;
+  return { left: column * part + 8, end: (column + 1) * part - 4, line: DIAGRAM + LINE * (Math.floor(index / COLUMNS) + 0.5) };
+}
+
 // Weighted terms of the reward, gains stacked upwards and costs downwards, with their values at the cursor.
 export function drawReward(canvas, walk, time, row, [bottom, top]) {
-  const { pen, width, height } = sized(canvas);
+  canvas.style.height = `${rewardHeight(canvas.clientWidth, walk)}px`;
+  const { pen, width } = sized(canvas), height = DIAGRAM;
   const names = Object.keys(walk.terms), count = walk.positions.length;
-  const scale = (width - LEFT - RIGHT) / count;
+  const scale = (width - LEFT - right(width)) / count;
   const y = (value) => 6 + ((top - value) / (top - bottom)) * (height - 12);
   for (let k = 0; k < count; k += 1) {
     let up = 0, down = 0;
@@ -69,13 +86,13 @@ export function drawReward(canvas, walk, time, row, [bottom, top]) {
   pen.fillStyle = "#ffffff";
   pen.fillRect(LEFT + Math.min(time / walk.step, count) * scale - 0.5, 0, 1, height);
   names.forEach((name, index) => {
-    const line = 8 + (index * (height - 16)) / Math.max(names.length - 1, 1);
+    const { left, end, line } = place(index, names.length, width);
     pen.fillStyle = walk.colours[name];
-    pen.fillRect(width - RIGHT + 8, line - 4, 8, 8);
+    pen.fillRect(left, line - 4, 8, 8);
     pen.fillStyle = INK;
-    pen.fillText(name.replaceAll("_", " "), width - RIGHT + 20, line);
+    pen.fillText(name.replaceAll("_", " "), left + 12, line);
     pen.textAlign = "right";
-    pen.fillText(walk.terms[name][row].toFixed(2).replace(/^-(?=0.00$)/, ""), width - 4, line);
+    pen.fillText(walk.terms[name][row].toFixed(2).replace(/^-(?=0.00$)/, ""), end, line);
     pen.textAlign = "left";
   });
 }
@@ -92,5 +109,5 @@ export function gaitTime(canvas, x, time) {
 }
 
 export function rewardTime(canvas, x, walk) {
-  return ((x - LEFT) / (canvas.clientWidth - LEFT - RIGHT)) * walk.step * walk.positions.length;
+  return ((x - LEFT) / (canvas.clientWidth - LEFT - right(canvas.clientWidth))) * walk.step * walk.positions.length;
 }

@@ -33,6 +33,7 @@ export class Inputs {
     this.stick = [0, 0, 0];
     window.addEventListener("keydown", (event) => {
       if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.target.closest("select")) return; // whose keys these are
       event.preventDefault();
       this.held.add(event.code);
     });

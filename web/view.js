@@ -53,8 +53,8 @@ export class View {
 
   draw() {
     const { clientWidth: width, clientHeight: height } = this.canvas;
-    const size = this.renderer.getSize(new THREE.Vector2());
-    if (size.x !== width || size.y !== height) {
+    if (this.width !== width || this.height !== height) {
+      Object.assign(this, { width, height });
       this.renderer.setSize(width, height, false);
       this.camera.aspect = width / height;
       // In a narrow view the creature is as far from the sides as it is from top and bottom in a wide one.
@@ -69,5 +69,6 @@ export class View {
     this.scene.traverse(({ geometry, material }) => (geometry?.dispose(), material?.dispose()));
     this.controls.dispose();
     this.renderer.dispose();
+    this.renderer.forceContextLoss(); // a page may have a few at a time
   }
 }

@@ -153,7 +153,13 @@ class Marks {
 
 function column(walk) {
   const box = document.createElement("section");
-  box.innerHTML = `<h2></h2><canvas class="view"></canvas><canvas class="gait"></canvas><canvas class="reward"></canvas>`;
+  const drawn = { view: "walk", gait: "foot contacts on the schedule", reward: "weighted terms of the reward" };
+  box.innerHTML = "<h2></h2>";
+  for (const [name, text] of Object.entries(drawn)) {
+    const canvas = Object.assign(document.createElement("canvas"), { className: name, role: "img" });
+    canvas.setAttribute("aria-label", `${walk.label}: ${text}`);
+    box.append(canvas);
+  }
   box.querySelector("h2").textContent = walk.label;
   const [view, gait, reward] = box.querySelectorAll("canvas");
   if (!walk.schedule) gait.remove();
@@ -170,7 +176,7 @@ async function main() {
   const extents = walks.map(extent); // one scale, so that walks can be compared
   const scale = [Math.min(...extents.map(([low]) => low)), Math.max(...extents.map(([, high]) => high))];
   const finest = Math.min(...walks.map((walk) => walk.step));
-  const state = { time: 0, speed: 1, playing: true };
+  const state = { time: 0, speed: 1, playing: !window.matchMedia("(prefers-reduced-motion: reduce)").matches };
   const slider = byId("time"), speeds = byId("speed"), button = byId("play");
   slider.max = seconds;
   slider.step = finest / 10;

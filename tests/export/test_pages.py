@@ -2,6 +2,7 @@
 
 import base64
 import io
+import itertools
 import json
 import re
 import zlib
@@ -271,3 +272,36 @@ def test_something_is_drawn(shown):
     middle = pictures[0][height // 4 : 3 * height // 4, width // 4 : 3 * width // 4]
     assert middle.std() > 20.0
     assert abs(pictures[0] - pictures[1]).mean() > 1.0
+
+
+@pytest.mark.slow
+@needs_viewer
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390), (320, 256)])
+def test_small_pages(browser, tracks, tmp_path, width, height):
+    """The view is large enough or the page scrolls, nothing overlaps, controls have names and a size to hit."""
+    (tmp_path / "walk.html").write_text(pages.page(tracks), encoding="utf-8")
+    tab = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
+    tab.goto((tmp_path / "walk.html").as_uri())
+    tab.wait_for_function("window.viewer", timeout=60_000)
+    assert tab.evaluate("viewer.state.playing") is False
+    tab.evaluate("viewer.seek(1)")
+    tab.wait_for_function("document.querySelector('.reward').style.height")
+    drawn = [box.bounding_box() for box in tab.locator("h2, section canvas").all()]
+    for first, second in itertools.combinations(drawn, 2):
+        aside = first["x"] + first["width"] <= second["x"] + 1 or second["x"] + second["width"] <= first["x"] + 1
+        assert (
+            aside or first["y"] + first["height"] <= second["y"] + 1 or second["y"] + second["height"] <= first["y"] + 1
+        )
+    assert all(box["x"] >= 0 and box["x"] + box["width"] <= width for box in drawn)
+    views = [box.bounding_box()["height"] for box in tab.locator(".view").all()]
+    assert min(views) >= 0.4 * height
+    assert tab.evaluate("document.documentElement.scrollHeight") > height  # it scrolls
+    footer = tab.locator("footer").bounding_box()
+    assert footer["y"] + footer["height"] <= height + 1  # in sight without scrolling
+    for control in tab.locator("button, input, select, summary").all():
+        box = control.bounding_box()
+        assert min(box["width"], box["height"]) >= 24
+        assert control.evaluate("each => each.ariaLabel || each.textContent.trim()")
+    labels = [canvas.get_attribute("aria-label") for canvas in tab.locator("canvas").all()]
+    assert len(set(labels)) == 6 and all(label.startswith("tick, ") for label in labels)
+    tab.close()

@@ -134,6 +134,14 @@ def test_bodies_and_grounds_are_chosen(tab):
     assert tab.evaluate("play.state.play.body.name") == "walker_6x3"
     assert tab.evaluate("play.state.play.simulation.field !== null")
     assert tab.locator("canvas").count() == 1
+    tab.evaluate("play.state.play.draw()")
+    assert tab.evaluate("play.state.play.view.camera.aspect") == pytest.approx(320 / 256)
+    tab.focus("#ground")  # a list that has the focus keeps its keys
+    tab.keyboard.press("ArrowUp")
+    assert tab.evaluate("play.inputs.command") == [0, 0, 0]
+    assert tab.input_value("#ground") == "level"
+    for index in range(20):  # more bodies than a browser has contexts to draw in
+        tab.select_option("#body", str(index % 2))
 
 
 def test_a_fallen_body_restarts(tab):
