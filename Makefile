@@ -16,6 +16,7 @@
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
 # make check-agents-release  the same for every algorithm, and for studies that are killed
+# make check-bodies  environments of different bodies of every layout, task and autoreset mode, and a census of varied ones; minutes
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
@@ -31,7 +32,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-glb check-blender check-godot check-jax check-agents check-agents-release bench survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-glb check-blender check-godot check-jax check-agents check-agents-release check-bodies bench survey obedience soak loopholes fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -180,6 +181,11 @@ check-agents check-agents-release: setup.cfg
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/agents tests/studies/test_study.py tests/cli/test_train.py \
 		tests/policies/test_onnx_file.py tests/evaluation/test_statistics.py
+
+check-bodies: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) -m pytest $(PARALLEL) tests/envs/test_bodies.py tests/models/test_families.py
+	$(VENV)/bin/arc-suite survey --family varied --count 120
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

@@ -9,6 +9,7 @@ from absl import flags
 
 from arc_suite import checks, policies, registry
 from arc_suite.envs.setup import Setup
+from arc_suite.models.families import FAMILIES
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
 from arc_suite.robots import ROBOTS, generator, spec_files
@@ -18,7 +19,10 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 MOST = 100_000  # episodes, or bodies: more than anyone waits for
-ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
+ROBOT_HELP = (
+    f"{', '.join(ROBOTS)}, module:name of one that another package has, or a body of a family: "
+    f"{', '.join(f'{family}:7' for family in FAMILIES)}"
+)
 
 
 def define_body() -> None:
@@ -99,8 +103,9 @@ def made_body() -> Body | None:
 def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
 
-    A robot of another package is named `module:name`, and its module imported. Flaws of the body in a spec file, such
-    as feet in the floor, are warned of with the values that fit, as `arc-suite check` has them.
+    A robot of another package is named `module:name`, and its module imported; `family:0-9` names ten bodies. Flaws of
+    the body in a spec file, such as feet in the floor, are warned of with the values that fit, as `arc-suite check`
+    has them.
 
     Raises:
         ValueError: as `made_body`, or an unknown robot, or a robot and a body.
@@ -108,11 +113,7 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """
     body = made_body()
     if body is None:
-        if ":" in robot.value:
-            body = registry.body_of(robot.value)
-            return {body.name: body}
-        name = checks.name(robot.value, [*ROBOTS, "all"], "robot")
-        return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
+        return dict(ROBOTS) if robot.value == "all" else named_bodies(robot.value, ["all"])
     if robot.present:
         raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
     for flaw in flaws(body) if FLAGS.spec is not None else ():
@@ -120,16 +121,40 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     return {body.name: body}
 
 
+def named_bodies(robot: str, near: Iterable[str] = ()) -> dict[str, Body]:
+    """Return the bodies by name that a value of --robot names; `near` are other values of the flag.
+
+    Raises:
+        ValueError: an unknown robot or family, or two bodies of one name.
+    """
+    if ":" not in robot:
+        return {robot: ROBOTS[checks.name(robot, ROBOTS, "robot", near)]}
+    found = registry.bodies_of(robot)
+    named = {body.name: body for body in found}
+    if len(named) < len(found):
+        raise ValueError(f"--robot={robot}: expected a name for each body, got two of one name")
+    return named
+
+
 def only_body(robot: flags.FlagHolder) -> Body:
     """Return the body of a program that takes one alone; see `bodies`.
 
     Raises:
-        ValueError: as `bodies`, or "all".
+        ValueError: as `bodies`, or several bodies.
         OSError: as `bodies`.
     """
-    body, *others = bodies(robot).values()
+    return only_one(bodies(robot), robot.value)
+
+
+def only_one(found: dict[str, Body], robot: str) -> Body:
+    """Return the body of those that a value of --robot names.
+
+    Raises:
+        ValueError: they are several.
+    """
+    body, *others = found.values()
     if others:
-        raise ValueError(f"--robot={robot.value}: expected one robot")
+        raise ValueError(f"--robot={robot}: expected one robot")
     return body
 
 

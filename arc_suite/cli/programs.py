@@ -16,9 +16,11 @@ PROGRAMS = (
     "tune_cpg",
     "train",
     "study",
+    "benchmark",
     "enter",
     "export",
     "survey",
+    "design",
     "doctor",
 )
 

@@ -28,9 +28,10 @@ TASKED = (
     "tune_cpg",
     "train",
     "survey",
+    "design",
     "enter",
 )
-WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export")
+WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export", "design")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS} | {"survey": ROOT / "tools" / "walk_census.py"}
 
@@ -132,7 +133,8 @@ def test_help_of_a_program(program):
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study", "enter") else []), "stray")
+    taking = ("check", "export", "study", "enter", "benchmark")  # an argument
+    done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 

@@ -33,6 +33,7 @@ ROOMS = (
     ("style",),
     ("tuning",),
     ("export",),  # to take away
+    ("design",),  # creatures found by search
     ("agents",),  # who learns
     ("studies",),  # tables of runs
     ("cli",),  # programs
@@ -52,6 +53,7 @@ THIRD_PARTY = {
     "robots": set(),
     "robots.generator": {"numpy"},
     "robots.mirror": {"numpy"},
+    "robots.varied": {"numpy"},
     "arenas": {"numpy", "dm_control"},
     "arenas.arena": {"dm_control"},
     "models": {"numpy", "mujoco", "dm_control"},
@@ -84,6 +86,8 @@ THIRD_PARTY = {
     "style.metrics": {"numpy"},
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},
+    "design": {"numpy"},
+    "design.gallery": {"numpy", "PIL"},
     "export": {"numpy", "mujoco"},
     "export.films": {"numpy", "imageio", "imageio_ffmpeg", "PIL"},
     "export.gltf": {"numpy"},
@@ -211,7 +215,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
-    contract |= {"tasks.parameters", "tasks.sensors"}
+    contract |= {"tasks.parameters", "tasks.sensors", "tasks.energy", "tasks.tokens"}
     particular = texts - contract
     assert {"tasks.walk", "tasks.commanded", "tasks.suite"} <= particular
     for name in modules():
