@@ -31,7 +31,6 @@ GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page
 
 _TASK = "steer"  # whose command the player gives
 _BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that a page can observe
-_LICENCES = ("LICENSE", "LICENSES_THIRD_PARTY.md")  # of MuJoCo, in its wheel
 
 
 def page(creatures: Sequence[Mapping[str, Any]]) -> str:
@@ -50,9 +49,9 @@ def page(creatures: Sequence[Mapping[str, Any]]) -> str:
 
 
 def licences() -> str:
-    """Return the licence of MuJoCo and its notices of third parties, as text of an HTML comment."""
-    found = metadata.distribution("mujoco")
-    texts = [found.read_text(f"licenses/{name}") for name in _LICENCES]
+    """Return the licence of MuJoCo and its notices of third parties, from its wheel, as text of an HTML comment."""
+    files = sorted(file for file in metadata.files("mujoco") or () if file.parent.name == "licenses")
+    texts = [file.read_text(encoding="utf-8") for file in files]
     return "\n\n".join(["This page contains MuJoCo and scripts of arc_suite.", *texts]).replace("-->", "-- >")
 
 
@@ -112,7 +111,7 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
     inner = task.task if isinstance(task, Modified) else task
     headed = "command" in inner.commands
     context, health = (inner if headed else steer).context, steer.health
-    scene = steer.scene
+    scene, (force_unit,) = steer.scene, context.force_unit
     return {
         "headed": headed,
         "torso": scene.layout.parts.start,
@@ -121,8 +120,8 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
         "turn": clock.TWO_PI * task.parameters.gait_frequency * scene.control_timestep,
         "units": context.units,
         "leak": context.leak,
-        "force_unit": context.force_unit if headed else np.ones(6),
-        "weight": context.force_unit[5],
+        "force_unit": force_unit if headed else np.ones(6),
+        "weight": force_unit[5],
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
