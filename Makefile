@@ -8,8 +8,9 @@
 # make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
-# make web     bundles the viewer that pages are made of, and three.js; needs Node
+# make web     bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
+# make check-play  walks bodies of pages in Node against Python, and plays pages in Chromium by keys and pointers
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3; the sample project is linted
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
@@ -31,7 +32,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-agents check-agents-release check-bodies bench survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-glb check-blender check-godot check-jax check-agents check-agents-release check-bodies bench survey obedience soak loopholes fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -112,13 +113,13 @@ check-clients: $(INSTALLED)
 ENGINES := out/engines
 
 # What it makes is not committed, and goes into wheels.
-VIEWER := arc_suite/export/web/viewer.js
+VIEWER := arc_suite/export/web/mujoco.wasm.zlib
 web: $(VIEWER)
 $(VIEWER): $(wildcard web/*)
 	mkdir -p .node-web $(dir $@)
 	cp web/package.json web/package-lock.json .node-web/
 	npm ci --prefix .node-web --no-audit --no-fund --silent
-	NODE_PATH=$(CURDIR)/.node-web/node_modules node web/build.js $@
+	NODE_PATH=$(CURDIR)/.node-web/node_modules node web/build.js $(dir $@)
 
 # Other builds go on without the viewer; what is to be released has it.
 dist: VENV := .venv-dist
@@ -138,6 +139,13 @@ check-web: setup.cfg $(VIEWER)
 	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
 		--outfile=$(ENGINES)/loader.js --log-level=warning
 	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
+
+check-play: VENV := .venv-web
+check-play: setup.cfg $(VIEWER)
+	tools/ensure_venv.sh $(VENV)
+	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
+	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
+	$(VENV)/bin/python -m pytest tests/export/test_play.py tests/export/test_play_page.py
 
 check-glb: $(INSTALLED)
 	mkdir -p .node-glb

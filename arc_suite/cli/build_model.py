@@ -64,7 +64,7 @@ def main() -> None:
             path = stack.enter_context(files.writing(FLAGS.render))
             physics = Physics.from_body(body, arena)
             physics.forward()
-            imageio.imwrite(path, physics.render(camera_id="portrait"))
+            imageio.imwrite(path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:
             print(summary(body))
 

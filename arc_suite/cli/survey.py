@@ -53,7 +53,8 @@ def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
     for outcome in outcomes[:12]:
         environment, _ = survey.play(outcome.trial)
         caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
-        views.append(films.captioned(environment.physics.render(300, 400, "portrait"), caption))
+        view = environment.physics.render(300, 400, "portrait", quality="still")
+        views.append(films.captioned(view, caption))
         environment.close()
     columns = min(4, len(views))
     views += [np.zeros_like(views[0])] * (-len(views) % columns)
