@@ -136,12 +136,12 @@ def test_a_bad_combination_stands_in_the_page_and_the_creature_walks_on(served, 
 
 def test_the_command_is_followed(served, tab):
     open_tab(tab, "Command")
-    press(tab, "Turn", "ArrowRight", 10)
+    press(tab, "Turn", "End")
     press(tab, "Forward", "Home")
-    served.until(lambda: np.allclose(served.session.desired, (-1.0, 0.0, 0.5)))
+    served.until(lambda: np.allclose(served.session.desired, (-1.0, 0.0, 1.0)))
     tab.evaluate("document.activeElement.blur()")  # keys go to the page, and not to a widget
     tab.keyboard.press("i")
-    served.until(lambda: np.allclose(served.session.desired, (-0.75, 0.0, 0.5)))
+    served.until(lambda: np.allclose(served.session.desired, (-0.75, 0.0, 1.0)))
     served.until(lambda: served.session.episodes.timestep.observation["command"][0] == -0.75)
 
 
