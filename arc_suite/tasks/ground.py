@@ -51,6 +51,11 @@ class Ground:
     own_arena: ClassVar[bool] = False
     blocks: ClassVar[Mapping[str, int]] = {}
 
+    @property
+    def adapts(self) -> bool:
+        """Whether the outcome of an episode chooses where the next one starts."""
+        return False
+
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the ground with checked settings in place of its own.
 
@@ -205,6 +210,11 @@ class Lanes(Ground):
             level=checks.integer("level", given["level"], 0, LEVELS - 1),
             terrain_seed=checks.integer("terrain_seed", given["terrain_seed"], 0, 2**32 - 1),
         )
+
+    @property
+    def adapts(self) -> bool:
+        """Whether there is a curriculum."""
+        return self.curriculum
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return the lanes, long enough for the distance at the target velocity, and a seventh more."""
