@@ -183,6 +183,11 @@ check-agents check-agents-release: setup.cfg
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/agents tests/studies/test_study.py tests/cli/test_train.py \
 		tests/policies/test_onnx_file.py tests/evaluation/test_statistics.py
 
+bench-gpu: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[agents,mjx-warp]' 'jax[cuda12]>=0.10'
+	$(VENV)/bin/python tools/bench_gpu.py --document docs/gpu.md
+
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md
 

@@ -53,7 +53,10 @@ class Reached(Exception):
 
 
 def walk(env, preset, steps):
-    """A compiled function of a state and a demonstrator's mind: both after steps, and rewards and overflows (steps,)."""
+    """A compiled walk from a state and a demonstrator's mind, and these.
+
+    It returns both after the steps, and rewards (steps, worlds), overflows (steps,) and done (steps, worlds).
+    """
     made = law(env.task, presets_of(env.task.scene.body)[preset])
 
     def step(carry, _):
@@ -90,7 +93,8 @@ def episodes(robot, impl, count):
     total, falls = np.asarray(rewards).sum(axis=0), int(np.asarray(done).any(axis=0).sum())
     with Setup.of(robot).make_vec(count, autoreset_mode="Disabled") as environment:
         policy = Demonstrator(environment, "tuned")
-        theirs = np.array([episode.total for episode in evaluation.episodes_in_batch(environment, policy)])
+        found = evaluation.episodes_in_batch(environment, policy, range(count))
+    theirs = np.array([episode.total for episode in found])
     apart = 100.0 * (total.mean() / theirs.mean() - 1.0)
     return [robot, impl, f"{total.mean():.1f}", f"{theirs.mean():.1f}", f"{apart:+.2f} %", f"{falls}"]
 
