@@ -33,7 +33,7 @@ class Worlds:
         self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, first_seed=first, num_envs=hp.num_envs)
         self.task, self.joints = self.env.task, self.env.action_size
         self._key = jax.random.key(context.seed)
-        self._state = jax.jit(jax.vmap(self.env.start))(first + jnp.arange(hp.num_envs))
+        self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
         self._act = jax.jit(self._acted)
 

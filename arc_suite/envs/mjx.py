@@ -132,7 +132,7 @@ class Env:
 
     def reset(self, rng) -> State:
         """Return the start of an episode, one of the table, given a key of JAX."""
-        return self.start(self.first_seed + jax.random.randint(rng, (), 0, self.num_starts))
+        return self.start(np.uint32(self.first_seed) + jax.random.randint(rng, (), 0, self.num_starts).astype("uint32"))
 
     def start(self, seed) -> State:
         """Return the start of the episode that any environment of the suite has after `reset(seed=seed)`.
@@ -140,7 +140,7 @@ class Env:
         Args:
             seed: () an integer from `first_seed` on; episodes repeat after `num_starts`.
         """
-        index = (seed - self.first_seed) % self.num_starts
+        index = (jnp.asarray(seed).astype("uint32") - np.uint32(self.first_seed)) % np.uint32(self.num_starts)
         start = jax.tree.map(lambda table: jnp.asarray(table)[index], self._starts)
         data = self._data.replace(qpos=start.qpos, qvel=start.qvel, mocap_pos=start.mocap_pos)
         zero = jnp.zeros(())
@@ -189,7 +189,8 @@ class Env:
         """
         if scene_option is not None or modify_scene_fns is not None:
             raise ValueError("render: expected neither scene_option nor modify_scene_fns; see arc_suite.envs.mjx")
-        states, camera = [trajectory] if isinstance(trajectory, State) else trajectory, camera or "tracking"
+        states = [trajectory] if isinstance(trajectory, State) else trajectory
+        camera = "tracking" if camera is None else camera
         return [self._picture(state, index, height=height, width=width, camera_id=camera) for state in states]
 
     def _picture(self, state: State, index: int | None, **options) -> np.ndarray:

@@ -82,6 +82,27 @@ def test_interface():
     assert mjx.load(body, "steer", num_starts=1).task.scene.body == body
 
 
+def test_seeds_of_four_billion():
+    first = 4_000_000_000
+    env = mjx.load(ROBOT, "walk", num_starts=3, first_seed=first)
+    found = jax.vmap(env.start)(np.arange(first, first + 3, dtype=np.uint32)).obs
+    rows = VectorEnv(ROBOT, "walk", 3, 1)
+    np.testing.assert_array_equal(found, rows.reset(seed=first)[0])
+    assert env.reset(jax.random.key(0)).obs in np.asarray(found)
+
+
+def test_pictures_are_those_of_the_suite():
+    env, start, _ = compiled(ROBOT, "steer")
+    rows = VectorEnv(ROBOT, "steer", WORLDS, 1, render_mode="rgb_array", width=80, height=60)
+    rows.reset(seed=0)
+    (theirs,) = rows.render([2])
+    (ours,) = env.render(start(np.arange(WORLDS)), height=60, width=80, index=2)
+    assert ours.shape == (60, 80, 3) and ours.std() > 10.0
+    assert abs(ours.astype(int) - theirs).mean() < 1.0
+    with pytest.raises(ValueError, match="scene_option"):
+        env.render([], scene_option=object())
+
+
 def test_a_row_that_diverges():
     _, start, step = compiled(ROBOT)
     state = start(np.arange(WORLDS))
