@@ -91,7 +91,7 @@ def episodes(robot, impl, count):
     walked, carry = walk(env, "tuned", int(env.episode_length))
     (_, _), (rewards, _, done) = walked(carry)
     total, falls = np.asarray(rewards).sum(axis=0), int(np.asarray(done).any(axis=0).sum())
-    with Setup.of(robot).make_vec(count, autoreset_mode="Disabled") as environment:
+    with contextlib.closing(Setup.of(robot).make_vec(count, autoreset_mode="Disabled")) as environment:
         policy = Demonstrator(environment, "tuned")
         found = evaluation.episodes_in_batch(environment, policy, range(count))
     theirs = np.array([episode.total for episode in found])
@@ -102,7 +102,7 @@ def episodes(robot, impl, count):
 def minutes(robot, simulation):
     """Row of a table: minutes and control steps after which PPO earns what `medium` does, evaluations counted."""
     setup = Setup.of(robot)
-    with setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled") as environment:
+    with contextlib.closing(setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled")) as environment:
         medium = Demonstrator(environment, "medium")
         goal = np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, medium)])
     run = Configuration.of(setup, "ppo", {"simulation": simulation, **LEARNING}, steps=50_000_000, evaluate_every=10**6)

@@ -1,5 +1,6 @@
 """PPO in worlds of MJX."""
 
+import contextlib
 import pathlib
 
 import jax
@@ -62,7 +63,7 @@ def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):
         for name, array in ours.checkpoint.items():
             assert_array_equal(theirs.checkpoint[name], array)
     made = policy(tmp_path / "whole", "leaper")
-    with setup.make_vec(2, autoreset_mode="Disabled") as environment:
+    with contextlib.closing(setup.make_vec(2, autoreset_mode="Disabled")) as environment:
         assert all(np.isfinite(each.total) for each in evaluation.episodes_in_batch(environment, made, range(2)))
 
 
@@ -78,6 +79,6 @@ def test_it_learns(tmp_path):
     )
     returns = []
     train(run, tmp_path / "run", on_metrics=lambda step, metrics: returns.append(metrics.get("return", 0.0)))
-    with run.setup.make_vec(1, autoreset_mode="Disabled") as environment:
+    with contextlib.closing(run.setup.make_vec(1, autoreset_mode="Disabled")) as environment:
         (still,) = evaluation.episodes_in_batch(environment, policy("zero", "tick"), range(1))
     assert max(returns) > still.total
