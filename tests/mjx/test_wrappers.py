@@ -26,11 +26,11 @@ LENGTH = 7
 def test_nothing_of_an_old_episode_lives_on(randomized):
     env = mjx.load("leaper", "walk", num_starts=16)
     ranges = {"friction": (0.9, 1.1)}
-    keys = jax.random.split(jax.random.key(1), WORLDS)
+    keys = jax.random.split(jax.random.PRNGKey(1), WORLDS)
     randomize = (lambda model: randomization_fn(**ranges)(model, keys)) if randomized else None
     wrapped = wrapper.wrap_for_brax_training(env, episode_length=LENGTH, randomization_fn=randomize)
     assert (wrapped.observation_size, wrapped.action_size) == (env.observation_size, env.action_size)
-    state = jax.jit(wrapped.reset)(jax.random.split(jax.random.key(0), WORLDS))
+    state = jax.jit(wrapped.reset)(jax.random.split(jax.random.PRNGKey(0), WORLDS))
     step, action = jax.jit(wrapped.step), jnp.full((WORLDS, 12), 0.3)
     first, rewards, lengths = state, [], []
     for count in range(2 * LENGTH):
