@@ -21,6 +21,7 @@
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
 # make soak    two million steps: memory, threads and files stay what they are
+# make loopholes  searches for policies that earn reward and fail at a task; some ten minutes
 # make fuzz    damages specs, tracks and datasets at random and reads them; minutes
 # make mutants plants mistakes and tells which test catches each; takes hours
 # make golden  shows how golden numbers and digests differ; tests/golden.py --accept and tests/digests.py --accept store new ones
@@ -31,7 +32,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release bench bench-gpu survey obedience soak fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -199,6 +200,9 @@ obedience: $(INSTALLED)
 
 soak: $(INSTALLED)
 	$(PYTHON) tests/soak.py
+
+loopholes: $(INSTALLED)
+	$(PYTHON) tests/loopholes.py
 
 fuzz: $(INSTALLED)
 	$(PYTHON) tests/fuzz.py

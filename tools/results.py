@@ -1,14 +1,17 @@
-"""Measures demonstrators on tasks: the tables between the marks in docs/results.md.
+"""Measures demonstrators on tasks: the tables between the marks in docs/results.md, and the anchors of scores.
 
 A cell holds the return, the task's metric, and in brackets the share of episodes that ended in a fall or with a
-foot under the ground.
+foot under the ground. Anchors are standing still and the best of the presets, in tasks with default settings; they
+go into the package.
 
 Example:
   python tools/results.py --tasks rough,steer --robots tick --difficulties 0.5 --episodes 4
   python tools/results.py --write
+  python tools/results.py --anchors
 """
 
 import contextlib
+import itertools
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,12 +19,15 @@ from pathlib import Path
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, evaluation, policies
+from arc_suite import checks, evaluation, files, policies
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
 from arc_suite.cpg.selection import presets_of
+from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
 LANES = (*terrain.KINDS, "course")
@@ -35,10 +41,12 @@ PRESETS = {
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),
 }
+# Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.
+WALK = ("zero", "medium", "tuned", "refined")
 METRICS = ("distance", "goals", "tracking")  # the first that a task has
 
 FLAGS = flags.FLAGS
-flags.DEFINE_list("tasks", list(PRESETS), "Which tasks.")
+flags.DEFINE_list("tasks", None, "Which tasks. [default: all]")
 flags.DEFINE_list("robots", list(ROBOTS), "Who walks.")
 flags.DEFINE_list("presets", None, "Of the demonstrator; zero stands still. [default: those that suit the task]")
 flags.DEFINE_list("difficulties", ["0.3333", "0.6667", "1"], "Of ground, from 0 to 1.")
@@ -46,6 +54,7 @@ flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many of each.", lower
 flags.DEFINE_integer("terrain_seed", 1, "Of what is random in the ground; learners train on others.", lower_bound=0)
 flags.DEFINE_integer("threads", None, "To simulate on. [default: as many as there are cores]", lower_bound=1)
 flags.DEFINE_boolean("write", False, "Write the tables into docs/results.md.")
+flags.DEFINE_boolean("anchors", False, "Measure anchors in place of tables, and write them into the package.")
 
 
 def cell(task: str, robot: str, preset: str, settings: dict) -> str:
@@ -98,6 +107,25 @@ def written(page: str, task: str, lines: list[str]) -> str:
     return found.sub("\n" + "\n".join(lines) + "\n\n", page, count=1)
 
 
+def anchor(robot: str, task: str) -> anchors.Returns:
+    """Return the returns of standing still and of the best preset of a robot in a task with default settings."""
+    setup, presets = Setup.of(robot, task), presets_of(ROBOTS[robot])
+    names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets)]
+    bar = program.progress(names, desc=f"{task} {robot}", leave=False)
+    found = {name: anchors.played(setup, name) for name in bar}
+    return {name: found[name] for name in (anchors.ZERO, anchors.of_returns(found).preset)}
+
+
+def write_anchors(tasks: list[str]) -> None:
+    """Measure anchors, and write each into the package; those of other places stay."""
+    order = [str(Setup.of(robot, task)) for task in TASKS for robot in ROBOTS]
+    for task, robot in itertools.product(tasks, FLAGS.robots):
+        known = anchors.read(anchors.TABLE) if anchors.TABLE.exists() else {}
+        known[str(Setup.of(robot, task))] = anchor(robot, task)
+        with files.writing(anchors.TABLE) as temporary:
+            anchors.write(temporary, {place: known[place] for place in order if place in known})
+
+
 def _number(text: str):
     with contextlib.suppress(ValueError):
         return float(text)
@@ -105,14 +133,17 @@ def _number(text: str):
 
 
 def main() -> None:
-    """Print a table for each task, and write it into the page."""
+    """Print a table for each task, and write it into the page; or write the anchors."""
     for robot in FLAGS.robots:
         presets = presets_of(ROBOTS[checks.name(robot, ROBOTS, "robot")])
         for preset in FLAGS.presets or ():
             checks.name(preset, ("zero", *presets), "preset")
-    for task in FLAGS.tasks:
-        checks.name(task, PRESETS, "task")
-    for task in FLAGS.tasks:
+    tasks = FLAGS.tasks or list(TASKS if FLAGS.anchors else PRESETS)
+    for task in tasks:
+        checks.name(task, TASKS if FLAGS.anchors else PRESETS, "task")
+    if FLAGS.anchors:
+        return write_anchors(tasks)
+    for task in tasks:
         lines = []
         for line in table(task):
             print(line, flush=True)

@@ -11,6 +11,8 @@ from arc_suite.agents.hyperparameters import BehaviourCloning, DAgger, ProximalP
 from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
 
+SOURCES = ("nothing", "prior data", "a demonstrator", "a policy")
+
 
 class Algorithm(NamedTuple):
     """An algorithm.
@@ -23,6 +25,7 @@ class Algorithm(NamedTuple):
         steps: environment steps of a run, by default.
         terrain_steps: the same in another arena than the flat one; None for as many.
         extends: whether a run can be extended to more steps, as no schedule hangs on them.
+        source: what it learns from, other than its own steps: one of `SOURCES`.
     """
 
     learner: str
@@ -32,6 +35,7 @@ class Algorithm(NamedTuple):
     steps: int = 1_000_000
     terrain_steps: int | None = None
     extends: bool = False
+    source: str = "nothing"
 
     @property
     def module(self) -> ModuleType:
@@ -80,7 +84,8 @@ _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 
 
 def _off_policy(hyperparameters: SoftActorCritic, summary: str, **defaults) -> Algorithm:
-    return Algorithm("arc_suite.agents.off_policy", hyperparameters, summary, extends=True, **defaults)
+    source = "nothing" if hyperparameters.prior == "none" else "prior data"
+    return Algorithm("arc_suite.agents.off_policy", hyperparameters, summary, extends=True, source=source, **defaults)
 
 
 # The paper's six, as in its published code, and others: docs/agents.md.
@@ -150,13 +155,24 @@ ALGORITHMS = {
         "proximal policy optimisation from the policy of another run, --hp start=FOLDER",
         evaluate_every=100_000,
         steps=500_000,
+        source="a policy",
     ),
     "dagger": Algorithm(
-        "arc_suite.agents.dagger", DAgger(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600
+        "arc_suite.agents.dagger",
+        DAgger(),
+        "imitation of a demonstrator",
+        evaluate_every=25_600,
+        steps=25_600,
+        source="a demonstrator",
     ),
     # Its steps are updates.
     "bc": Algorithm(
-        "arc_suite.agents.bc", BehaviourCloning(), "behaviour cloning of a dataset", evaluate_every=2500, steps=5000
+        "arc_suite.agents.bc",
+        BehaviourCloning(),
+        "behaviour cloning of a dataset",
+        evaluate_every=2500,
+        steps=5000,
+        source="prior data",
     ),
 }
 

@@ -1,7 +1,8 @@
 """Pictures of training: returns of evaluations over environment steps."""
 
-from collections.abc import Mapping
-from itertools import cycle
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,75 +10,162 @@ from matplotlib.ticker import EngFormatter
 
 from arc_suite.evaluation import curve
 
-# Okabe and Ito's colours, told apart by colour-blind eyes too.
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
-_GREY = "#8C8C8C"
+# Colour and marker of an algorithm in all pictures: Okabe and Ito's colours for the paper's six and PPO, Tol's muted
+# ones for the others. Both palettes are made for colour-blind eyes; markers tell apart what is near.
+STYLES = {
+    "sac": ("#0072B2", "o"),
+    "speq": ("#009E73", "s"),
+    "sope_eo": ("#E69F00", "^"),
+    "sacfd": ("#D55E00", "v"),
+    "speq_o2o": ("#CC79A7", "D"),
+    "sope": ("#56B4E9", "P"),
+    "ppo": ("#000000", "o"),
+    "sac_parallel": ("#882255", "X"),
+    "dagger": ("#999933", "*"),
+    "droq": ("#332288", "h"),
+    "finetune": ("#44AA99", "p"),
+    "bc": ("#DDCC77", "d"),
+}
+_OTHERS = (("#CC6677", "<"), ("#117733", ">"), ("#AA4499", "8"), ("#88CCEE", "H"))  # of other packages, in order
+_DASHES = ("-", "--", "-.", ":")  # of runs of one algorithm with other hyperparameters or data
+_GREY = "#6E6E6E"
+_GAP = 0.052  # between the labels of two levels, as a share of the axis
 
 
-def returns(evaluations: Mapping[str, np.ndarray], title: str, lines: Mapping[str, float]) -> Figure:
+class Curve(NamedTuple):
+    """Returns of a kind of run.
+
+    Attributes:
+        algorithm: which gives the colour.
+        steps: (points,) environment steps.
+        returns: (runs, points) mean return of each evaluation.
+    """
+
+    algorithm: str
+    steps: np.ndarray
+    returns: np.ndarray
+
+
+def returns(
+    evaluations: Mapping[str, np.ndarray],
+    algorithm: str,
+    title: str,
+    lines: Mapping[str, float],
+    finals: Mapping[str, float],
+) -> Figure:
     """Draw the learning curve of a run: the mean return of each evaluation, from the lowest to the highest episode.
 
     Args:
         evaluations: table of a run (`run_folder.table`).
+        algorithm: of the run.
         title: of the picture.
         lines: returns to compare with, by name.
+        finals: of the paper, by algorithm.
     """
     figure = Figure(figsize=(8.0, 4.5), dpi=120, layout="constrained")
     axis = figure.subplots()
     steps = np.unique(evaluations["step"])
     episodes = [evaluations["return"][evaluations["step"] == step] for step in steps]
     low, mean, high = np.array([(each.min(), each.mean(), each.max()) for each in episodes]).T
-    axis.fill_between(steps, low, high, color=_COLOURS[0], alpha=0.15, linewidth=0)
-    axis.plot(steps, mean, color=_COLOURS[0], marker="." if len(steps) < 15 else None)
-    _finish(axis, title, lines)
-    axis.set_ylabel("return of an evaluation")
+    colour, marker = _styles([algorithm])[algorithm]
+    axis.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0)
+    axis.plot(steps, mean, color=colour, marker=_shown(marker, steps))
+    _finish(axis, title, lines, finals, _styles([algorithm, *finals]))
+    axis.set_ylabel("return: mean, lowest and highest of ten episodes")
     return figure
 
 
 def study(
-    groups: Mapping[str, Mapping[str, tuple[np.ndarray, np.ndarray]]], lines: Mapping[str, Mapping[str, float]]
+    groups: Mapping[str, Mapping[str, Curve]],
+    lines: Mapping[str, Mapping[str, float]],
+    finals: Mapping[str, Mapping[str, float]],
 ) -> Figure:
-    """Draw the learning curves of a study: a row for each place, two pictures of the same numbers in it.
+    """Draw the learning curves of a study, a panel for each place.
 
-    On the left the mean over runs with their standard deviation, as in the paper; on the right the
-    interquartile mean with its 95 % bootstrap interval.
+    A curve is the interquartile mean over runs, with its 95 % bootstrap interval; of a single run the mean return.
 
     Args:
-        groups: steps (points,) and mean returns (runs, points) by place and kind of run. Of one run, the returns of
-            an evaluation's episodes (episodes, points).
+        groups: by place and kind of run.
         lines: returns to compare with, by place and name.
+        finals: of the paper, by place and algorithm.
     """
-    figure = Figure(figsize=(12.0, 3.6 * len(groups)), dpi=110, layout="constrained")
-    axes = figure.subplots(len(groups), 2, squeeze=False, sharey="row")
-    colours = dict(
-        zip(dict.fromkeys(kind for kinds in groups.values() for kind in kinds), cycle(_COLOURS), strict=False)
-    )
-    for (left, right), (place, kinds) in zip(axes, groups.items(), strict=True):
-        for kind, (steps, returns) in kinds.items():
-            mean, deviation, robust = returns.mean(axis=0), returns.std(axis=0), curve([returns])
-            bands = (left, mean, mean - deviation, mean + deviation), (right, robust.iqm, robust.low, robust.high)
-            for axis, middle, low, high in bands:
-                axis.fill_between(steps, low, high, color=colours[kind], alpha=0.15, linewidth=0)
-                axis.plot(steps, middle, color=colours[kind], label=kind, marker="." if len(steps) < 15 else None)
-        for axis, title in ((left, "mean, standard deviation"), (right, "interquartile mean, 95 % interval")):
-            _finish(axis, f"{place}: {title}", lines.get(place, {}))
-        right.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))  # off the curves
-        left.set_ylabel("return of an evaluation")
+    columns = min(len(groups), 2)
+    rows = -(-len(groups) // columns)
+    figure = Figure(figsize=(7.5 * columns, 3.9 * rows + 0.5), dpi=100, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False)
+    used = [each.algorithm for kinds in groups.values() for each in kinds.values()]
+    styles = _styles([*used, *(name for every in finals.values() for name in every)])
+    dashes = _dashes(groups)
+    for axis in axes.flat[len(groups) :]:
+        axis.remove()
+    for axis, (place, kinds) in zip(axes.flat, groups.items(), strict=False):
+        for kind, each in kinds.items():
+            colour, marker = styles[each.algorithm]
+            style = {"color": colour, "linestyle": dashes[kind], "marker": _shown(marker, each.steps), "markersize": 5}
+            robust = curve([each.returns])
+            if len(each.returns) > 1:
+                axis.fill_between(each.steps, robust.low, robust.high, color=colour, alpha=0.15, linewidth=0)
+            axis.plot(each.steps, robust.iqm, label=kind, **style)
+        _finish(axis, place, lines.get(place, {}), finals.get(place, {}), styles)
+    for axis in axes[:, 0]:
+        axis.set_ylabel("return of an evaluation")
+    handles = {label: line for axis in axes.flat for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles, loc="outside upper left", ncols=min(len(handles), 6), frameon=False)
     return figure
 
 
-def _finish(axis, title: str, lines: Mapping[str, float]) -> None:
-    """Draw returns to compare with, and label the picture."""
-    for value in lines.values():
-        axis.axhline(value, color=_GREY, linestyle="--", linewidth=1.0)
-    axis.set_ylim(bottom=min(axis.get_ylim()[0], 0.0))
-    room = 0.07 * np.ptp(axis.get_ylim())  # for a name above its line; where another line is nearer, it stands below
-    axis.set_ylim(top=max([axis.get_ylim()[1], *(value + room for value in lines.values())]))
-    for name, value in lines.items():
-        side = "top" if any(value < other < value + room for other in lines.values()) else "bottom"
-        axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va=side, color=_GREY)
+def _styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """Return colours and markers by algorithm; unknown ones get others, in order."""
+    others = itertools.cycle(_OTHERS)
+    return {name: STYLES[name] if name in STYLES else next(others) for name in dict.fromkeys(names)}
+
+
+def _dashes(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, str]:
+    """Return the pattern of the lines of each kind: kinds of one algorithm differ."""
+    kinds = {kind: each.algorithm for every in groups.values() for kind, each in every.items()}
+    counts = {name: itertools.cycle(_DASHES) for name in kinds.values()}
+    return {kind: next(counts[algorithm]) for kind, algorithm in kinds.items()}
+
+
+def _shown(marker: str, steps: np.ndarray) -> str | None:
+    return marker if len(steps) < 15 else None
+
+
+def _finish(axis, title: str, lines: Mapping[str, float], finals: Mapping[str, float], styles: Mapping) -> None:
+    """Draw levels to compare with, labelled on the right of the axis, where no line runs."""
+    levels = [(value, name, _GREY, "--") for name, value in lines.items()]
+    levels += [(value, f"{name}, paper", styles[name][0], ":") for name, value in finals.items()]
+    for value, _, colour, dashes in levels:
+        axis.axhline(value, color=colour, linestyle=dashes, linewidth=1.0, zorder=0)
+    low, high = axis.get_ylim()
+    low, high = min(low, 0.0), max([high, *(1.03 * value for value, *_ in levels)])
+    axis.set_ylim(low, high)
+    gap, levels = _GAP * (high - low), sorted(levels)
+    heights = _apart([value for value, *_ in levels], gap, high)
+    for (value, name, colour, _), height in zip(levels, heights, strict=True):
+        axis.annotate(
+            f"{name} {value:.0f}",
+            xy=(1.0, value),
+            xytext=(1.04, height),
+            xycoords=("axes fraction", "data"),
+            textcoords=("axes fraction", "data"),
+            va="center",
+            fontsize=8,
+            color=colour,
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0},
+        )
     axis.set_xlabel("environment steps")
     axis.set_title(title, loc="left", fontweight="bold")
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))
     axis.set_xlim(left=0.0)
     axis.spines[["top", "right"]].set_visible(False)
+
+
+def _apart(values: Sequence[float], gap: float, top: float) -> list[float]:
+    """Return heights near ascending values, `gap` or more apart, the highest at most at `top`."""
+    heights: list[float] = []
+    for value in values:
+        heights.append(max(value, heights[-1] + gap) if heights else value)
+    for index in reversed(range(len(heights))):
+        heights[index] = min(heights[index], top - gap * (len(heights) - 1 - index))
+    return heights

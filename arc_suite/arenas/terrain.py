@@ -6,11 +6,14 @@ trenches are boxes, since feet sink into a steep height field.
 
 import dataclasses
 import functools
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from dm_control import mjcf
 
+from arc_suite import checks
 from arc_suite.arenas import field
 from arc_suite.arenas.arena import Arena
 from arc_suite.robots.spec import Body
@@ -23,44 +26,75 @@ LEVEL = 3.0  # level ground ahead of the start, where nothing is said of it
 _LENGTH = 80.0  # ahead of the start, of arenas that no task has made
 _LANES = 3  # of these
 _CELL = 0.5  # of the height field
-_GRAIN = 1.0 / 16.0  # of stairs and trenches along x
+_GRAIN = 1.0 / 16.0  # of stairs and trenches along x, as near as a width is a multiple of it
 _THICKNESS = 2.0  # of the ground
 _TRENCH = 0.6  # depth
 _NEAR = 0.5  # how far around its centre the ground under a torso counts
 
 
-def _rough(random: np.random.RandomState, difficulty: float, x: np.ndarray, rows: int) -> np.ndarray:
+class Obstacle(NamedTuple):
+    """The size of what a lane puts in the way; lengths in standing heights.
+
+    Attributes:
+        rise: of a step, or the most of the nodes of rough ground.
+        slope: tangent of a ramp.
+        width: of a tread or a trench.
+    """
+
+    rise: float = 0.0
+    slope: float = 0.0
+    width: float = 1.0
+
+
+# Kind of ground -> what of an obstacle belongs to it, and that for a difficulty from 0 to 1.
+_DIFFICULTIES = {
+    "rough": lambda difficulty: {"rise": 0.45 * difficulty},
+    "slopes": lambda difficulty: {"slope": 0.3 * difficulty},
+    "stairs": lambda difficulty: {"rise": 0.05 + 0.25 * difficulty, "width": 1.0},
+    "gaps": lambda difficulty: {"width": round(1.0 + 9.0 * difficulty) * _GRAIN},
+}
+# What a caller may give in metres, the slope in radians, with bounds.
+SIZES = {"rise": (0.0, 100.0), "slope": (0.0, 1.2), "width": (1e-9, 1000.0)}
+_NARROWEST = 0.125  # tread or trench: every step is a box, and boxes take time
+
+
+def sizes(kinds: Sequence[str]) -> tuple[str, ...]:
+    """Return the sizes that a caller may give where all lanes are of these kinds: none of several kinds."""
+    return tuple(_DIFFICULTIES[kinds[0]](0.0)) if len(kinds) == 1 else ()
+
+
+def _rough(random: np.random.RandomState, obstacle: Obstacle, x: np.ndarray, rows: int) -> np.ndarray:
     """Nodes of random height, ramped in over twice the standing height."""
-    return random.uniform(0.0, 0.45 * difficulty, (rows, len(x))) * ((x - LEVEL) / 2.0).clip(0.0, 1.0)
+    return random.uniform(0.0, obstacle.rise, (rows, len(x))) * ((x - LEVEL) / 2.0).clip(0.0, 1.0)
 
 
-def _slopes(random: np.random.RandomState, difficulty: float, x: np.ndarray, rows: int) -> np.ndarray:
+def _slopes(random: np.random.RandomState, obstacle: Obstacle, x: np.ndarray, rows: int) -> np.ndarray:
     """Ramps of six heights up, three level, six down, three level; lanes begin with up to a height more of level."""
     place = (x - LEVEL - random.randint(3) * _CELL) % 18.0 * (x > LEVEL)
     ramp = np.minimum(place, 15.0 - place).clip(0.0, 6.0)
-    return np.broadcast_to(0.3 * difficulty * ramp, (rows, len(x)))
+    return np.broadcast_to(obstacle.slope * ramp, (rows, len(x)))
 
 
-def _stairs(random: np.random.RandomState, difficulty: float, x: np.ndarray) -> np.ndarray:
-    """Four steps up, a landing of three heights, four down, another; treads of one; lanes are shifted by up to one."""
-    place = x - LEVEL - random.randint(16) * _GRAIN
-    steps = np.floor(place.clip(0.0)) % 14.0  # up at 0, 1, 2, 3; the fourth tread goes on as the landing
-    up = (steps + 1.0).clip(0.0, 4.0) - (steps - 6.0).clip(0.0, 4.0)
-    return (0.05 + 0.25 * difficulty) * up * (place >= 0.0)
+def _stairs(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray, grain: float) -> np.ndarray:
+    """Four steps up, a landing of three treads, four down, another; lanes are shifted by up to 16 cells."""
+    place = cells - random.randint(16)
+    steps = place.clip(0) // round(obstacle.width / grain) % 14
+    up = (steps + 1).clip(0, 4) - (steps - 6).clip(0, 4)  # up at 0, 1, 2, 3; the fourth tread goes on as the landing
+    return obstacle.rise * up * (place >= 0)
 
 
-def _gaps(random: np.random.RandomState, difficulty: float, x: np.ndarray) -> np.ndarray:
-    """Trenches, 1/16 to 10/16 wide, a sixteenth for each level of a curriculum, across lands of 1.5 to 3."""
-    heights, at, width = np.zeros(len(x)), LEVEL, round(1.0 + 9.0 * difficulty) * _GRAIN
-    lands = np.round(random.uniform(1.5, 3.0, int(len(x) * _GRAIN)) / _GRAIN) * _GRAIN  # more than fit
+def _gaps(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray, grain: float) -> np.ndarray:
+    """Trenches across lands of 1.5 to 3."""
+    heights, at, width = np.zeros(len(cells)), 0, round(obstacle.width / grain)
+    lands = np.round(random.uniform(1.5, 3.0, int(len(cells) * grain)) / grain).astype(int)  # more than fit
     for land in lands:
-        heights[(x >= at) & (x < at + width)] = -_TRENCH
+        heights[(cells >= at) & (cells < at + width)] = -_TRENCH
         at += width + land
     return heights
 
 
-# Kind of ground -> heights, in standing heights, of a lane with its stream of random numbers, its difficulty from 0 to
-# 1 and its places along x.
+# Kind of ground -> heights, in standing heights, of a lane with its stream of random numbers and its obstacle, at
+# places along x, or in cells of a length from where the level ground ends.
 FIELDS = {"rough": _rough, "slopes": _slopes}
 STEPS = {"stairs": _stairs, "gaps": _gaps}
 KINDS = (*FIELDS, *STEPS)
@@ -75,13 +109,13 @@ class Terrain(Arena):
     Attributes:
         unit: m, the standing height of the body; all lengths are multiples of it.
         length: of the lanes ahead of the start, in units.
-        lanes: kind and difficulty of each, by the order of `KINDS`.
+        lanes: kind and obstacle of each, by the order of `KINDS`; stairs and trenches have widths of one grain.
         seed: of the random ground; a lane does not depend on its neighbours.
     """
 
     unit: float
     length: float
-    lanes: tuple[tuple[str, float], ...]
+    lanes: tuple[tuple[str, Obstacle], ...]
     seed: int = 0
 
     def start(self, lane):
@@ -113,7 +147,7 @@ class Terrain(Arena):
         """
         for top in np.unique(heights[heights > self._bottom]):
             edges = np.flatnonzero(np.diff(heights >= top, prepend=False, append=False))
-            for first, last in edges.reshape(-1, 2) * _GRAIN:
+            for first, last in edges.reshape(-1, 2) * self._grain:
                 size = np.array((0.5 * (last - first), 0.5 * WIDTH, 0.5 * _THICKNESS)) * self.unit
                 middle = np.array((0.5 * (first + last) - BACK, 0.0, top - 0.5 * _THICKNESS)) * self.unit
                 yield size, middle + (0.0, self.start(lane), 0.0)
@@ -135,7 +169,7 @@ class Terrain(Arena):
         """Heights (...) of stairs and trenches, in units, from the lanes' beginning and the first one's edge."""
         numpy, (lanes, cells) = along.__array_namespace__(), self._profiles.shape
         lane = numpy.floor(across / WIDTH).astype(int).clip(0, lanes - 1)
-        cell = numpy.floor(along / _GRAIN).astype(int).clip(0, cells - 1)
+        cell = numpy.floor(along / self._grain).astype(int).clip(0, cells - 1)
         return numpy.asarray(self._profiles).ravel()[lane * cells + cell]
 
     def torso_clearance(self, positions):
@@ -165,8 +199,8 @@ class Terrain(Arena):
         """Heights of the height field's nodes, in units, (rows, columns) for each lane."""
         x, rows = np.arange(0.0, BACK + self.length + _CELL, _CELL) - BACK, round(WIDTH / _CELL)
         return [
-            FIELDS[kind](self._random(lane), difficulty, x, rows)
-            for lane, (kind, difficulty) in enumerate(self.lanes[: self._fields])
+            FIELDS[kind](self._random(lane), obstacle, x, rows)
+            for lane, (kind, obstacle) in enumerate(self.lanes[: self._fields])
         ]
 
     @functools.cached_property
@@ -178,12 +212,18 @@ class Terrain(Arena):
     @functools.cached_property
     def _profiles(self) -> np.ndarray:
         """Heights of stairs and trenches, in units, (lanes, cells)."""
-        x = np.arange(0.0, BACK + self.length, _GRAIN) - BACK
+        cells = np.arange(math.ceil((BACK + self.length) / self._grain)) - math.ceil((BACK + LEVEL) / self._grain)
         profiles = [
-            STEPS[kind](self._random(lane), difficulty, x)
-            for lane, (kind, difficulty) in enumerate(self.lanes[self._fields :], self._fields)
+            STEPS[kind](self._random(lane), obstacle, cells, self._grain)
+            for lane, (kind, obstacle) in enumerate(self.lanes[self._fields :], self._fields)
         ]
-        return np.array(profiles).reshape(len(profiles), len(x))
+        return np.array(profiles).reshape(len(profiles), len(cells))
+
+    @functools.cached_property
+    def _grain(self) -> float:
+        """Length of a cell of stairs and trenches, in units: every width is a multiple of it."""
+        width = self.lanes[-1][1].width
+        return width / round(width / _GRAIN)
 
     @functools.cached_property
     def _bottom(self) -> float:
@@ -200,7 +240,14 @@ class Terrain(Arena):
         return np.random.RandomState((self.seed, KINDS.index(kind), before))
 
 
-def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(DIFFICULTY,), seed: int = 0) -> Terrain:
+def made(
+    body: Body,
+    kinds: Mapping[str, int],
+    length: float = _LENGTH,
+    levels=(DIFFICULTY,),
+    seed: int = 0,
+    given: Mapping[str, float] | None = None,
+) -> Terrain:
     """Return lanes of the size of a body.
 
     Args:
@@ -209,12 +256,26 @@ def made(body: Body, kinds: Mapping[str, int], length: float = _LENGTH, levels=(
         length: of lanes ahead of the start, in standing heights.
         levels: difficulties, from 0 to 1.
         seed: of the random lanes.
+        given: sizes of obstacles by name, m and rad, in place of those of the difficulties.
 
     Returns:
         The lanes: by kind, in the order of `KINDS`, then by difficulty.
+
+    Raises:
+        ValueError: treads or trenches too narrow for the body's size.
     """
-    lanes = [(kind, level) for kind in KINDS if kind in kinds for level in levels for _ in range(kinds[kind])]
-    return Terrain(body.torso.standing_height, length, tuple(lanes), seed)
+    unit = body.torso.standing_height
+    shares = {name: math.tan(size) if name == "slope" else size / unit for name, size in (given or {}).items()}
+    if "width" in shares:
+        checks.number("width", given["width"], _NARROWEST * unit)
+    lanes = [
+        (kind, Obstacle(**(_DIFFICULTIES[kind](level) | shares)))
+        for kind in KINDS
+        if kind in kinds
+        for level in levels
+        for _ in range(kinds[kind])
+    ]
+    return Terrain(unit, length, tuple(lanes), seed)
 
 
 def fitted(kind: str):

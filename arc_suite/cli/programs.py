@@ -15,9 +15,11 @@ PROGRAMS = (
     "tune_cpg",
     "train",
     "study",
+    "benchmark",
     "enter",
     "export",
     "survey",
+    "design",
     "doctor",
 )
 

@@ -59,10 +59,10 @@ def main(name: str | None = None) -> int:
     show = runner.shown(jobs)
     states = runner.make(runs, folder, results, jobs, show, progress)
     show(states, whole=True)
-    failed = [each.run.name for each in states if each.word == "failed"]
-    for each in failed:
-        print(f"{folder / each}.log: {last_line(folder / f'{each}.log')}", file=sys.stderr)
-    return 1 if failed else 0
+    failures = runner.failures(states, folder)
+    for line in failures:
+        print(line, file=sys.stderr)
+    return 1 if failures else 0
 
 
 def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
@@ -92,8 +92,3 @@ def shard(text: str) -> tuple[int, int]:
     if not (part.isdecimal() and parts.isdecimal() and int(part) < int(parts)):
         raise ValueError(f"--shard={text}: expected i/n with i from 0 to n - 1, such as 0/4")
     return int(part), int(parts)
-
-
-def last_line(log: Path) -> str:
-    """Return the last line of a log."""
-    return (log.read_text(encoding="utf-8", errors="replace").splitlines() or ["says nothing"])[-1]

@@ -27,6 +27,7 @@ from arc_suite.agents.training import train
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, named_values, only_body, task
 from arc_suite.cli.program import progress, use_one_thread
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
 from arc_suite.policies import network, onnx_file
 
 FLAGS = flags.FLAGS
@@ -72,7 +73,7 @@ def main() -> None:
             raise KeyboardInterrupt(f"interrupted; the same command resumes {folder}") from None
     if finished and importlib.util.find_spec("onnx"):
         onnx_file.save(folder / "policy.onnx", network.load(folder))
-    print(f"{folder}: {earned(folder) if finished else 'stopped; the same command resumes it'}")
+    print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
 
 
 def configured() -> Configuration:
@@ -92,10 +93,14 @@ def configured() -> Configuration:
     return Configuration.of(Setup.of(only_body(_ROBOT), *task()), FLAGS.algorithm, hyperparameters, *run)
 
 
-def earned(folder: Path) -> str:
+def earned(run: Configuration, folder: Path) -> str:
     """Return the result of a finished run, for people."""
     returns = run_folder.latest_returns(run_folder.table(folder, "evaluations"))
-    return f"finished, return {returns.mean():.1f} +- {returns.std():.1f}"
+    result, scale = returns.mean(), anchors.anchors(run.setup)
+    levels = f"standing still {scale.zero:.1f}"
+    if scale.demonstrator is not None:
+        levels = f"score {scale.score(result):z.2f} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
+    return f"finished, return {result:.1f} +- {returns.std():.1f}, {levels}"
 
 
 def picture(run: Configuration, folder: Path) -> Callable:
@@ -104,12 +109,14 @@ def picture(run: Configuration, folder: Path) -> Callable:
         return lambda step, metrics: None
     from arc_suite.agents import plots
 
-    expert = evaluation.expert_return(run.setup)
-    lines = {} if expert is None else {"the paper's demonstrator": expert}
-
     def draw(step, metrics):
         if "return" in metrics:
-            figure = plots.returns(run_folder.table(folder, "evaluations"), folder.name, lines)
+            scale = anchors.anchors(run.setup)
+            lines = {"standing still": scale.zero}
+            if scale.demonstrator is not None:
+                lines[f"demonstrator {scale.preset}"] = scale.demonstrator
+            finals = evaluation.published_finals(run.setup, [run.algorithm])
+            figure = plots.returns(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
             with files.writing(folder / "curve.png") as temporary:
                 figure.savefig(temporary)
 

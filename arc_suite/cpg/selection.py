@@ -60,20 +60,29 @@ def preset_names() -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for presets in (*PRESETS.values(), DEFAULTS) for name in presets))
 
 
-def suited_preset(task: Task) -> str:
-    """Return the preset that suits a task and its body best.
+def suited_presets(task: Task) -> tuple[str, ...]:
+    """Return the presets that suit a task and its body, the best first; empty where none does.
 
-    It is the first of the task's `demonstrators` that the body has and whose blocks the task observes; then
-    `steered`; then, where the task prescribes a walk, one that walks straight ahead.
+    They are those of the task's `demonstrators` that the body has and whose blocks the task observes; then
+    `steered`; then, where the task prescribes a walk, those that walk straight ahead.
+
+    Raises:
+        ValueError: as `presets_of`.
+    """
+    presets = presets_of(task.scene.body)
+    names = dict.fromkeys((*task.demonstrators, "steered", *(() if task.parameters is None else _AHEAD)))
+    return tuple(n for n in names if n in presets and set(_kind(presets[n]).reads) <= task.blocks.keys())
+
+
+def suited_preset(task: Task) -> str:
+    """Return the first of the presets that suit a task and its body.
 
     Raises:
         ValueError: no preset suits the task, or as `presets_of`.
     """
-    presets = presets_of(task.scene.body)
-    for name in (*task.demonstrators, "steered", *(() if task.parameters is None else _AHEAD)):
-        if name in presets and set(_kind(presets[name]).reads) <= task.blocks.keys():
-            return name
+    if names := suited_presets(task):
+        return names[0]
     raise ValueError(
         f"task {task.name}: nothing suits a task that observes no command and prescribes no gait; "
-        f"choose one of {', '.join(presets)}"
+        f"choose one of {', '.join(presets_of(task.scene.body))}"
     )

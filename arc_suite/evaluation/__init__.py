@@ -7,6 +7,7 @@ from arc_suite.evaluation.protocol import (
     episodes,
     episodes_in_batch,
     expert_return,
+    published_finals,
     rollout,
     run,
 )
@@ -35,6 +36,7 @@ __all__ = [
     "iqm_and_interval",
     "performance_profile",
     "probability_of_improvement",
+    "published_finals",
     "rollout",
     "run",
     "summary",

@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.paper import DEMONSTRATORS
+from arc_suite.paper import DEMONSTRATORS, FINALS
 from arc_suite.policies import Policy, alone
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting
@@ -32,8 +32,22 @@ class Episode(NamedTuple):
 
 def expert_return(setup: Setup) -> float | None:
     """Return what the paper's demonstrator earns; None for other tasks, settings and robots than the paper's."""
-    published = setup.kind.name == "walk" and not setup.task_kwargs
-    return DEMONSTRATORS.get(setup.body.name) if published else None
+    return DEMONSTRATORS.get(setup.body.name) if _is_published(setup) else None
+
+
+def published_finals(setup: Setup, algorithms: Iterable[str]) -> dict[str, float]:
+    """Return the paper's returns after 1,000,000 steps by algorithm, of those given, or of the best without any.
+
+    Empty for other tasks, settings and robots than the paper's.
+    """
+    finals = FINALS.get(setup.body.name, {}) if _is_published(setup) else {}
+    if given := {name: finals[name] for name in algorithms if name in finals}:
+        return given
+    return {name: value for name, value in finals.items() if value == max(finals.values())}
+
+
+def _is_published(setup: Setup) -> bool:
+    return setup.kind.name == "walk" and not setup.task_kwargs
 
 
 def check_ends(limit: float) -> None:

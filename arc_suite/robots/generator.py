@@ -6,7 +6,7 @@ they stand with every foot on the floor.
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
 # elevation above the horizontal in degrees. The first link sweeps, the others bend.
-_PROFILES = {
+PROFILES = {
     1: ((1.0, -50.0),),
     2: ((0.3, 5.0), (0.7, -55.0)),
     3: ((0.25, 10.0), (0.35, -30.0), (0.4, -80.0)),
@@ -45,7 +45,7 @@ _SPACING = 0.5  # of the height, between neighbouring legs of a side
 _REACH = 0.9  # of the height, from mount to foot
 
 
-class _Proportions(NamedTuple):
+class Proportions(NamedTuple):
     """Proportions of a generated body; lengths of the torso are half-extents.
 
     Attributes:
@@ -53,7 +53,7 @@ class _Proportions(NamedTuple):
         half_length, half_width: of the torso, m.
         thickness: half of it, of the height.
         fan: degrees by which the first pair of legs points forward and the last one backward.
-        profile: of every leg; see `_PROFILES`.
+        profile: of every leg; see `PROFILES`.
         reaches: of each pair, or of each leg around a torso: from mount to foot, seen from above, of
             the height.
     """
@@ -90,8 +90,8 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
         half_length = half_width = _SPACING * _HEIGHT * legs / (2.0 * math.pi)
     else:
         half_length, half_width = _SPACING * _HEIGHT * legs / 4.0, 0.4 * _HEIGHT
-    proportions = _Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, _PROFILES[links], (_REACH,) * legs)
-    return _body(f"walker_{legs}x{links}", legs, layout, proportions)
+    proportions = Proportions(_HEIGHT, half_length, half_width, 0.25, 35.0, PROFILES[links], (_REACH,) * legs)
+    return proportioned(f"walker_{legs}x{links}", legs, layout, proportions)
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
@@ -133,7 +133,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
     width = random.uniform(0.35, 0.7)
     unequal = random.uniform() < 0.4
     reaches = random.uniform(0.7, 1.2) * (random.uniform(0.75, 1.3, legs) if unequal else np.ones(legs))
-    proportions = _Proportions(
+    proportions = Proportions(
         height=height,
         half_length=half_length,
         half_width=half_length * (1.0 if layout == "radial" else width),
@@ -141,11 +141,11 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         fan=random.uniform(15.0, 45.0),
         profile=[
             (share * random.uniform(0.8, 1.2), elevation + random.uniform(-8.0, 8.0))
-            for share, elevation in _PROFILES[links]
+            for share, elevation in PROFILES[links]
         ],
         reaches=tuple(map(float, reaches)),
     )
-    return _body(f"random_{seed}", legs, layout, proportions)
+    return proportioned(f"random_{seed}", legs, layout, proportions)
 
 
 def scaled(body: Body, factor: float) -> Body:
@@ -199,25 +199,56 @@ def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
         ValueError: a value out of range, or a length grown out of range.
     """
     random, amount = np.random.default_rng(checks.seed(seed)), checks.number("amount", amount, 0.0, 0.5)
-    legs: dict[str, Leg] = {}
-    for leg in body.legs:
-        if leg.name in legs:
-            continue
-        legs[leg.name] = changed = _mutated_leg(leg, random, amount)
-        for other in body.legs:
-            if other.name not in legs and leg.mirrored(other.name) == other:
-                legs[other.name] = changed.mirrored(other.name)
+    return deformed(body, amount * random.standard_normal(deformations(body)))
+
+
+def deformations(body: Body) -> int:
+    """Return how many changes `deformed` takes: for every leg without a mirror image before it, its links and one."""
+    return sum(len(leg.links) + 1 for leg, _ in _with_images(body))
+
+
+def deformed(body: Body, changes: np.ndarray) -> Body:
+    """Return a body with legs of other lengths and headings; mirrored legs stay mirrored, and feet at their height.
+
+    Args:
+        body: to change.
+        changes: (deformations,) for each of these legs the logarithm of the factor of each link, and the turn of the
+            leg about the vertical, rad.
+
+    Returns:
+        The body, `<name>_mutated`, to be sized anew.
+
+    Raises:
+        ValueError: a length grown out of range.
+    """
+    legs, first = {}, 0
+    for leg, images in _with_images(body):
+        last = first + len(leg.links)
+        legs[leg.name] = changed = _deformed_leg(leg, changes[first:last, None], float(changes[last]))
+        legs |= {name: changed.mirrored(name) for name in images}
+        first = last + 1
     return _changed(body, "mutated", legs=tuple(legs[leg.name] for leg in body.legs))
 
 
-def _mutated_leg(leg: Leg, random: np.random.Generator, amount: float) -> Leg:
+def _with_images(body: Body) -> Iterator[tuple[Leg, list[str]]]:
+    """Yield every leg without a mirror image before it, and the names of its images behind it."""
+    seen = set()
+    for leg in body.legs:
+        if leg.name not in seen:
+            seen.add(leg.name)
+            images = [other.name for other in body.legs if other.name not in seen and leg.mirrored(other.name) == other]
+            seen.update(images)
+            yield leg, images
+
+
+def _deformed_leg(leg: Leg, logarithms: np.ndarray, turn: float) -> Leg:
     ends = np.array([link.end for link in leg.links])
     drop = ends[:, 2].sum()
-    ends *= np.exp(amount * random.standard_normal((len(ends), 1)))
+    ends *= np.exp(logarithms)
     if ends[:, 2].sum() * drop > 0.0:
         ends[:, 2] *= drop / ends[:, 2].sum()
     links = tuple(link.replace(end=tuple(map(float, end))) for link, end in zip(leg.links, ends, strict=True))
-    return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(amount * random.standard_normal()))
+    return leg.replace(links=links, yaw_deg=leg.yaw_deg + math.degrees(turn))
 
 
 def _changed(body: Body, how: str, legs: Sequence[Leg], **fields) -> Body:
@@ -239,7 +270,8 @@ def _check_layout(layout: str | None, legs: int) -> str:
     return checks.name(layout, LAYOUTS, "layout")
 
 
-def _body(name: str, legs: int, layout: str, proportions: _Proportions) -> Body:
+def proportioned(name: str, legs: int, layout: str, proportions: Proportions) -> Body:
+    """Return a body of given proportions; checked legs and layout are as in `generate`."""
     p = proportions
     if layout == "radial":
         all_legs = _around(legs, p)
@@ -251,7 +283,14 @@ def _body(name: str, legs: int, layout: str, proportions: _Proportions) -> Body:
     return Body(name=name, torso=Torso(standing_height=p.height, solids=(chassis,)), legs=all_legs)
 
 
-def _left_side(pairs: int, p: _Proportions) -> tuple[Leg, ...]:
+def places(legs: int, layout: str) -> np.ndarray:
+    """Return how far ahead the legs of `Proportions.reaches` are mounted: from 1, in front, to -1."""
+    if layout == "pairs":
+        return np.linspace(1.0, -1.0, legs // 2)
+    return np.cos(np.radians(_headings(legs)))
+
+
+def _left_side(pairs: int, p: Proportions) -> tuple[Leg, ...]:
     legs = []
     for i in range(pairs):
         along = 1.0 - 2.0 * i / (pairs - 1)  # 1 for the first leg, -1 for the last one
@@ -260,18 +299,22 @@ def _left_side(pairs: int, p: _Proportions) -> tuple[Leg, ...]:
     return tuple(legs)
 
 
-def _around(legs: int, p: _Proportions) -> tuple[Leg, ...]:
-    # An even number leaves the front free, so that both sides have as many.
-    start = 0.0 if legs % 2 else 180.0 / legs
+def _around(legs: int, p: Proportions) -> tuple[Leg, ...]:
     all_legs = []
-    for i in range(legs):
-        heading = (start + 360.0 * i / legs + 180.0) % 360.0 - 180.0
+    for i, heading in enumerate(_headings(legs)):
         mount = (0.8 * p.half_length * _cos(heading), 0.8 * p.half_width * _sin(heading), 0.0)
         all_legs.append(_leg(f"leg{i + 1}", mount, heading, p.reaches[i], p))
     return tuple(all_legs)
 
 
-def _leg(name: str, mount: Vector, heading: float, reach: float, p: _Proportions) -> Leg:
+def _headings(legs: int) -> list[float]:
+    """Return the headings of legs around a torso, degrees."""
+    # An even number leaves the front free, so that both sides have as many.
+    start = 0.0 if legs % 2 else 180.0 / legs
+    return [(start + 360.0 * i / legs + 180.0) % 360.0 - 180.0 for i in range(legs)]
+
+
+def _leg(name: str, mount: Vector, heading: float, reach: float, p: Proportions) -> Leg:
     """Return a leg that points to a heading (degrees, counter-clockwise from forward) and ends on the floor."""
     links = len(p.profile)
     foot_radius = 0.06 * p.height

@@ -13,20 +13,24 @@ from pathlib import Path
 
 import numpy as np
 
-from arc_suite import evaluation, files
+from arc_suite import files
+from arc_suite.evaluation import anchors
 from arc_suite.evaluation.entries import Entry
 
 PAGE, TABLE, ENTRIES = "README.md", "leaderboard.csv", "entries"
+STYLE = ("gait compliance", "heading error, rad", "torso pitch, rad")
 HEADS = (
-    *("robot, task", "algorithm", "return", "IQM [95 %]", "metric", "gait compliance", "heading error, rad"),
-    *("torso pitch, rad", "steps", "CPU min", "study", "command of seed 0"),
+    *("robot, task", "algorithm", "phases, updates", "prior data, episodes", "seeds", "return", "score", "IQM [95 %]"),
+    *("metric", *STYLE, "steps", "CPU min", "study", "command of seed 0", "configuration"),
 )
 _NAME = re.compile(r"[\w.-]+")
 _TEXT = (
     "All committed studies, written by `arc-suite study NAME --report`, and entries, written by `arc-suite enter`. "
-    "Return: mean of the latest evaluation, and interquartile mean with 95 % bootstrap interval over seeds, or of a "
-    "single seed over episodes. Then the task's own metric, speed in m/s; headings are relative to the x axis, which "
-    "is not the direction of a command."
+    "Return: mean of the latest evaluation. Score: (return - standing still) / (best demonstrator - standing still). "
+    "IQM: interquartile mean with 95 % bootstrap interval over seeds; a single seed has none. Then the task's own "
+    "metric, speed in m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one "
+    "configuration that several studies have are in one row. Phases: the most updates of the critics alone; 75,000 are "
+    "published."
 )
 
 
@@ -44,9 +48,16 @@ def write(folder: Path, lines: Sequence[Sequence[str]]) -> None:
     with files.writing(folder / TABLE) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
     every = [row for path in sorted(folder.parent.glob(f"*/{TABLE}")) for row in _rows(path)]
-    every.sort(key=lambda row: (row[0], -float(row[2])))
+    once: dict[str, dict[str, str]] = {}
+    for row in (dict(zip(HEADS, cells, strict=True)) for cells in every):
+        known = once.get(row["configuration"])
+        if known is None or int(row["seeds"]) > int(known["seeds"]):
+            once[row["configuration"]] = row
+    shown = sorted(once.values(), key=lambda row: (row["robot, task"], -float(row["return"])))
+    heads = HEADS[:-1]  # the configuration is for this choice alone
+    page = table(heads, [[row[head] for head in heads] for row in shown])
     with files.writing(folder.parent / PAGE) as temporary:
-        temporary.write_text(f"# Leaderboard\n\n{_TEXT}\n\n{table(HEADS, every)}\n", encoding="utf-8")
+        temporary.write_text(f"# Leaderboard\n\n{_TEXT}\n\n{page}\n", encoding="utf-8")
 
 
 def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> Path:
@@ -64,8 +75,7 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
     Raises:
         ValueError: a name of other characters than letters, digits, `_`, `-` and `.`.
     """
-    if not _NAME.fullmatch(name):
-        raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
+    checked_name(name)
     folder = files.folder(studies / ENTRIES)
     rows = {(row[0], row[1]): row for row in (_rows(folder / TABLE) if (folder / TABLE).exists() else ())}
     for entry in entries:
@@ -74,15 +84,36 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
         with files.writing(copied) as temporary:
             temporary.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
         totals = np.array([episode.total for episode in entry.episodes])
-        middle, (low, high) = evaluation.iqm_and_interval([totals])
+        score = float(anchors.anchors(entry.setup).score(totals.mean()))
         figures = {key: np.mean([each.progress[key] for each in entry.episodes]) for key in entry.episodes[0].progress}
         figure = next(iter(figures))
         compliance = f"{figures['gait_compliance']:.3f}" if "gait_compliance" in figures else "-"
-        result = f"{totals.mean():.1f}", f"{middle:.1f} [{low:.1f}, {high:.1f}]", f"{figure} {figures[figure]:.3f}"
-        link = f"[entry]({ENTRIES}/{copied.name})"
-        rows[place, name] = [place, name, *result, compliance, "-", "-", "-", "-", link, _command(entry)]
+        cells = dict.fromkeys(HEADS, "-") | {
+            "robot, task": place,
+            "algorithm": name,
+            "seeds": "1",
+            "return": f"{totals.mean():.1f}",
+            "score": f"{score:z.2f}" if np.isfinite(score) else "-",
+            "metric": f"{figure} {figures[figure]:.3f}",
+            STYLE[0]: compliance,
+            "study": f"[entry]({ENTRIES}/{copied.name})",
+            "command of seed 0": _command(entry),
+            "configuration": copied.name,
+        }
+        rows[place, name] = list(cells.values())
     write(folder, list(rows.values()))
     return studies / PAGE
+
+
+def checked_name(name: str) -> str:
+    """Return the name of a learner.
+
+    Raises:
+        ValueError: it has other characters than letters, digits, `_`, `-` and `.`.
+    """
+    if not _NAME.fullmatch(name):
+        raise ValueError(f"--name={name}: expected letters, digits, _, - and .")
+    return name
 
 
 def table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

@@ -1,20 +1,18 @@
 """Publication: copies the results of runs that are committed, with the style of their latest policies."""
 
 import contextlib
-import csv
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 
 from arc_suite import evaluation, files, policies, style
 from arc_suite.agents import run_folder
 from arc_suite.agents.run_folder import table
-from arc_suite.cpg import suited_preset
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
 from arc_suite.policies import Policy, checkpoints, network
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.studies import results
@@ -26,7 +24,7 @@ PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
 # Metrics of `arc_suite.style` by which the final policies are compared.
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 
-# Presets of demonstrators whose returns are published, in `walk`, and in tasks with a command; and the suited one.
+# Presets of demonstrators whose returns are published, in `walk`, and in tasks with a command; and the best one.
 PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
 
 
@@ -81,7 +79,7 @@ def _phases(training: Mapping[str, np.ndarray]) -> str:
 
 
 def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
-    """Publish all evaluated runs of a study, and the returns of demonstrators in the same tasks.
+    """Publish all evaluated runs of a study, and what standing still and demonstrators earn in the same tasks.
 
     Raises:
         OSError: a file cannot be written.
@@ -89,36 +87,20 @@ def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
     for run in runs:
         publish(run, folder, published)
     known = results.demonstrators(published)
-    places = {run.place: run for run in runs}
-    if places.keys() <= known.keys() or not published.exists():
+    setups = {run.place: run.configuration.setup for run in runs}
+    if setups.keys() <= known.keys() or not published.exists():
         return
-    with (
-        files.writing(published / results.DEMONSTRATORS) as temporary,
-        temporary.open("w", encoding="utf-8", newline="") as file,
-    ):
-        lines = csv.writer(file, lineterminator="\n")
-        lines.writerow(("place", "preset", "seed", "return"))
-        for place, presets in known.items():
-            for preset, totals in presets.items():
-                lines.writerows((place, preset, seed, repr(float(total))) for seed, total in enumerate(totals))
-        for place, run in places.items():
-            if place not in known:
-                for preset, episodes in _demonstrated(run.configuration.setup).items():
-                    lines.writerows((place, preset, seed, repr(each.total)) for seed, each in enumerate(episodes))
+    measured = {place: _demonstrated(setup) for place, setup in setups.items() if place not in known}
+    with files.writing(published / results.DEMONSTRATORS) as temporary:
+        anchors.write(temporary, known | measured)
 
 
-def _demonstrated(setup: Setup) -> dict[str, list[evaluation.Episode]]:
-    """Return the episodes of the evaluation protocol by the demonstrators of a body, by preset."""
-    found = {}
-    environment = setup.make_vec(evaluation.EPISODES, num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
-    with contextlib.closing(environment):
-        task = environment.task.definition
-        usual = COMMANDED if "command" in task.blocks else PRESETS
-        for preset in dict.fromkeys((*usual, suited_preset(task))):
-            if preset in presets_of(setup.body):
-                policy = policies.policy("cpg", setup.body, preset, evaluation.EPISODES, task=task)
-                found[preset] = evaluation.episodes_in_batch(environment, policy)
-    return found
+def _demonstrated(setup: Setup) -> anchors.Returns:
+    """Return the returns of the evaluation protocol of standing still and of demonstrators of a body, by policy."""
+    found = dict(anchors.known(setup) or anchors.measured(setup))
+    usual = COMMANDED if "command" in setup.definition.blocks else PRESETS
+    missing = [preset for preset in usual if preset in presets_of(setup.body) and preset not in found]
+    return found | {preset: anchors.played(setup, preset) for preset in missing}
 
 
 @contextlib.contextmanager

@@ -1,114 +1,26 @@
 """Reports of studies: Markdown and curves, of published tables alone."""
 
+import hashlib
 import itertools
+import json
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import checks, evaluation, files
 from arc_suite.agents import run_folder
-from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
 from arc_suite.paper import FINALS as PAPER
-from arc_suite.studies import leaderboard, results, tables
+from arc_suite.studies import claims, leaderboard, results, tables
 from arc_suite.studies.leaderboard import table
 from arc_suite.studies.results import STRIP, Result
 from arc_suite.studies.tables import Run, Study
 
 REPORT, CURVES = "README.md", "curves.png"
 
-ONLINE = ("sac", "speq", "sope_eo")
-WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
-COMPETITIVE = 100.0  # of return: within it of the best online algorithm the paper calls SAC competitive
-
 Groups = Mapping[str, Mapping[str, Sequence[Result]]]
-_Of = Callable[[str, str], float | None]  # robot and algorithm -> a figure; None where there is none
-
-
-class Claim(NamedTuple):
-    """A claim of the paper.
-
-    Attributes:
-        text: in short.
-        compared: of a robot and the metrics of algorithms, the margin, which is above zero if the claim holds; None
-            if a metric is missing.
-        figure: the metric of a result.
-        in_paper: whether the paper's final returns decide the claim, too.
-    """
-
-    text: str
-    compared: Callable[[str, _Of], float | None]
-    figure: Callable[[Result], float]
-    in_paper: bool = False
-
-
-def _difference(first: float | None, second: float | None) -> float | None:
-    return None if first is None or second is None else first - second
-
-
-def _least(values: Sequence[float | None]) -> float | None:
-    return None if None in values else min(values)
-
-
-def _metric(name: str) -> Callable[[Result], float]:
-    """The mean size of a metric of style over the episodes in which it is finite; NaN where there is none."""
-
-    def figure(result):
-        sizes = np.abs(result.style.get(name, np.empty(0)))
-        return float(sizes[np.isfinite(sizes)].mean()) if np.isfinite(sizes).any() else np.nan
-
-    return figure
-
-
-def _final(result: Result) -> float:
-    return result.final
-
-
-def _of_all(names: Sequence[str]) -> Callable[[str, _Of], float | None]:
-    """The least lead of some algorithms over the paper's demonstrator."""
-    return lambda robot, of: _least(
-        [_difference(of(robot, n), evaluation.expert_return(Setup.of(robot))) for n in names]
-    )
-
-
-def _pairs(robot: str, of: _Of) -> float | None:
-    pairs = zip(WITH_PRIOR, ONLINE, strict=True)
-    return _least([_difference(of(robot, with_prior), of(robot, online)) for with_prior, online in pairs])
-
-
-def _most(name: str) -> Callable[[str, _Of], float | None]:
-    """The least lead of an algorithm over the other five."""
-    others = [other for other in (*ONLINE, *WITH_PRIOR) if other != name]
-    return lambda robot, of: _least([_difference(of(robot, name), of(robot, other)) for other in others])
-
-
-def _best_online(robot: str, of: _Of) -> float | None:
-    """The lead of SOPE-EO over the other two, on Tick of SPEQ."""
-    best = "speq" if robot == "tick" else "sope_eo"
-    return _least([_difference(of(robot, best), of(robot, other)) for other in ONLINE if other != best])
-
-
-def _sac_lags(robot: str, of: _Of) -> float | None:
-    """By how much more than `COMPETITIVE` SAC stays below the best online algorithm; on Queen, by how much less."""
-    figures = [of(robot, name) for name in ONLINE]
-    if None in figures:
-        return None
-    lag = max(figures) - figures[0] - COMPETITIVE
-    return -lag if robot == "queen" else lag
-
-
-CLAIMS = (
-    Claim("all online algorithms surpass the demonstrator", _of_all(ONLINE), _final, True),
-    Claim("SOPE-EO is the best online algorithm, on Tick SPEQ", _best_online, _final, True),
-    Claim("SAC is competitive on Queen alone", _sac_lags, _final, True),
-    Claim("with prior data all start higher", _pairs, lambda result: float(result.returns[0].mean())),
-    Claim("with prior data all end higher than without", _pairs, _final, True),
-    Claim("SAC walks sideways: the largest heading error, rad", _most("sac"), _metric("heading_error")),
-    Claim("SPEQ pitches forwards: the largest pitch, rad", _most("speq"), _metric("torso_pitch")),
-    Claim("SOPE looks best: the most gait compliance", _most("sope"), _metric("gait_compliance")),
-)
 
 
 def write(name: str, study: Study, published: Path) -> Path:
@@ -132,35 +44,39 @@ def write(name: str, study: Study, published: Path) -> Path:
     groups, demonstrators = results.grouped(found), results.demonstrators(published)
     sections = {
         f"Study {name}": [_title(study, found), _reached(found)],
-        "Curves": [f"![Returns over environment steps]({CURVES})"],
+        "Curves": [_CURVES, f"![Returns over environment steps]({CURVES})"],
         "Final returns": [_FINALS, _finals(groups, demonstrators)],
-        "Sample efficiency": [_EFFICIENCY, _efficiency(groups)],
-        "Probability of improvement": [_IMPROVEMENT, _improvements(groups)],
+        "Sample efficiency": [_EFFICIENCY, _efficiency(groups, demonstrators)],
+        **({"Probability of improvement": [_IMPROVEMENT, compared]} if (compared := _improvements(groups)) else {}),
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
         "Style": [_STYLE, _style(groups), *_strips(name, groups, published)],
-        "Claims of the paper": [_CLAIMS, _claims(found)],
+        **({"Claims of the paper": [claims.TEXT, claims.checked(found)]} if any(map(claims.is_papers, found)) else {}),
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
     with files.writing(published / REPORT) as temporary:
         temporary.write_text(_page(sections), encoding="utf-8")
-    leaderboard.write(published, _rows(published.name, groups))
+    leaderboard.write(published, _rows(published.name, groups, demonstrators))
     return published / REPORT
 
 
+_CURVES = (
+    "Interquartile mean over seeds with its 95 % bootstrap interval; of a single seed the mean. Dashed: standing "
+    "still and demonstrators. Dotted: the paper's returns after 1,000,000 steps."
+)
 _FINALS = (
-    "Mean of the latest evaluation, ten seeded episodes, and standard deviation over seeds, or of a single seed over "
-    "its episodes; interquartile mean with 95 % bootstrap interval over the same. The last column is the paper's, "
-    "after 1,000,000 steps, read off its curves within about 30. Then come the demonstrators."
+    "Mean of the latest evaluation, ten seeded episodes, and standard deviation over seeds; interquartile mean with "
+    "95 % bootstrap interval over seeds. A single seed has neither. Score: (return - standing still) / (best "
+    "demonstrator - standing still). The last column is the paper's, after 1,000,000 steps, read off its curves within "
+    "about 30. Then come standing still and the demonstrators, with the standard deviation over episodes."
 )
 _EFFICIENCY = (
-    "Environment steps and minutes of one core until an evaluation has the return of the paper's demonstrator, and "
-    "3,500; a dash if it has not. Area is the mean return over all evaluations so far."
+    "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
+    "it has not. Area is the mean return over all evaluations so far."
 )
 _IMPROVEMENT = (
     "Probability that an algorithm has a higher return than that of the column, with 95 % bootstrap interval, over "
-    "all robots and tasks, at the latest step that both have reached. With one seed, episodes stand for runs: the "
-    "interval then says nothing about other seeds."
+    "the places in which both have several seeds, at the latest step that both have reached."
 )
 _PHASES = (
     "Updates of the critics alone in a stabilisation phase, for runs with published phases: those of `speq` and "
@@ -174,10 +90,6 @@ _STRIPS = (
     "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle, to the nearest control "
     "step: the fifth cycle, or the latest whole one before a fall. The camera moves along and keeps its direction; in "
     "tasks with a command it looks straight ahead. The command line makes a page that plays the policy."
-)
-_CLAIMS = (
-    "Margin of each claim, in its own unit: it holds above zero. The paper's margin is from its final returns after "
-    "1,000,000 steps, if they decide the claim. Ours are from finished runs alone, at their steps."
 )
 
 
@@ -204,31 +116,44 @@ def _reached(found: Sequence[Result]) -> str:
 def _curves(groups: Groups, demonstrators):
     from arc_suite.agents import plots  # needs matplotlib
 
-    drawn = {}
+    drawn, finals = {}, {}
     for place, kinds in groups.items():
         drawn[place] = {}
         for kind, seeds in kinds.items():
             count = min(len(each.steps) for each in seeds)
-            several = np.array([each.returns.mean(axis=1)[:count] for each in seeds])
-            drawn[place][kind] = seeds[0].steps[:count], several if len(seeds) > 1 else seeds[0].returns.T
-    lines = {p: {f"demonstrator {n}": v.mean() for n, v in d.items()} for p, d in demonstrators.items()}
-    return plots.study(drawn, lines)
+            returns = np.array([each.returns.mean(axis=1)[:count] for each in seeds])
+            drawn[place][kind] = plots.Curve(_algorithm(seeds[0].run), seeds[0].steps[:count], returns)
+        finals[place] = evaluation.published_finals(
+            seeds[0].run.configuration.setup, [each.algorithm for each in drawn[place].values()]
+        )
+    lines = {p: {_policy(n): v.mean() for n, v in every.items()} for p, every in demonstrators.items()}
+    return plots.study(drawn, lines, finals)
+
+
+def _algorithm(run: Run) -> str:
+    return run.configuration.algorithm
+
+
+def _policy(name: str) -> str:
+    """The name of an anchor for people."""
+    return "standing still" if name == anchors.ZERO else f"demonstrator {name}"
 
 
 def _mean(values: np.ndarray) -> str:
-    return f"{values.mean():.1f} +- {values.std():.1f}"
+    return f"{values.mean():.1f}" + (f" +- {values.std():.1f}" if len(values) > 1 else "")
 
 
 def _iqm(values: np.ndarray) -> str:
+    if len(values) == 1:
+        return "-"
     middle, (low, high) = evaluation.iqm_and_interval([values])
     return f"{middle:.1f} [{low:.1f}, {high:.1f}]"
 
 
-def _is_papers(result: Result) -> bool:
-    """Return whether the paper's table of final returns has a run."""
-    setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
-    plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
-    return plain and algorithm in PAPER.get(setup.body.name, {})
+def _score(values: np.ndarray, place: str, demonstrators) -> str:
+    """The score of mean returns, a dash without anchors."""
+    found = anchors.of_returns(demonstrators[place]).score(values.mean()) if place in demonstrators else np.nan
+    return f"{found:z.2f}" if np.isfinite(found) else "-"
 
 
 def _expert(run: Run) -> float | None:
@@ -241,45 +166,46 @@ def _finals(groups: Groups, demonstrators) -> str:
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
             run, values = seeds[0].run, results.scores(seeds)
-            paper = (
-                str(PAPER[run.configuration.setup.body.name][run.configuration.algorithm])
-                if _is_papers(seeds[0])
-                else "-"
-            )
-            reached = f"{min(each.steps[-1] for each in seeds):,}"
-            lines.append((place, kind, reached, str(len(seeds)), _mean(values), _iqm(values), paper))
+            own = PAPER[run.configuration.setup.body.name][_algorithm(run)] if claims.is_papers(seeds[0]) else "-"
+            reached, score = f"{min(each.steps[-1] for each in seeds):,}", _score(values, place, demonstrators)
+            lines.append((place, kind, reached, str(len(seeds)), _mean(values), score, _iqm(values), str(own)))
         expert = _expert(run)
-        for preset, totals in demonstrators.get(place, {}).items():
-            paper = f"{expert:.0f}" if preset == "medium" and expert else "-"
-            lines.append((place, f"demonstrator {preset}", "-", "-", _mean(totals), _iqm(totals), paper))
-    return table(("robot, task", "algorithm", "steps", "seeds", "return", "IQM [95 %]", "paper, 1M steps"), lines)
-
-
-def _efficiency(groups: Groups) -> str:
-    lines = []
-    for place, kinds in groups.items():
-        for kind, seeds in kinds.items():
-            expert = _expert(seeds[0].run)
-            cells = []
-            for threshold in (expert, 3500.0):
-                steps, seconds = (np.inf, np.inf) if threshold is None else results.until(seeds, threshold)
-                cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
-            area = np.mean([each.returns.mean() for each in seeds])
-            lines.append((place, kind, *cells, f"{area:.1f}"))
-    heads = ("robot, task", "algorithm", "steps to demonstrator", "CPU min", "steps to 3,500", "CPU min", "area")
+        for name, totals in demonstrators.get(place, {}).items():
+            own = f"{expert:.0f}" if name == "medium" and expert else "-"
+            score = _score(totals, place, demonstrators)
+            lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own))
+    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]", "paper, 1M steps")
     return table(heads, lines)
 
 
-def _improvements(groups: Groups) -> str:
-    names = list(dict.fromkeys(kind for kinds in groups.values() for kind in kinds))
+def _efficiency(groups: Groups, demonstrators) -> str:
     lines = []
-    for x in names:
-        cells = []
-        for y in names:
-            found = None if x == y else results.improvement(groups, x, y)
-            cells.append("-" if found is None else "{:.2f} [{:.2f}, {:.2f}]".format(found[0], *found[1]))
-        lines.append((x, *cells))
-    return table(("more than", *names), lines)
+    for place, kinds in groups.items():
+        half = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf
+        for kind, seeds in kinds.items():
+            cells = []
+            for threshold in (half, 3500.0):
+                steps, seconds = results.until(seeds, threshold)
+                cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
+            area = np.mean([each.returns.mean() for each in seeds])
+            lines.append((place, kind, *cells, f"{area:.1f}"))
+    heads = ("robot, task", "algorithm", "steps to score .5", "CPU min", "steps to 3,500", "CPU min", "area")
+    return table(heads, lines)
+
+
+def _improvements(groups: Groups) -> str | None:
+    """The table of all kinds that can be compared; None without any."""
+    names = list(dict.fromkeys(kind for kinds in groups.values() for kind in kinds))
+    found = {pair: results.improvement(groups, *pair) for pair in itertools.permutations(names, 2)}
+    found = {pair: each for pair, each in found.items() if each is not None}
+    names = [name for name in names if any(name in pair for pair in found)]
+    if not names:
+        return None
+
+    def cell(pair):
+        return "{:.2f} [{:.2f}, {:.2f}]".format(found[pair][0], *found[pair][1]) if pair in found else "-"
+
+    return table(("more than", *names), [(x, *(cell((x, y)) for y in names)) for x in names])
 
 
 def _phases(groups: Groups) -> str:
@@ -304,27 +230,8 @@ def _style(groups: Groups) -> str:
 
 
 def _size(name: str, seeds: Sequence[Result]) -> str:
-    size = np.mean([_metric(name)(each) for each in seeds])
+    size = np.mean([results.size(each.style.get(name, np.empty(0))) for each in seeds])
     return "-" if np.isnan(size) else f"{size:.3f}"
-
-
-def _claims(found: Sequence[Result]) -> str:
-    own = [each for each in found if _is_papers(each) and each.steps[-1] >= each.run.configuration.steps]
-    lines = []
-    for claim in CLAIMS:
-
-        def measured(robot, name, claim=claim):
-            figures = [claim.figure(each) for each in own if _robot_and_algorithm(each) == (robot, name)]
-            return float(np.mean(figures)) if figures else None
-
-        paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
-        ours = {robot: claim.compared(robot, measured) for robot in PAPER}
-        lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
-    return table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
-
-
-def _robot_and_algorithm(result: Result) -> tuple[str, str]:
-    return result.run.configuration.setup.body.name, result.run.configuration.algorithm
 
 
 def _strips(name: str, groups: Groups, published: Path) -> list[str]:
@@ -350,17 +257,7 @@ def _setting(item: tuple[str, object]) -> str:
     return f"--set={name}={value if isinstance(value, str) else checks.json_text(name, value)}"
 
 
-def _leads(figures: Mapping[str, float | None]) -> str:
-    known = {robot: figure for robot, figure in figures.items() if figure is not None}
-    return ", ".join(f"{robot} {figure:+.4g}" for robot, figure in known.items()) or "-"
-
-
-def _verdict(figures: Mapping[str, float | None]) -> str:
-    known = [figure > 0.0 for figure in figures.values() if figure is not None]
-    return f"{sum(known)} of {len(known)} robots" if known else "not measured"
-
-
-def _rows(name: str, groups: Groups) -> list[tuple[str, ...]]:
+def _rows(name: str, groups: Groups, demonstrators) -> list[tuple[str, ...]]:
     """Return the rows of a study in the leaderboard, by `leaderboard.HEADS`."""
     rows = []
     for seeds in (seeds for kinds in groups.values() for seeds in kinds.values()):
@@ -368,10 +265,34 @@ def _rows(name: str, groups: Groups) -> list[tuple[str, ...]]:
         figure = next(iter(seeds[0].progress))
         own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
         style = [_size(metric, seeds) for metric in ("gait_compliance", "heading_error", "torso_pitch")]
-        command = f"arc-suite train --config studies/{name}/{run.name}/{run_folder.CONFIG}"
-        steps = f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}"
-        cpu = f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}"
-        result = f"{np.mean([each.final for each in seeds]):.1f}"
-        link = f"[{name}]({name}/{REPORT})"
-        rows.append((run.place, run.kind, result, _iqm(values), own, *style, steps, cpu, link, f"`{command}`"))
+        cells = {
+            "robot, task": run.place,
+            "algorithm": run.kind,
+            "phases, updates": _phase_length(run),
+            "prior data, episodes": f"{run.prior.preset}, {run.prior.episodes:,}" if run.prior else "-",
+            "seeds": str(len(seeds)),
+            "return": f"{values.mean():.1f}",
+            "score": _score(values, run.place, demonstrators),
+            "IQM [95 %]": _iqm(values),
+            "metric": own,
+            **dict(zip(leaderboard.STYLE, style, strict=True)),
+            "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
+            "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
+            "study": f"[{name}]({name}/{REPORT})",
+            "command of seed 0": f"`arc-suite train --config studies/{name}/{run.name}/{run_folder.CONFIG}`",
+            "configuration": _identity(run),
+        }
+        rows.append(tuple(cells[head] for head in leaderboard.HEADS))
     return rows
+
+
+def _phase_length(run: Run) -> str:
+    """The most updates of a stabilisation phase."""
+    length = getattr(run.configuration.hyperparameters, "phase_updates", 0)
+    return f"{length:,}" if length else "-"
+
+
+def _identity(run: Run) -> str:
+    """A hash of the configuration without its seed: runs that differ in nothing else have the same."""
+    fields = {name: value for name, value in run.configuration.to_dict().items() if name != "seed"}
+    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()[:12]

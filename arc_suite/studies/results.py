@@ -1,6 +1,5 @@
 """Results of studies: the published tables of their runs, and statistics over them."""
 
-import csv
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -9,6 +8,7 @@ import numpy as np
 
 from arc_suite import evaluation
 from arc_suite.agents import run_folder
+from arc_suite.evaluation import anchors
 from arc_suite.studies.tables import Run
 
 DEMONSTRATORS = "demonstrators.csv"
@@ -72,13 +72,9 @@ def _result(run: Run, folder: Path) -> Result:
 
 
 def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
-    """Return the returns of demonstrators, by place (`Run.place`) and preset, each (episodes,)."""
-    found: dict[str, dict[str, list[float]]] = {}
-    if (published / DEMONSTRATORS).exists():
-        with (published / DEMONSTRATORS).open(encoding="utf-8", newline="") as file:
-            for line in csv.DictReader(file):
-                found.setdefault(line["place"], {}).setdefault(line["preset"], []).append(float(line["return"]))
-    return {place: {name: np.array(values) for name, values in presets.items()} for place, presets in found.items()}
+    """Return the returns of standing still and of demonstrators, (episodes,), by place (`Run.place`) and policy."""
+    path = published / DEMONSTRATORS
+    return anchors.read(path) if path.exists() else {}
 
 
 def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
@@ -90,8 +86,14 @@ def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
 
 
 def scores(seeds: Sequence[Result]) -> np.ndarray:
-    """Return the mean return of each seed, (seeds,), or of a single seed the returns of its episodes, (episodes,)."""
-    return seeds[0].returns[-1] if len(seeds) == 1 else np.array([each.final for each in seeds])
+    """Return the mean return of each seed, (seeds,)."""
+    return np.array([each.final for each in seeds])
+
+
+def size(values: np.ndarray) -> float:
+    """Return the mean size of the values that are finite; NaN where none are."""
+    sizes = np.abs(values[np.isfinite(values)])
+    return float(sizes.mean()) if sizes.size else np.nan
 
 
 def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
@@ -109,12 +111,13 @@ def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
 
 
 def improvement(groups: dict[str, dict[str, list[Result]]], x: str, y: str) -> tuple[float, tuple[float, float]] | None:
-    """Return the probability that a run of kind x earns more than one of y, with its interval; None without pairs.
+    """Return the probability that a run of kind x earns more than one of y, with its interval.
 
-    Places are strata. Both are compared at the latest step that all their runs have reached.
+    Places in which both have several seeds are strata. Both are compared at the latest step that all their runs have
+    reached. None without such a place.
     """
     pairs = [(kinds[x], kinds[y]) for kinds in groups.values() if x in kinds and y in kinds]
-    cut = [[_until_step(side, both) for side in both] for both in pairs]
+    cut = [[_until_step(side, both) for side in both] for both in pairs if min(map(len, both)) > 1]
     cut = [both for both in cut if all(side for side in both)]
     if not cut:
         return None

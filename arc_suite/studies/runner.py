@@ -177,6 +177,16 @@ def text(states: Sequence[State], jobs: int, most: int | None = None) -> str:
     return "\n".join([*lines, f"{finished} of {len(states)} finished{left}"])
 
 
+def failures(states: Sequence[State], folder: Path) -> list[str]:
+    """Return a line for each failed run: its log, and the last line in it."""
+    logs = [folder / f"{each.run.name}.log" for each in states if each.word == "failed"]
+    return [f"{log}: {_last_line(log)}" for log in logs]
+
+
+def _last_line(log: Path) -> str:
+    return (log.read_text(encoding="utf-8", errors="replace").splitlines() or ["says nothing"])[-1]
+
+
 def shown(jobs: int) -> Callable[..., None]:
     """Return a function that shows states: a table in its place on a terminal, elsewhere a line for each change."""
     words, height = {}, 0

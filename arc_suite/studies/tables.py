@@ -11,6 +11,7 @@ from arc_suite.agents.configuration import Configuration
 from arc_suite.data import Settings
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
+from arc_suite.studies.tracks import FAR, PLACES, SEEDS, TRACKS
 
 _EPISODES = 1000  # of prior data, as in the paper
 
@@ -244,17 +245,39 @@ STUDIES = {
 }
 
 
+def benchmark(track: str, algorithm: str) -> Study:
+    """Return the study of an algorithm on a track of the benchmark: all places with the first seed, then the others.
+
+    Raises:
+        ValueError: an unknown track or algorithm, or one that learns from something else than the track gives.
+    """
+    rule = TRACKS[checks.name(track, TRACKS, "track")]
+    if (source := algorithms.algorithm(algorithm).source) != rule.source:
+        fit = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.source == rule.source)
+        what = f"algorithm {algorithm} learns from {source}, and the track {track} takes those that learn from"
+        raise ValueError(f"{what} {rule.source}: {fit}")
+    runs = []
+    for seed, (robot, task) in itertools.product(range(SEEDS), PLACES):
+        prior = Prior("medium" if task == "walk" else "steered", rule.episodes) if rule.episodes else None
+        steps = rule.far_steps if task in FAR else rule.steps
+        runs.append(run(robot, algorithm, steps, seed, task, prior=prior))
+    return Study(f"track {track} of the benchmark: {algorithm}", tuple(runs))
+
+
 def folder_name(name: str) -> str:
     """Return the name of a folder, without the colon of `module:attribute`."""
     return name.replace(":", ".")
 
 
 def study(name: str) -> Study:
-    """Return the study of a name, or of `module:attribute`, a `Study` on Python's path.
+    """Return the study of a name, of `<track>-<algorithm>`, or of `module:attribute`, a `Study` on Python's path.
 
     Raises:
         ValueError: there is none, or two of its runs have one name.
     """
+    track, _, algorithm = name.partition("-")
+    if track in TRACKS:
+        return benchmark(track, algorithm)
     found = checks.imported(name, "study") if ":" in name else STUDIES[checks.name(name, STUDIES, "study")]
     if not isinstance(found, Study):
         raise ValueError(f"study {name!r}: expected a Study, got {type(found).__name__}")

@@ -42,12 +42,10 @@ class Ground:
     """Where a body moves.
 
     Attributes:
-        settings: names of the fields that a caller may set.
         own_arena: whether the ground is the only arena of the task.
         blocks: sizes of the blocks that it adds to the observation, by name.
     """
 
-    settings: ClassVar[tuple[str, ...]] = ()
     own_arena: ClassVar[bool] = False
     blocks: ClassVar[Mapping[str, int]] = {}
 
@@ -55,6 +53,11 @@ class Ground:
     def adapts(self) -> bool:
         """Whether the outcome of an episode chooses where the next one starts."""
         return False
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The names of the fields that a caller may set."""
+        return ()
 
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the ground with checked settings in place of its own.
@@ -185,6 +188,7 @@ class Lanes(Ground):
         curriculum: whether episodes climb levels of difficulty by their outcomes.
         level: from 0 to 9, at which a curriculum begins.
         terrain_seed: of what is random in the ground.
+        rise, slope, width: of obstacles, m, the slope in rad, in place of what a difficulty makes of the body's height.
     """
 
     kinds: tuple[str, ...]
@@ -195,20 +199,32 @@ class Lanes(Ground):
     curriculum: bool = False
     level: int = 0
     terrain_seed: int = 0
+    rise: float | None = None
+    slope: float | None = None
+    width: float | None = None
 
-    settings: ClassVar[tuple[str, ...]] = ("difficulty", "curriculum", "level", "terrain_seed")
     own_arena: ClassVar[bool] = True
     blocks: ClassVar[Mapping[str, int]] = {"scan": SCAN.shape[1]}
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The names of the fields that a caller may set; sizes where there is one kind of ground."""
+        return ("difficulty", "curriculum", "level", "terrain_seed", *terrain.sizes(self.kinds))
 
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the lanes with checked settings."""
         given = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
+        sizes = [name for name in terrain.sizes(self.kinds) if given[name] is not None]
+        for name in ("difficulty", "curriculum", "level"):
+            if sizes and name in overrides:
+                raise ValueError(f"{name}: expected none with {sizes[0]}={given[sizes[0]]}, got {overrides[name]}")
         return dataclasses.replace(
             self,
             difficulty=checks.number("difficulty", given["difficulty"], 0.0, 1.0),
             curriculum=checks.boolean("curriculum", given["curriculum"]),
             level=checks.integer("level", given["level"], 0, LEVELS - 1),
             terrain_seed=checks.integer("terrain_seed", given["terrain_seed"], 0, 2**32 - 1),
+            **{name: checks.number(name, given[name], *terrain.SIZES[name]) for name in sizes},
         )
 
     @property
@@ -222,7 +238,8 @@ class Lanes(Ground):
         length = min(6.0 + np.ceil(1.15 * distance / body.torso.standing_height), LONGEST)
         levels = np.arange(LEVELS) / (LEVELS - 1.0) if self.curriculum else [self.difficulty]
         copies = dict.fromkeys(self.kinds, self.copies[self.curriculum])
-        return terrain.made(body, copies, float(length), tuple(map(float, levels)), self.terrain_seed)
+        sizes = {name: size for name in terrain.SIZES if (size := getattr(self, name)) is not None}
+        return terrain.made(body, copies, float(length), tuple(map(float, levels)), self.terrain_seed, sizes)
 
     @property
     def mirrors(self) -> Mapping[str, Mirror]:

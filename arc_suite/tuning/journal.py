@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +14,18 @@ class Journal:
     """A file whose first line holds what determines a search, and each further line a generation.
 
     Attributes:
-        generations: those in the file.
+        generations: those in the file, NamedTuples.
     """
 
-    def __init__(self, path: str | os.PathLike, settings: Mapping[str, Any]):
+    def __init__(
+        self, path: str | os.PathLike, settings: Mapping[str, Any], generation: Callable[..., Any] = Generation
+    ):
         """Open the file, or starts one.
 
         Args:
             path: of the file, in a folder that is there.
             settings: what determines the search; plain values.
+            generation: makes a generation from the fields of a line.
 
         Raises:
             ValueError: the file belongs to another search, or is no journal, or another process
@@ -42,12 +45,12 @@ class Journal:
             text = text[: text.rfind(b"\n") + 1] or text
         elif text != header:
             text = b""
-        self.generations = _generations(path, text, header) if text else []
+        self.generations = _generations(path, text, header, generation) if text else []
         self._file.truncate(len(text))
         if not text:
             self._write(header)
 
-    def append(self, generation: Generation) -> None:
+    def append(self, generation: Any) -> None:
         """Add a generation, which is in the file from then on."""
         self._write(_line(generation._asdict()))
         self.generations.append(generation)
@@ -65,14 +68,14 @@ def _line(value: Mapping[str, Any]) -> bytes:
     return json.dumps(value).encode() + b"\n"
 
 
-def _generations(path: Path, text: bytes, header: bytes) -> list[Generation]:
+def _generations(path: Path, text: bytes, header: bytes, generation: Callable[..., Any]) -> list[Any]:
     """Return the generations of a journal's text, if its header is that one."""
     advice = "delete it or write to another folder"
     try:
         found, *lines = map(json.loads, text.splitlines())
         wanted = json.loads(header)
         differing = [name for name in wanted if found[name] != wanted[name]]
-        generations = [Generation(**line) for line in lines]
+        generations = [generation(**line) for line in lines]
     except (ValueError, LookupError, TypeError):
         raise ValueError(f"{path}: no journal of a search; {advice}") from None
     for name in differing:

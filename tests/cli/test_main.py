@@ -28,9 +28,10 @@ TASKED = (
     "tune_cpg",
     "train",
     "survey",
+    "design",
     "enter",
 )
-WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
+WRITING = ("build_model", "render", "animate", "style", "tune_cpg", "train", "export", "design")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS} | {"survey": ROOT / "tools" / "walk_census.py"}
 
@@ -125,16 +126,15 @@ def test_help_of_a_program(program):
     assert f"\n  arc-suite {program}" in text
     names = re.findall(r"^(-\S*?):", text, re.MULTILINE)
     assert "--[no]version" in names
-    assert ("-o,--output" in names) == (
-        program in ("build_model", "render", "animate", "style", "tune_cpg", "train", "export")
-    )
+    assert ("-o,--output" in names) == (program in WRITING)
     assert "--output" not in names
     assert {"--task", "--set"} & set(names) == ({"--task", "--set"} if program in TASKED else set())
 
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    done = run(program, *(["--", "a.json"] if program in ("check", "export", "study", "enter") else []), "stray")
+    taking = ("check", "export", "study", "enter", "benchmark")  # an argument
+    done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     line = f"arc-suite {program}: unexpected argument 'stray'; see --help\n"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
 

@@ -33,6 +33,7 @@ ROOMS = (
     ("style",),
     ("tuning",),
     ("export",),  # to take away
+    ("design",),  # creatures found by search
     ("agents",),  # who learns
     ("studies",),  # tables of runs
     ("cli",),  # programs
@@ -89,6 +90,8 @@ THIRD_PARTY = {
     "style.metrics": {"numpy"},
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},
+    "design": {"numpy"},
+    "design.gallery": {"numpy", "PIL"},
     "export": {"numpy", "mujoco"},
     "export.films": {"numpy", "imageio", "imageio_ffmpeg", "PIL"},
     "export.gltf": {"numpy"},
@@ -216,7 +219,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
-    contract |= {"tasks.parameters", "tasks.sensors"}
+    contract |= {"tasks.parameters", "tasks.sensors", "tasks.energy"}
     particular = texts - contract
     assert {"tasks.walk", "tasks.commanded", "tasks.suite"} <= particular
     for name in modules():

@@ -70,8 +70,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
-    package |= {"arc_suite/export/page.html", "arc_suite/export/web/viewer.js"}
-    package |= {"arc_suite_command.py"}
+    package |= {"arc_suite/design/gallery.html", "arc_suite/export/page.html", "arc_suite/export/web/viewer.js"}
+    package |= {"arc_suite_command.py", "arc_suite/evaluation/anchors.csv"}
     package |= {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite" / "policies" / "packaged").iterdir()}
     package |= {f"arc_suite/robots/examples/{name}.json" for name in spec_files.EXAMPLES}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"

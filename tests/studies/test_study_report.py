@@ -10,7 +10,8 @@ import pytest
 
 from arc_suite import evaluation, paper
 from arc_suite.agents import configuration
-from arc_suite.studies import report, results, tables
+from arc_suite.evaluation import anchors
+from arc_suite.studies import claims, report, results, tables
 from arc_suite.studies.tables import Study, run
 
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
@@ -40,10 +41,10 @@ def made(tmp_path):
     keys = [(robot, name, seed) for robot in paper.FINALS for name in paper.FINALS[robot] for seed in (0, 1)]
     runs = tuple(run(robot, name, 2000, seed) for robot, name, seed in keys)
     for each, (robot, name, seed) in zip(runs, keys, strict=True):
-        start, style = 100.0 if name in report.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
+        start, style = 100.0 if name in claims.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
         publish(tmp_path / "mine", each, constant(start, float(paper.FINALS[robot][name]) + seed), style)
-    text = "place,preset,seed,return\n" + "".join(f"queen, walk,medium,{s},2048.0\n" for s in range(10))
-    (tmp_path / "mine" / "demonstrators.csv").write_text(text.replace("queen, walk", '"queen, walk"'))
+    levels = {"zero": np.full(10, 1600.0), "medium": np.full(10, 2048.0), "refined": np.full(10, 3600.0)}
+    anchors.write(tmp_path / "mine" / "demonstrators.csv", {"queen, walk": levels, "tick, walk": levels})
     return Study("as in the paper", runs), tmp_path / "mine"
 
 
@@ -62,13 +63,15 @@ def test_report(made):
     page = report.write("mine", study, folder).read_text()
     assert (folder / "curves.png").stat().st_size > 10_000
     assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0"]
-    # 3610 and 3611, each with 0 to 9 on top
-    assert cells(page, "tick, walk", "sope", "2,000")[3:] == ["2", "3615.0 +- 0.5", "3615.0 [3614.5, 3615.5]", "3610"]
-    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "2048.0 [2048.0, 2048.0]", "2048"]
-    assert cells(page, "tick, walk", "sac", "2,000", "3.0") == [
-        *("tick, walk", "sac", "2,000", "3.0", "-", "-"),
-        f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}",
-    ]
+    # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
+    final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610"]
+    assert cells(page, "tick, walk", "sope", "2,000")[3:] == final
+    assert cells(page, "leaper, walk", "sope", "2,000")[5] == "-", "without anchors"
+    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048"]
+    assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "0.00", "-", "-"]
+    area = f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}"
+    assert cells(page, "tick, walk", "sac", "-", "-") == ["tick, walk", "sac", "-", "-", "-", "-", area]
+    assert cells(page, "tick, walk", "sope", "2,000", "3.0")[4:6] == ["2,000", "3.0"]
     assert cells(page, "bastion, walk", "sac", "0.500")[2:] == ["0.500"] * 6
     assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
     assert "As in the paper.\n" in page
@@ -81,20 +84,20 @@ def test_claims(made):
     """On the paper's own finals each sentence comes out as in its table; one does not hold there."""
     study, folder = made
     page = report.write("mine", study, folder).read_text()
-    held = {claim.text: cells(page, claim.text)[1:] for claim in report.CLAIMS}
-    for claim in report.CLAIMS:
+    held = {claim.text: cells(page, claim.text)[1:] for claim in claims.CLAIMS}
+    for claim in claims.CLAIMS:
         published, there, ours, here = held[claim.text]
         if claim.in_paper:
             assert there == here
             assert re.findall(r"\w+ [+-]", published) == re.findall(r"\w+ [+-]", ours)
         else:
             assert (published, there) == ("-", "not measured")
-    assert [held[claim.text][3] for claim in report.CLAIMS] == [
+    assert [held[claim.text][3] for claim in claims.CLAIMS] == [
         *("4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "3 of 4 robots"),
         *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
     ]
     assert "queen -300" in held["with prior data all end higher than without"][0]
-    least = min(paper.FINALS["queen"][name] for name in report.ONLINE) - paper.DEMONSTRATORS["queen"]
+    least = min(paper.FINALS["queen"][name] for name in claims.ONLINE) - paper.DEMONSTRATORS["queen"]
     assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
 
 
@@ -125,12 +128,12 @@ def test_claims_need_what_they_compare(made):
     study, folder = made
     few = study._replace(runs=tuple(each for each in study.runs if each.kind == "sac"))
     page = report.write("few", few, folder).read_text()
-    assert cells(page, report.CLAIMS[0].text)[3:] == ["-", "not measured"]
+    assert cells(page, claims.CLAIMS[0].text)[3:] == ["-", "not measured"]
     found = results.results(few.runs, folder)
-    assert report._is_papers(found[0])
+    assert claims.is_papers(found[0])
     usual = {"robot": "tick", "algorithm": "sac", "steps": 2000}
     for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
-        assert not report._is_papers(found[0]._replace(run=run(**usual | other)))
+        assert not claims.is_papers(found[0]._replace(run=run(**usual | other)))
 
 
 def test_unfinished_evaluations_do_not_count(tmp_path):
@@ -145,16 +148,48 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
 
 
 def test_runs_are_compared_where_both_have_been(tmp_path):
-    """At the latest step that all have reached."""
-    long, short = run("tick", "sac", 2000), run("tick", "speq", 2000)
-    publish(tmp_path, long, constant(100.0, 900.0))
-    publish(tmp_path, short, constant(500.0, 600.0))
-    path = tmp_path / short.name / "evaluations.csv"
-    path.write_text("\n".join(path.read_text().splitlines()[:11]) + "\n")
-    groups = results.grouped(results.results([long, short], tmp_path))
+    """At the latest step that all have reached, and where both have several seeds."""
+    runs = [run("tick", name, 2000, seed) for seed in range(2) for name in ("sac", "speq")]
+    for each in runs:
+        publish(tmp_path, each, constant(100.0, 900.0) if each.kind == "sac" else constant(500.0, 600.0))
+        if each.kind == "speq":
+            path = tmp_path / each.name / "evaluations.csv"
+            path.write_text("\n".join(path.read_text().splitlines()[:11]) + "\n")
+    groups = results.grouped(results.results(runs, tmp_path))
     probability, interval = results.improvement(groups, "speq", "sac")
     assert probability == 1.0 and interval == (1.0, 1.0)
     assert results.improvement(groups, "speq", "sope") is None
+    assert results.improvement(results.grouped(results.results(runs[:3], tmp_path)), "speq", "sac") is None
+
+
+@pytest.mark.slow
+def test_one_seed_has_no_interval(tmp_path):
+    runs = run("tick", "sac", 2000), run("tick", "speq", 2000)
+    for each in runs:
+        publish(tmp_path / "mine", each, constant(100.0, 200.0))
+    page = report.write("mine", Study("one seed each", runs), tmp_path / "mine").read_text()
+    assert cells(page, "tick, walk", "sac", "2,000", "1")[4:] == ["204.5", "-", "-", "2590"]
+    assert "Probability" not in page
+    assert cells((tmp_path / "README.md").read_text(), "tick, walk", "sac")[4:8] == ["1", "204.5", "-", "-"]
+
+
+@pytest.mark.slow
+def test_the_leaderboard_holds_each_configuration_once(tmp_path):
+    """The row with more seeds; phases tell two configurations of one algorithm apart."""
+    phases = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
+    few, many = (run("tick", "sac", 2000),), tuple(run("tick", "sac", 2000, seed) for seed in range(2))
+    other = (*many, run("tick", "speq", 2000), run("tick", "speq", 2000, hyperparameters=phases, label="speq-short"))
+    for name, runs in (("a", few), ("b", other)):
+        for each in runs:
+            publish(tmp_path / name, each, constant(100.0, 200.0))
+        report.write(name, Study(name, runs), tmp_path / name)
+    page = (tmp_path / "README.md").read_text()
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| tick")]
+    assert sorted((row[1], row[2], row[4], row[14]) for row in rows) == [
+        ("sac", "-", "2", "[b](b/README.md)"),
+        ("speq", "75,000", "1", "[b](b/README.md)"),
+        ("speq-short", "7,500", "1", "[b](b/README.md)"),
+    ]
 
 
 def test_until(tmp_path):
@@ -187,8 +222,8 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
     """By the one command, and nobody has changed a number."""
     committed = COMMITTED
     shutil.copytree(committed, tmp_path / "studies")
-    names = [name for name in tables.STUDIES if (committed / name).exists()]
-    assert len(names) == 6 and len(list(committed.glob("*/*/config.json"))) == 52
+    names = sorted({path.parts[-3] for path in committed.glob("*/*/config.json")})
+    assert names
     for name in names:
         report.write(name, tables.study(name), tmp_path / "studies" / name)
     for path in (*(f"{name}/README.md" for name in names), "README.md"):
@@ -198,7 +233,7 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
 def test_the_papers_table_has_every_robot_and_algorithm():
     assert paper.FINALS.keys() == paper.DEMONSTRATORS.keys()
     for finals in paper.FINALS.values():
-        assert set(finals) == {*report.ONLINE, *report.WITH_PRIOR}
+        assert set(finals) == {*claims.ONLINE, *claims.WITH_PRIOR}
     assert evaluation.EPISODES == 10
 
 

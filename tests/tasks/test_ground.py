@@ -83,6 +83,65 @@ def test_ground_is_a_function_of_its_settings(kind):
     assert abs(heights(difficulty=1.0)).max() > abs(heights(difficulty=0.3)).max() or kind == "gaps"
 
 
+def profile(robot, kind, **settings):
+    """Heights, m, along the middle of the first lane, every centimetre."""
+    arena = prepared(robot, kind, settings)[0].scene.arena
+    x = np.arange(0.0, 12.0, 0.01)
+    return arena.height(x, arena.start(0) + 0.0 * x)
+
+
+def test_obstacles_in_metres_are_the_same_for_all_bodies():
+    """Queen stands 0.45 m high, Tick 0.21 m; edges may be off by rounding of the places in the test."""
+    for robot in ("queen", "tick"):
+        height = ROBOTS[robot].torso.standing_height
+        stairs = profile(robot, "stairs", rise=0.06, width=0.3)
+        up = np.flatnonzero(np.diff(stairs))
+        assert_allclose(np.unique(stairs), 0.06 * np.arange(5), atol=1e-12)
+        assert_allclose(np.diff(up[:4]), 30.0, atol=1.0)
+        trench = profile(robot, "gaps", width=0.11) < 0.0
+        first, last = np.flatnonzero(np.diff(trench))[:2]
+        assert abs(last - first - 11) <= 1
+        slopes = profile(robot, "slopes", slope=0.2)
+        assert_allclose(slopes.max(), 6.0 * height * np.tan(0.2), atol=1e-2)
+        rough = profile(robot, "rough", rise=0.05)
+        assert 0.03 < rough.max() <= 0.05
+
+
+def test_a_rise_in_metres_equals_its_difficulty():
+    height = ROBOTS["queen"].torso.standing_height
+    assert_allclose(
+        profile("queen", "stairs", rise=0.3 * height), profile("queen", "stairs", difficulty=1.0), atol=1e-12
+    )
+
+
+def test_height_is_that_of_rays_on_treads_in_metres():
+    task, model = prepared("leaper", "stairs", {"rise": 0.07, "width": 0.23})
+    arena, data, hit = task.scene.arena, mujoco.MjData(model), np.zeros(1, np.int32)
+    data.qpos[2] = 1e3
+    mujoco.mj_forward(model, data)
+    for x in np.random.RandomState(0).uniform(0.0, arena.length * arena.unit, 60):
+        start = np.array([x, arena.start(0), 50.0])
+        distance = mujoco.mj_ray(model, data, start, np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
+        assert abs(50.0 - distance - arena.height(np.float64(x), np.float64(start[1]))) < 1e-6 * arena.unit, x
+
+
+@pytest.mark.parametrize(
+    ("task", "settings", "message"),
+    [
+        ("stairs", {"rise": 0.1, "difficulty": 1.0}, "difficulty: expected none with rise=0.1, got 1.0"),
+        ("gaps", {"width": 0.1, "curriculum": True}, "curriculum: expected none with width=0.1, got True"),
+        ("stairs", {"rise": -0.1}, "rise: expected a number from 0 to 100, got -0.1"),
+        ("slopes", {"slope": "steep"}, "slope: expected a number from 0 to 1.2, got 'steep'"),
+        ("stairs", {"width": 0.01}, "width: expected a finite number of at least 0.02"),
+        ("course", {"rise": 0.1}, "unknown setting of course 'rise'"),
+    ],
+)
+def test_sizes_that_do_not_fit_are_one_line(task, settings, message):
+    with pytest.raises(ValueError) as error:
+        arc_suite.load("tick", task, settings)
+    assert str(error.value).startswith(message) and "\n" not in str(error.value)
+
+
 def test_a_lane_is_the_same_beside_others():
     body, places = ROBOTS["queen"], np.linspace(0.0, 20.0, 300)
     alone = terrain.made(body, {"gaps": 1}, 40.0)

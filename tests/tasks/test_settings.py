@@ -26,6 +26,7 @@ OTHER = {
     "curriculum": True,
     "level": 5,
     "terrain_seed": 3,
+    "rise": 0.05,
     **dict.fromkeys((*parameters.SHARED_NOISE, *parameters.Noise._fields), 0.05),
 }
 WITH = {"level": {"curriculum": True}}
@@ -66,7 +67,9 @@ def test_tasks_that_differ_in_data_alone_have_the_same_settings():
     assert {task: names(task) for task in TASKS if task in ("shoved", "limp")} == dict.fromkeys(
         ("shoved", "limp"), names("steer")
     )
-    assert {names(task) for task in ("slopes", "stairs", "gaps", "course", "roam")} == {names("rough")}
+    sizes = {"rough": ["rise"], "slopes": ["slope"], "stairs": ["rise", "width"], "gaps": ["width"], "course": []}
+    for task, own in (sizes | {"roam": ["rise"]}).items():
+        assert sorted(names(task)) == sorted((*names("course"), *own))
 
 
 @pytest.mark.parametrize("task", [name for name in TASKS if name != "walk"])

@@ -1,0 +1,100 @@
+"""Run the benchmark: ten places, three tracks, a score.
+
+A score is (return - standing still) / (best demonstrator - standing still). The track `top` gives an algorithm a
+million steps, three on uneven ground and among pillars; `samples` gives it 100,000; `demonstrations` gives it 100,000,
+and 100 episodes of a demonstrator. The runs of an algorithm on a track are a study: killed at any moment, the same
+command resumes. Policies of other libraries are files ROBOT-TASK-SEED in a folder. Without a track the command prints
+the table of all learners.
+
+  arc-suite benchmark samples --algorithm sac_parallel
+  arc-suite benchmark top --algorithm ppo --seeds 2 --jobs 8
+  arc-suite benchmark samples --algorithm sac --seeds 1 --places tick-walk,leaper-walk
+  arc-suite benchmark samples --policies my_zips --name my_sac
+  arc-suite benchmark --page docs/benchmark.md
+"""
+
+import re
+import sys
+from pathlib import Path
+
+from absl import flags
+
+from arc_suite import checks, files
+from arc_suite.cli.program import progress
+from arc_suite.envs.vector import usable_cores
+from arc_suite.studies import benchmark, leaderboard, report, results, runner, tables
+from arc_suite.studies.tracks import PLACES, SEEDS, TRACKS
+
+FLAGS = flags.FLAGS
+flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")
+flags.DEFINE_integer("seeds", SEEDS, "Seeds of each place.", 1, SEEDS)
+flags.DEFINE_list("places", ["-".join(each) for each in PLACES], "Places to run, ROBOT-TASK.")
+flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
+flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
+flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")
+flags.DEFINE_string("runs", "runs", "Folder of the runs.")
+flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
+flags.DEFINE_string("page", None, "Page to write the table into, between the lines <!-- table --> and <!-- end -->.")
+
+_MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
+
+
+def main(track: str | None = None) -> int:
+    """Run a track, and print or write the table; the exit status is 0 if no run has failed."""
+    places = [checks.name(each, ["-".join(each) for each in PLACES], "place") for each in FLAGS.places]
+    page = FLAGS.page and Path(FLAGS.page).read_text(encoding="utf-8")
+    if page is not None and not _MARKS.search(page):
+        raise ValueError(f"--page={FLAGS.page}: expected the lines <!-- table --> and <!-- end -->, got none")
+    status = 0
+    if track is not None:
+        checks.name(track, TRACKS, "track")
+        status = scored(track) if FLAGS.policies else learned(track, places)
+    table = benchmark.text(Path(FLAGS.results))
+    if page is None:
+        print(table)
+    else:
+        with files.writing(Path(FLAGS.page)) as temporary:
+            temporary.write_text(_MARKS.sub(lambda match: f"\n{table}\n\n", page), encoding="utf-8")
+    return status
+
+
+def learned(track: str, places: list[str]) -> int:
+    """Make the runs of the algorithm, and write their report and scores.
+
+    Raises:
+        ValueError: an algorithm that the track does not take.
+    """
+    study = tables.benchmark(track, FLAGS.algorithm)
+    name = f"{track}-{tables.folder_name(FLAGS.algorithm)}"
+    runs = [each for each in study.runs if _is_asked(each, places)]
+    folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
+    jobs = FLAGS.jobs or usable_cores()
+    show = runner.shown(jobs)
+    states = runner.make(runs, folder, published, jobs, show, progress)
+    show(states, whole=True)
+    failures = runner.failures(states, folder)
+    for line in failures:
+        print(line, file=sys.stderr)
+    if found := results.results(study.runs, published):
+        print(report.write(name, study, published))
+        benchmark.write(published, benchmark.of_results(found))
+    return 1 if failures else 0
+
+
+def scored(track: str) -> int:
+    """Score the policies of a folder.
+
+    Raises:
+        ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or no policies in the folder.
+        OSError: a file cannot be read.
+    """
+    policies = Path(FLAGS.policies)
+    name = leaderboard.checked_name(FLAGS.name or policies.resolve().name)
+    scores = benchmark.of_policies(policies, progress)
+    benchmark.write(files.folder(Path(FLAGS.results, f"{track}-{name}")), scores)
+    return 0
+
+
+def _is_asked(run: tables.Run, places: list[str]) -> bool:
+    setup, seed = run.configuration.setup, run.configuration.seed
+    return seed < FLAGS.seeds and f"{setup.body.name}-{setup.kind.name}" in places

@@ -1,0 +1,1 @@
+"""Creatures found by search: bodies from genes, goals, trials by demonstrators, and an archive of the best."""

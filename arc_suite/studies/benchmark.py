@@ -1,0 +1,170 @@
+"""The benchmark: scores of runs on its tracks, see `tracks`, and of policies of other libraries.
+
+studies/<track>-<learner>/scores.csv    a line for each run, by `write`
+
+The table of all learners is made from these files alone.
+"""
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import checks, evaluation, files, policies, style
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
+from arc_suite.policies import network
+from arc_suite.studies import results
+from arc_suite.studies.leaderboard import table
+from arc_suite.studies.results import Result
+from arc_suite.studies.tracks import PLACES, TRACKS, TURNING
+
+SCORES = "scores.csv"
+CLIP = (-0.5, 1.2)  # of the score of a run
+HALF = 0.5  # score up to which minutes of the processor are counted
+STYLE, STYLE_HEADS = ("gait_compliance", "heading_error"), ("gait compliance", "heading error, rad")
+NOT_RUN = "not run"
+
+
+class Score(NamedTuple):
+    """Result of a run; a line of `SCORES`.
+
+    Attributes:
+        robot, task, seed: of the run.
+        result: mean return of the protocol's episodes.
+        score: of it, clipped to `CLIP`.
+        minutes: of the processor until an evaluation had the score `HALF`; infinite if none had, NaN if unknown.
+        gait_compliance: mean over the episodes.
+        heading_error: mean size over the episodes, rad; NaN for tasks of `TURNING`.
+    """
+
+    robot: str
+    task: str
+    seed: int
+    result: float
+    score: float
+    minutes: float
+    gait_compliance: float
+    heading_error: float
+
+
+def of_results(found: Iterable[Result]) -> list[Score]:
+    """Return the scores of the runs that are finished."""
+    return [_of_result(each) for each in found if each.steps[-1] >= each.run.configuration.steps]
+
+
+def _of_result(found: Result) -> Score:
+    setup = found.run.configuration.setup
+    scale = anchors.anchors(setup)
+    enough = np.flatnonzero(scale.score(found.returns.mean(axis=1)) >= HALF)
+    minutes = found.cpu[enough[0]] / 60.0 if enough.size else np.inf
+    return _score(setup, found.run.configuration.seed, found.final, minutes, found.style, scale)
+
+
+def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale) -> Score:
+    clipped = float(np.clip(scale.score(result), *CLIP))
+    compliance, error = (results.size(measured[each]) for each in STYLE)
+    if setup.kind.name in TURNING:
+        error = np.nan
+    return Score(setup.body.name, setup.kind.name, seed, float(result), clipped, float(minutes), compliance, error)
+
+
+def of_policies(folder: Path, progress: Callable) -> list[Score]:
+    """Play the protocol's episodes by the policies of a folder, and return their scores.
+
+    Args:
+        folder: of policies named `ROBOT-TASK-SEED`, as `policies.policy` takes them: a zip of stable-baselines3, a
+            policy file (.npz), or the folder of a run.
+        progress: makes a progress bar as `tqdm` does.
+
+    Raises:
+        ValueError: no policy of a place in the folder, or one that does not fit.
+        OSError: a file cannot be read.
+    """
+    places = "|".join("-".join(each) for each in PLACES)
+    pattern = re.compile(rf"({places})-(\d+)(\.zip|{re.escape(network.EXTENSION)})?")
+    named = [(path, pattern.fullmatch(path.name)) for path in sorted(folder.iterdir())]
+    found = [(path, match) for path, match in named if match]
+    if not found:
+        raise ValueError(f"{folder}: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none")
+    return [
+        _of_policy(path, Setup.of(*match[1].split("-")), int(match[2]))
+        for path, match in progress(found, desc=str(folder), unit="policy", leave=False)
+    ]
+
+
+def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
+    environment = setup.load()
+    policy = policies.policy(path, setup.body, task=environment.task.definition)
+    tracks = [style.record(environment, policy, seed) for seed in range(evaluation.EPISODES)]
+    every = [style.measure(track) for track in tracks]
+    measured = {each: np.array([metrics[each].value for metrics in every]) for each in STYLE}
+    result = np.mean([track.rewards.sum() for track in tracks])
+    return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup))
+
+
+def write(folder: Path, scores: Sequence[Score]) -> None:
+    """Write the scores of a learner on a track into its folder.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with files.writing(folder / SCORES) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([Score._fields, *scores])
+
+
+def read(path: Path) -> list[Score]:
+    """Return the scores of a file.
+
+    Raises:
+        ValueError: a damaged file.
+        OSError: it cannot be read.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        heads, *lines = csv.reader(file)
+    if tuple(heads) != Score._fields or any(len(line) != len(Score._fields) for line in lines):
+        raise ValueError(f"{path}: expected lines of {', '.join(Score._fields)}")
+    return [Score(robot, task, int(seed), *map(float, others)) for robot, task, seed, *others in lines]
+
+
+def text(studies: Path) -> str:
+    """Return the table of the benchmark in Markdown: all learners in a folder of studies, by track and score.
+
+    Raises:
+        ValueError: a damaged file of scores, or a folder of a name that begins with no track.
+        OSError: a file cannot be read.
+    """
+    lines = []
+    for path in studies.glob(f"*/{SCORES}"):
+        track, _, learner = path.parent.name.partition("-")
+        order = tuple(TRACKS).index(checks.name(track, TRACKS, "track"))
+        if scores := read(path):
+            whole = len({(each.robot, each.task) for each in scores}) == len(PLACES)
+            middle = evaluation.interquartile_mean([each.score for each in scores])
+            lines.append((order, not whole, -middle, track, learner, *_cells(scores)))
+    places = [" ".join(each) for each in PLACES]
+    heads = ["track", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
+    return table(heads, [line[3:] for line in sorted(lines)])
+
+
+def _cells(scores: Sequence[Score]) -> list[str]:
+    """Cells of a learner; the total is that of all places alone, its interval that over two seeds or more."""
+    groups = [[each for each in scores if (each.robot, each.task) == where] for where in PLACES]
+    seeds = [len(group) for group in groups if group]
+    few, many = min(seeds), max(seeds)
+    strata = [[each.score for each in group] for group in groups]
+    total = f"{sum(map(bool, groups))} of {len(PLACES)} places"
+    if all(groups):
+        middle, (low, high) = evaluation.iqm_and_interval(strata)
+        total = f"{middle:.3f}" + (f" [{low:.3f}, {high:.3f}]" if few > 1 else "")
+    minutes = float(np.median([each.minutes for each in scores]))
+    shown = [
+        f"{few}" if few == many else f"{few} to {many}",
+        total,
+        f"{minutes:.1f}" if np.isfinite(minutes) else "-",
+        *(f"{results.size(np.array([getattr(each, name) for each in scores])):.3f}" for name in STYLE),
+    ]
+    return shown + [f"{np.mean(stratum):z.2f}" if stratum else NOT_RUN for stratum in strata]

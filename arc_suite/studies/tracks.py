@@ -1,0 +1,37 @@
+"""Tracks of the benchmark: the places of every track, and what each track gives to an algorithm."""
+
+from typing import NamedTuple
+
+SEEDS = 3  # of every place
+
+# Robot and task of each place, with default settings; those on uneven ground and among pillars are `FAR`.
+PLACES = (
+    *(("queen", "walk"), ("bastion", "walk"), ("tick", "walk"), ("leaper", "walk")),
+    *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
+    *(("tick", "rough"), ("queen", "stairs"), ("tick", "navigate")),
+)
+FAR = ("rough", "stairs", "navigate")
+TURNING = ("steer", "navigate")  # tasks with commands that turn: a heading error says nothing there
+
+
+class Track(NamedTuple):
+    """A track.
+
+    Attributes:
+        steps: environment steps of a run.
+        far_steps: the same in tasks of `FAR`.
+        source: what its algorithms learn from, see `Algorithm.source`.
+        episodes: of prior data; 0 for none.
+    """
+
+    steps: int
+    far_steps: int
+    source: str = "nothing"
+    episodes: int = 0
+
+
+TRACKS = {
+    "top": Track(1_000_000, 3_000_000),
+    "samples": Track(100_000, 100_000),
+    "demonstrations": Track(100_000, 100_000, "prior data", 100),
+}

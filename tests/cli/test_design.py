@@ -1,0 +1,124 @@
+"""`arc-suite design` searches, goes on when it was broken off, and leaves the same files."""
+
+import csv
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import imageio.v3 as imageio
+import programs
+import pytest
+
+from arc_suite.robots.spec_files import load_body
+
+QUICK = ("--steps=10", "--seed=3", "--nopages")
+
+
+def design(*arguments):
+    return programs.arc_suite("design", *QUICK, *arguments)
+
+
+def contents(folder):
+    return {path.relative_to(folder): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """A folder with a search over variants of Tick that any cell's walk may win."""
+    folder = tmp_path_factory.mktemp("design") / "ticks"
+    return folder, design("--around=tick", "--goal=speed", "--bodies=20", "--processes=1", f"--output={folder}")
+
+
+def test_files(found):
+    folder, done = found
+    if "cannot render" in done.stderr:
+        pytest.skip(done.stderr)
+    assert (done.returncode, done.stderr) == (0, "")
+    with (folder / "bodies.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["number"]) for row in rows] == list(range(20))
+    best = {row["cell"]: row for row in rows if row["elite"] == "1"}
+    assert {path.stem for path in (folder / "bodies").iterdir()} == best.keys()
+    report = json.loads((folder / "design.json").read_text())
+    assert {elite["cell"]: str(elite["second"]["speed"]) for elite in report["elites"]} == {
+        cell: row["speed_2"] for cell, row in best.items()
+    }
+    for cell in best:
+        body = load_body(folder / "bodies" / f"{cell}.json")
+        assert body.name.startswith("tick_") and len(body.legs) == 6
+        assert cell in done.stdout
+    assert imageio.imread(folder / "gallery.png").ndim == 3
+
+
+def test_processes_make_no_difference(found, tmp_path):
+    folder, done = found
+    again = design("--around=tick", "--goal=speed", "--bodies=20", "--processes=2", f"--output={tmp_path / 'ticks'}")
+    assert again.returncode == done.returncode
+    assert contents(tmp_path / "ticks") == contents(folder)
+
+
+@pytest.mark.slow
+def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
+    straight, broken = tmp_path / "straight", tmp_path / "broken"
+    arguments = ("--goal=speed", "--map=legs", "--processes=2")
+    done = design(*arguments, "--bodies=40", f"--output={straight}")
+    command = [sys.executable, "-m", "arc_suite", "design", *QUICK, *arguments, "--bodies=2000", f"--output={broken}"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    journal = broken / "journal.jsonl"
+    deadline = time.monotonic() + 120.0
+    while not (journal.exists() and journal.read_bytes().count(b"\n") >= 2) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:2]) + lines[1][:300])  # a batch, and one that was being written
+    again = design(*arguments, "--bodies=40", f"--output={broken}")
+    assert again.stdout.replace("broken", "straight") == done.stdout
+    assert contents(broken) == contents(straight)
+
+
+def test_another_search_is_refused_and_left_alone(found):
+    folder, _ = found
+    before = contents(folder)
+    done = design("--around=tick", "--goal=speed", "--bodies=20", "--mass=3", f"--output={folder}")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert "of a search with budget" in done.stderr and "write to another folder" in done.stderr
+    assert contents(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--goal=sped",), "unknown goal 'sped'; did you mean 'speed'?"),
+        (("--map=legs,legs",), "map: expected one or two different axes of legs, links, height, width, got legs,legs"),
+        (("--mass=-1",), "mass: expected a number from 1e-06 to 1e+06, got -1.0"),
+        (("--span=nan",), "span: expected a number from 0.05 to 100, got nan"),
+        (("--mass=1e6", "--span=0.06"), "no body: "),
+        (("--bodies=0",), "flag --bodies=0: 0 is not an integer in the range [1, 100000]"),
+        (("--task=stair",), "unknown task 'stair'; did you mean 'stairs'?"),
+        (("--task=stairs", "--set=terrain_seed=x"), "terrain_seed: expected an integer from 0 to 4294967295, got 'x'"),
+        (("--set=speed=3",), "unknown setting of walk 'speed'"),
+        (("--set=rise",), "--set rise: expected name=value"),
+        (("--goal=tracking", "--task=walk"), "--goal=tracking: task walk does not measure tracking"),
+        (("--around=tik",), "unknown domain 'tik'; did you mean 'tick'?"),
+        (("--around=missing.json",), "cannot read missing.json: no such file or directory"),
+    ],
+)
+def test_bad_arguments_are_one_line(tmp_path, arguments, message):
+    done = design(*arguments, f"--output={tmp_path / 'gallery'}")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"arc-suite design: {message}") and done.stderr.count("\n") == 1
+    assert not (tmp_path / "gallery").exists()
+
+
+def test_a_folder_is_required():
+    assert design().stderr == "arc-suite design: no folder to write to; say --output=FOLDER\n"
+
+
+def test_a_search_that_finds_nothing_says_why(tmp_path):
+    done = design("--bodies=20", "--power=0.001", "--processes=1", f"--output={tmp_path}")
+    assert done.returncode == 1 and done.stderr.count("\n") == 1
+    assert done.stderr.startswith("arc-suite design: none of 20 bodies counts; most often: ")
+    assert (tmp_path / "bodies.csv").read_text().count("\n") == 21

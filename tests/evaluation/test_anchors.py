@@ -1,0 +1,70 @@
+"""Anchors of scores: what standing still and the best demonstrator earn."""
+
+import numpy as np
+import pytest
+
+from arc_suite.cpg.selection import suited_presets
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import EPISODES, anchors
+from arc_suite.evaluation.anchors import Anchors
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import TASKS
+
+TABLE = anchors.read(anchors.TABLE)
+
+
+def test_a_score_is_0_for_standing_and_1_for_the_demonstrator():
+    scale = Anchors(1000.0, 3000.0, "refined")
+    assert scale.score(np.array([1000.0, 3000.0, 500.0, 3400.0])).tolist() == [0.0, 1.0, -0.25, 1.2]
+    assert scale.at(0.5) == 2000.0
+
+
+@pytest.mark.parametrize("scale", [Anchors(1000.0), Anchors(1000.0, 900.0, "medium")])
+def test_there_is_no_score_without_a_better_demonstrator(scale):
+    assert np.isnan(scale.score(2000.0)) and scale.at(0.5) == np.inf
+
+
+def test_the_best_demonstrator_is_the_one_that_earns_most():
+    played = {"zero": np.array([1.0, 3.0]), "tuned": np.array([9.0, 9.0]), "steered": np.array([0.0, 20.0])}
+    assert anchors.of_returns(played) == Anchors(2.0, 10.0, "steered")
+
+
+def test_a_place_of_the_table_has_standing_still_and_one_demonstrator():
+    assert TABLE.keys() <= {str(Setup.of(robot, task)) for robot in ROBOTS for task in TASKS}
+    for place, every in TABLE.items():
+        assert list(every)[0] == anchors.ZERO and len(every) == 2, place
+        assert all(len(returns) == EPISODES for returns in every.values()), place
+
+
+def test_standing_still_and_the_demonstrators_of_walk_earn_what_the_documents_say():
+    found = {robot: anchors.anchors(Setup.of(robot)) for robot in ROBOTS}
+    assert {scale.preset for scale in found.values()} == {"refined"}
+    zeros = {"queen": 1634.8, "bastion": 1630.8, "tick": 1640.0, "leaper": 1734.9}
+    assert {robot: round(scale.zero, 1) for robot, scale in found.items()} == zeros
+
+
+def _same_as_fresh(robot, task):
+    """The first episode of each anchor, played anew. Chaotic motions differ between processors, so falls may too."""
+    setup = Setup.of(robot, task)
+    for name, returns in TABLE[str(setup)].items():
+        (fresh,) = anchors.played(setup, name, range(1))
+        assert fresh == pytest.approx(returns[0], rel=0.01), (robot, task, name)
+
+
+@pytest.mark.parametrize(("robot", "task"), [("tick", "walk"), ("queen", "steer")])
+def test_a_fresh_episode_earns_what_the_table_says(robot, task):
+    _same_as_fresh(robot, task)
+
+
+@pytest.mark.release
+@pytest.mark.parametrize("place", TABLE)
+def test_fresh_episodes_earn_what_the_table_says(place):
+    _same_as_fresh(*place.split(", "))
+
+
+def test_other_settings_are_measured():
+    setup = Setup.of("tick", "walk", {"time_limit": 1.0})
+    assert anchors.known(setup) is None
+    scale, whole = anchors.anchors(setup), anchors.anchors(Setup.of("tick"))
+    assert 0.0 < scale.zero < 0.05 * whole.zero and scale.demonstrator > scale.zero
+    assert list(anchors.measured(setup)) == ["zero", *suited_presets(setup.definition)]
