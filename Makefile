@@ -8,13 +8,15 @@
 # make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
-# make web     bundles the viewer that pages are made of, and three.js; needs Node
+# make web     bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
+# make check-play  walks bodies of pages in Node against Python, and plays pages in Chromium by keys and pointers
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
-# make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3
+# make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3; the sample project is linted
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
 # make check-agents-release  the same for every algorithm, and for studies that are killed
+# make check-bodies  environments of different bodies of every layout, task and autoreset mode, and a census of varied ones; minutes
 # make check-mjx  worlds on MJX and MuJoCo Warp, on a processor, in an environment of their own; minutes
 # make bench-gpu  measures worlds on this machine's GPU, writes its table into docs/gpu.md
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
@@ -32,7 +34,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -113,13 +115,13 @@ check-clients: $(INSTALLED)
 ENGINES := out/engines
 
 # What it makes is not committed, and goes into wheels.
-VIEWER := arc_suite/export/web/viewer.js
+VIEWER := arc_suite/export/web/mujoco.wasm.zlib
 web: $(VIEWER)
 $(VIEWER): $(wildcard web/*)
 	mkdir -p .node-web $(dir $@)
 	cp web/package.json web/package-lock.json .node-web/
 	npm ci --prefix .node-web --no-audit --no-fund --silent
-	NODE_PATH=$(CURDIR)/.node-web/node_modules node web/build.js $@
+	NODE_PATH=$(CURDIR)/.node-web/node_modules node web/build.js $(dir $@)
 
 # Other builds go on without the viewer; what is to be released has it.
 dist: VENV := .venv-dist
@@ -140,6 +142,13 @@ check-web: setup.cfg $(VIEWER)
 		--outfile=$(ENGINES)/loader.js --log-level=warning
 	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
 
+check-play: VENV := .venv-web
+check-play: setup.cfg $(VIEWER)
+	tools/ensure_venv.sh $(VENV)
+	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
+	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
+	$(VENV)/bin/python -m pytest tests/export/test_play.py tests/export/test_play_page.py
+
 check-glb: $(INSTALLED)
 	mkdir -p .node-glb
 	cp tests/engines/package.json tests/engines/package-lock.json .node-glb/
@@ -155,6 +164,10 @@ check-blender: $(INSTALLED)
 	.venv-blender/bin/python tests/engines/blender.py $(ENGINES)
 
 check-godot: $(INSTALLED)
+	tools/ensure_venv.sh .venv-godot
+	.venv-godot/bin/python -m pip install -q gdtoolkit==4.5.0
+	.venv-godot/bin/gdlint examples/godot
+	.venv-godot/bin/gdformat --check examples/godot
 	command -v godot3-server >/dev/null || tools/ensure_packages.sh godot3-server
 	$(PYTHON) tests/engines/make_files.py $(ENGINES) few
 	$(PYTHON) tests/engines/godot.py $(ENGINES)
@@ -183,6 +196,11 @@ check-agents check-agents-release: setup.cfg
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
 	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/agents tests/studies/test_study.py tests/cli/test_train.py \
 		tests/policies/test_onnx_file.py tests/evaluation/test_statistics.py
+
+check-bodies: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) -m pytest $(PARALLEL) tests/envs/test_bodies.py tests/models/test_families.py
+	$(VENV)/bin/arc-suite survey --family varied --count 120
 
 bench-gpu: setup.cfg
 	tools/ensure_venv.sh $(VENV)

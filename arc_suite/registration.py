@@ -1,6 +1,6 @@
-"""Robots and tasks of other packages, and Gymnasium's ids for all there are."""
+"""Robots, families of bodies and tasks of other packages, and Gymnasium's ids for all there are."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -10,6 +10,7 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import law
 from arc_suite.envs.prepare import prepared
+from arc_suite.models.families import FAMILIES
 from arc_suite.models.visuals import VISUALS
 from arc_suite.models.visuals.spec import Visuals
 from arc_suite.registry import MODULES
@@ -18,6 +19,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import TASKS, Task
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.parameters import PARAMETERS, SHARED_NOISE
+
+BODIES = "bodies"  # in place of a robot in ids of environments of different bodies
 
 
 def register(
@@ -29,8 +32,9 @@ def register(
     visuals: Visuals | None = None,
     tasks: Iterable[type[Task]] = (),
     arenas: Mapping[str, Any] | None = None,
+    families: Mapping[str, Callable[[int], Body]] | None = None,
 ) -> None:
-    """Add a robot, tasks, arenas or all of them to the suite: every task then exists for every robot.
+    """Add a robot, tasks, arenas, families or all of them to the suite: every task then exists for every robot.
 
     Call it where a module is imported. `load` and Gymnasium's ids then name the robot as they name
     Queen.
@@ -47,6 +51,9 @@ def register(
         visuals: decorations and colours; None for those that suit any body.
         tasks: classes by the contract of `tasks.contract`, each with its name.
         arenas: functions by name, from a body to the `Arena` that suits it.
+        families: functions by name, from a seed to a body, always the same for the same seed; see
+            `models.families.sound`. `name:seed` then stands for the body wherever a domain does, and comes before
+            a module of that name.
 
     Raises:
         ValueError: a name that is taken, or parameters or a preset that do not fit the body;
@@ -55,22 +62,31 @@ def register(
     module = None if module == "__main__" else module
     new_tasks: dict[str, Any] = {_task_name(task): task for task in tasks}
     new_arenas = dict(arenas or {})
-    for kind, table, new in (("task", TASKS, new_tasks), ("arena", ARENAS, new_arenas)):
+    new_families = {_family_name(name): make for name, make in (families or {}).items()}
+    added: tuple[tuple[str, dict, dict], ...]
+    added = ("task", TASKS, new_tasks), ("arena", ARENAS, new_arenas), ("family", FAMILIES, new_families)
+    for kind, table, new in added:
         for name, value in new.items():
             if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
                 raise ValueError(f"{kind} {name!r} is already registered")
     if body is None:
         if (parameters, presets, visuals) != (None, None, None):
             raise ValueError("parameters, presets and visuals belong to a body, and none is given")
-        if not (new_tasks or new_arenas):
-            raise ValueError("nothing to register: give a body, tasks or arenas")
+        if not (new_tasks or new_arenas or new_families):
+            raise ValueError("nothing to register: give a body, tasks, arenas or families")
     else:
         _register_body(body, parameters or {}, presets, visuals)
         MODULES["domain", body.name] = module
-    TASKS.update(new_tasks)
-    ARENAS.update(new_arenas)
-    MODULES.update({("task", name): module for name in new_tasks} | {("arena", name): module for name in new_arenas})
+    for kind, table, new in added:
+        table.update(new)
+        MODULES.update({(kind, name): module for name in new})
     register_ids()
+
+
+def _family_name(name) -> str:
+    if not (isinstance(name, str) and name.isidentifier()):
+        raise ValueError(f"family {name!r}: expected a name of letters, digits and underscores")
+    return name
 
 
 def _task_name(task) -> str:
@@ -85,6 +101,8 @@ def _task_name(task) -> str:
 def _register_body(body, parameters, presets, visuals) -> None:
     if not isinstance(body, Body):
         raise ValueError(f"body: expected a spec.Body, got {body!r}")
+    if body.name == BODIES:
+        raise ValueError(f"robot {BODIES!r}: ids of environments of different bodies have this name; choose another")
     if ROBOTS.get(body.name, body) != body:
         raise ValueError(f"robot {body.name!r} is already registered")
     for task, given in parameters.items():
@@ -117,7 +135,8 @@ def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, An
 def register_ids() -> None:
     """Register `arc_suite/<robot>-<task>-v<version>` with Gymnasium for every pair that has no id yet.
 
-    The adapters are imported when an environment is made.
+    `bodies` in place of a robot is for `gymnasium.make_vec` alone: environments of different bodies. The adapters
+    are imported when an environment is made.
     """
     for domain_name, task_name in registry.all_tasks():
         env_id = registry.env_id(domain_name, TASKS[task_name])
@@ -131,4 +150,12 @@ def register_ids() -> None:
                     "domain_name": registry.importable("domain", domain_name),
                     "task_name": registry.importable("task", task_name),
                 },
+            )
+    for task_name, task in TASKS.items():
+        env_id = registry.env_id(BODIES, task)
+        if env_id not in gymnasium.registry:
+            gymnasium.register(
+                env_id,
+                vector_entry_point="arc_suite.envs.bodies:BodiesEnv",
+                kwargs={"task_name": registry.importable("task", task_name)},
             )

@@ -1,18 +1,25 @@
-"""Tables of names: robots, tasks and arenas, including those of other packages."""
+"""Tables of names: robots, families of bodies, tasks and arenas, including those of other packages."""
 
 import importlib
 import os
+import re
 import sys
 from collections.abc import Callable, Mapping
 
 from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
+from arc_suite.models.families import FAMILIES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
 
 MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
+
+
+MOST_BODIES = 1 << 16  # that one name stands for
+
+_SEEDS = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")
 
 
 class NotImported(ValueError):
@@ -33,13 +40,64 @@ def body_of(domain) -> Body:
     """Return the body of a domain.
 
     Args:
-        domain: name of a robot, path of a file that holds a body (a `Path`, or a string that ends
-            in .json), the text of such a file, or the body itself.
+        domain: name of a robot, `family:seed`, path of a file that holds a body (a `Path`, or a string that
+            ends in .json), the text of such a file, or the body itself.
 
     Raises:
-        ValueError: an unknown name, or a file that holds no body.
+        ValueError: an unknown name, a file that holds no body, or several bodies.
         OSError: the file cannot be read.
     """
+    members = _members(domain)
+    if members is None:
+        return _single(domain)
+    if len(members[1]) > 1:
+        raise ValueError(f"domain {domain!r}: expected one body, got {len(members[1])}")
+    return _member(members[0], members[1][0])
+
+
+def bodies_of(domain) -> tuple[Body, ...]:
+    """Return the bodies of a domain: those of `family:first-last`, else that of `body_of`.
+
+    Raises:
+        ValueError: as `body_of`, or more than 65536 bodies.
+        OSError: as `body_of`.
+    """
+    members = _members(domain)
+    return (_single(domain),) if members is None else tuple(_member(members[0], seed) for seed in members[1])
+
+
+def family_of(name: str) -> Callable[[int], Body]:
+    """Return the function from a seed to a body of a family, by name or `module:name`.
+
+    Raises:
+        ValueError: an unknown name.
+    """
+    return _find(name, FAMILIES, "family")
+
+
+def _members(domain) -> tuple[str, range] | None:
+    """The family and the seeds of `family:seed`, `module:family:seed` or a range of them; None for other domains."""
+    if not isinstance(domain, str) or domain.startswith("{"):
+        return None
+    family, _, seeds = domain.rpartition(":")
+    if not (family in FAMILIES or ":" in family):
+        return None
+    if not (found := _SEEDS.fullmatch(seeds)):
+        raise ValueError(f"domain {domain!r}: expected {family}:seed or {family}:first-last, such as {family}:0-9")
+    first, last = int(found[1]), int(found[2] or found[1])
+    if not first <= last < first + MOST_BODIES:
+        raise ValueError(f"domain {domain!r}: expected seeds in ascending order, at most {MOST_BODIES}")
+    return family, range(first, last + 1)
+
+
+def _member(family: str, seed: int) -> Body:
+    body = family_of(family)(seed)
+    if not isinstance(body, Body):
+        raise ValueError(f"family {family!r}: expected a spec.Body of seed {seed}, got {body!r}")
+    return body
+
+
+def _single(domain) -> Body:
     if isinstance(domain, Body):
         return domain
     if isinstance(domain, os.PathLike) or (isinstance(domain, str) and domain.endswith(".json")):

@@ -32,7 +32,8 @@ def view(task: str, robot: str) -> np.ndarray:
     policy = policies.policy("cpg", robot, suited_preset(definition), task=definition)
     for _ in evaluation.rollout(environment, policy, 0, FLAGS.steps):
         pass
-    picture = environment.physics.render(HEIGHT, WIDTH, camera_id="portrait" if task in NEAR else "tracking")
+    camera = "portrait" if task in NEAR else "tracking"
+    picture = environment.physics.render(HEIGHT, WIDTH, camera, quality="still")
     return films.captioned(picture, f"{task}: {robot}")
 
 

@@ -1,65 +1,24 @@
 // Plays recorded walks, side by side: bodies from their parts, a timeline, foot contacts and rewards with a cursor.
 import * as THREE from "three";
-import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { drawGait, drawReward, extent, gaitTime, rewardTime } from "./charts.js";
+import { unpacked } from "./data.js";
+import { grounds, triangles } from "./ground.js";
+import { geometry, materials, partOf, quaternion } from "./parts.js";
+import { View } from "./view.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
-const WINDOW = 4; // s of foot contacts
-const VIEW = (35 / 180) * Math.PI; // angle of the camera
-const INK = "#d7dde5", FAINT = "#8791a0", PALE = "#39424f", BLUE = "#3b9be0", VERMILION = "#f0713a";
 
 const byId = (id) => document.getElementById(id);
-
-async function unpacked(text) {
-  const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return JSON.parse(await new Response(stream).text());
-}
-
-const quaternion = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);
-
-function geometry({ kind, size: [a, b, c] }) {
-  switch (kind) {
-    case "box":
-      return new THREE.BoxGeometry(2 * a, 2 * b, 2 * c);
-    case "ellipsoid":
-      return new THREE.SphereGeometry(1, 32, 20).scale(a, b, c);
-    case "sphere":
-      return new THREE.SphereGeometry(a, 24, 16);
-    case "capsule": // three.js's stand along y, MuJoCo's along z
-      return new THREE.CapsuleGeometry(a, 2 * b, 8, 20).rotateX(Math.PI / 2);
-    default:
-      return new THREE.CylinderGeometry(a, a, 2 * b, 28).rotateX(Math.PI / 2);
-  }
-}
-
-function materials(looks) {
-  return Object.fromEntries(
-    Object.entries(looks).map(([name, { colour, emission, roughness }]) => {
-      const shown = new THREE.Color().setRGB(...colour, THREE.SRGBColorSpace);
-      const glow = { emissive: shown, emissiveIntensity: emission };
-      return [name, new THREE.MeshStandardMaterial({ color: shown, roughness, ...glow })];
-    }),
-  );
-}
 
 // A body whose parts turn as a walk tells; the frame is MuJoCo's: x ahead, y left, z up.
 class Creature {
   constructor(walk) {
     this.walk = walk;
     const looks = materials(walk.materials);
-    this.parts = walk.parts.map((part) => {
-      const group = new THREE.Group();
-      group.name = part.name;
-      group.position.set(...part.place);
-      group.quaternion.copy(quaternion(part.quaternion));
-      for (const shape of part.shapes) {
-        const mesh = new THREE.Mesh(geometry(shape), looks[shape.material]);
-        mesh.position.set(...shape.place);
-        mesh.quaternion.copy(quaternion(shape.quaternion));
-        mesh.castShadow = mesh.receiveShadow = true;
-        group.add(mesh);
-      }
-      return group;
+    this.parts = walk.parts.map((part) => partOf(part, looks));
+    walk.parts.forEach(({ place, quaternion: turn }, index) => {
+      this.parts[index].position.set(...place);
+      this.parts[index].quaternion.copy(quaternion(turn));
     });
     walk.parts.forEach((part, index) => part.parent !== null && this.parts[part.parent].add(this.parts[index]));
     this.torso = this.parts[0];
@@ -96,85 +55,36 @@ class Creature {
   }
 }
 
-// A view of one creature, whose camera goes along and can be turned about it.
+// A view of one creature in its surroundings.
 class Stage {
   constructor(walk, canvas) {
-    this.canvas = canvas;
     this.creature = new Creature(walk);
-    const height = walk.height;
-    this.scene = new THREE.Scene();
-    this.scene.background = new THREE.Color("#a3adb8");
-    this.away = new THREE.Vector3(1.9, -2.6, 1.1).multiplyScalar(1.5 * walk.reach); // of the camera
-    const away = this.away.length(); // the ground is there for 12 heights about the way, a plane for more
-    this.scene.fog = new THREE.Fog("#a3adb8", away + 3 * height, away + (walk.scenery.level ? 34 : 11) * height);
+    const { height, reach, scenery } = walk;
+    this.view = new View(canvas, height, reach, (scenery.level ? 34 : 11) * height);
     this.marks = new Marks(walk.scenery);
-    this.scene.add(this.creature.torso, this.marks.group, new THREE.HemisphereLight("#dfe8f2", "#56606c", 1.6));
-    this.sun = new THREE.DirectionalLight("#fff4e6", 2.4);
-    this.sun.castShadow = true;
-    this.sun.shadow.mapSize.set(1024, 1024);
-    const reach = 2.5 * walk.reach;
-    Object.assign(this.sun.shadow.camera, { left: -reach, right: reach, top: reach, bottom: -reach, far: 20 * reach });
-    this.sun.shadow.normalBias = 0.01 * height;
-    this.offset = new THREE.Vector3(-0.3, 0.5, 1.2).setLength(6 * reach);
-    this.scene.add(this.sun, this.sun.target, ...surroundings(walk));
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true });
-    this.renderer.shadowMap.enabled = true;
-    this.renderer.setPixelRatio(window.devicePixelRatio);
-    this.camera = new THREE.PerspectiveCamera(35, 1, 0.02 * height, 100 * height);
-    this.camera.up.set(0, 0, 1);
-    this.controls = new OrbitControls(this.camera, canvas);
-    this.controls.maxPolarAngle = 0.49 * Math.PI;
+    this.view.scene.add(this.creature.torso, this.marks.group, ...surroundings(walk));
     this.creature.seek(0);
-    this.target = new THREE.Vector3();
-    this.aim(this.target);
-    this.camera.position.copy(this.target).add(this.away);
-    this.controls.target.copy(this.target);
-    this.controls.update();
+    this.view.place(this.target());
   }
 
-  aim(target) {
+  // What the camera is aimed at.
+  target() {
     const { x, y, z } = this.creature.torso.position;
     const { height, scenery } = this.creature.walk;
-    return target.set(x, y, scenery.level ? 0.45 * height : z - 0.5 * height);
+    return new THREE.Vector3(x, y, scenery.level ? 0.45 * height : z - 0.5 * height);
   }
 
   draw(time) {
     this.creature.seek(time);
     this.marks.seek(this.creature.row(time));
-    const before = this.target.clone();
-    const way = this.aim(this.target).clone().sub(before);
-    this.camera.position.add(way);
-    this.controls.target.add(way);
-    this.controls.update();
-    this.sun.target.position.copy(this.target);
-    this.sun.position.copy(this.target).add(this.offset);
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    const size = this.renderer.getSize(new THREE.Vector2());
-    if (size.x !== width || size.y !== height) {
-      this.renderer.setSize(width, height, false);
-      this.camera.aspect = width / height;
-      // In a narrow view the creature is as far from the sides as it is from top and bottom in a wide one.
-      this.camera.fov = 2 * Math.atan(Math.tan(VIEW / 2) * Math.max(1, height / width)) * (180 / Math.PI);
-      this.camera.updateProjectionMatrix();
-    }
-    this.renderer.render(this.scene, this.camera);
+    this.view.follow(this.target());
+    this.view.draw();
   }
 }
 
 // What is around the creature: floors and steps with tiles on them, fields, obstacles.
 function surroundings({ scenery, height, positions }) {
-  const floor = tiles();
-  const material = (shade) =>
-    new THREE.MeshStandardMaterial({ map: floor, color: new THREE.Color().setScalar(shade), roughness: 0.95 });
-  const ground = (shape, shade, [x, y, z] = [0, 0, 0]) => {
-    const places = shape.attributes.position;
-    const tile = Array.from({ length: places.count }, (_, index) => [places.getX(index) + x, places.getY(index) + y]);
-    shape.setAttribute("uv", new THREE.Float32BufferAttribute(tile.flat().map((way) => way / height), 2));
-    const mesh = new THREE.Mesh(shape, material(shade));
-    mesh.position.set(x, y, z);
-    mesh.receiveShadow = true;
-    return mesh;
-  };
+  const ground = grounds(height);
   const path = new THREE.Box2().setFromPoints(positions.map(([x, y]) => new THREE.Vector2(x, y)));
   const middle = path.getCenter(new THREE.Vector2()).divideScalar(height).round().multiplyScalar(height);
   const width = (Math.max(...path.getSize(new THREE.Vector2()).toArray()) / height + 80) * height;
@@ -191,23 +101,6 @@ function surroundings({ scenery, height, positions }) {
     ...scenery.fields.map((field) => ground(triangles(field), 1)),
     ...scenery.solids.map(solid),
   ];
-}
-
-// A height field, in whose cells MuJoCo's triangles meet from the corner of lowest to that of highest x and y.
-function triangles({ low, cell, heights }) {
-  const columns = heights[0].length;
-  const points = heights.flatMap((row, j) => row.flatMap((z, i) => [low[0] + i * cell[0], low[1] + j * cell[1], z]));
-  const corners = heights.slice(1).flatMap((_, j) =>
-    heights[0].slice(1).flatMap((_, i) => {
-      const first = j * columns + i;
-      const last = first + columns + 1;
-      return [first, first + 1, last, first, last, last - 1];
-    }),
-  );
-  const shape = new THREE.BufferGeometry().setIndex(corners);
-  shape.setAttribute("position", new THREE.Float32BufferAttribute(points, 3));
-  shape.computeVertexNormals();
-  return shape;
 }
 
 // What the task asks for: arrows and discs, one mesh for each style.
@@ -258,108 +151,15 @@ class Marks {
   }
 }
 
-// A square tile, which makes motion over the ground visible.
-function tiles() {
-  const canvas = document.createElement("canvas");
-  canvas.width = canvas.height = 128;
-  const pen = canvas.getContext("2d");
-  pen.fillStyle = "#8d99a6";
-  pen.fillRect(0, 0, 128, 128);
-  pen.fillStyle = "#5d6875";
-  pen.fillRect(1, 1, 126, 126);
-  const texture = new THREE.CanvasTexture(canvas);
-  texture.colorSpace = THREE.SRGBColorSpace;
-  texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
-  texture.anisotropy = 8;
-  return texture;
-}
-
-function sized(canvas) {
-  const scale = window.devicePixelRatio;
-  const width = canvas.clientWidth, height = canvas.clientHeight;
-  if (canvas.width !== Math.round(width * scale) || canvas.height !== Math.round(height * scale)) {
-    canvas.width = Math.round(width * scale);
-    canvas.height = Math.round(height * scale);
-  }
-  const pen = canvas.getContext("2d");
-  pen.setTransform(scale, 0, 0, scale, 0, 0);
-  pen.clearRect(0, 0, width, height);
-  pen.font = "11px system-ui, sans-serif";
-  pen.textBaseline = "middle";
-  return { pen, width, height };
-}
-
-const LEFT = 58, RIGHT = 150; // px, for names of legs and for terms
-
-// Bars of stance by leg on the prescribed schedule, some seconds about the cursor.
-function drawGait(canvas, walk, time) {
-  const { pen, width, height } = sized(canvas);
-  const rows = walk.legs.length, pitch = (height - 4) / rows, scale = (width - LEFT - 8) / WINDOW;
-  const start = time - WINDOW / 2;
-  const bar = (first, last, row, share, colour) => {
-    const from = Math.max(LEFT, LEFT + (first * walk.step - start) * scale);
-    const to = Math.min(width - 8, LEFT + (last * walk.step - start) * scale);
-    if (to <= from) return;
-    pen.fillStyle = colour;
-    pen.fillRect(from, 2 + (row + (1 - share) / 2) * pitch, to - from + 0.5, share * pitch); // without seams
-  };
-  walk.legs.forEach((leg, row) => {
-    pen.fillStyle = INK;
-    pen.fillText(leg, 4, 2 + (row + 0.5) * pitch);
-    const first = Math.max(0, Math.floor(start / walk.step) - 1);
-    const last = Math.min(walk.positions.length, Math.ceil((start + WINDOW) / walk.step) + 1);
-    const steps = Array.from({ length: Math.max(0, last - first) }, (_, index) => first + index);
-    for (const k of steps) if (walk.schedule[k][row]) bar(k, k + 1, row, 0.84, PALE);
-    for (const k of steps) if (walk.stance[k][row]) bar(k, k + 1, row, 0.4, walk.schedule[k][row] ? BLUE : VERMILION);
-  });
-  pen.fillStyle = "#ffffff";
-  pen.fillRect(LEFT + (WINDOW / 2) * scale - 0.5, 0, 1, height);
-}
-
-// Weighted terms of the reward, gains stacked upwards and costs downwards, with their values at the cursor.
-function drawReward(canvas, walk, time, row, [bottom, top]) {
-  const { pen, width, height } = sized(canvas);
-  const names = Object.keys(walk.terms), count = walk.positions.length;
-  const scale = (width - LEFT - RIGHT) / count;
-  const y = (value) => 6 + ((top - value) / (top - bottom)) * (height - 12);
-  for (let k = 0; k < count; k += 1) {
-    let up = 0, down = 0;
-    for (const name of names) {
-      const value = walk.terms[name][k], from = value > 0 ? up : down;
-      pen.fillStyle = walk.colours[name];
-      pen.fillRect(LEFT + k * scale, Math.min(y(from), y(from + value)), scale + 0.6, Math.abs(y(from) - y(from + value)));
-      if (value > 0) up += value;
-      else down += value;
-    }
-  }
-  pen.fillStyle = INK;
-  pen.textAlign = "right";
-  for (const value of [0, Math.floor(top)]) pen.fillText(value.toFixed(0), LEFT - 6, y(value));
-  pen.textAlign = "left";
-  pen.fillText("reward", 4, height / 2);
-  pen.fillStyle = "#ffffff";
-  pen.fillRect(LEFT + Math.min(time / walk.step, count) * scale - 0.5, 0, 1, height);
-  names.forEach((name, index) => {
-    const line = 8 + (index * (height - 16)) / Math.max(names.length - 1, 1);
-    pen.fillStyle = walk.colours[name];
-    pen.fillRect(width - RIGHT + 8, line - 4, 8, 8);
-    pen.fillStyle = INK;
-    pen.fillText(name.replaceAll("_", " "), width - RIGHT + 20, line);
-    pen.textAlign = "right";
-    pen.fillText(walk.terms[name][row].toFixed(2).replace(/^-(?=0.00$)/, ""), width - 4, line);
-    pen.textAlign = "left";
-  });
-}
-
-// The least and the greatest of what costs and gains add up to in any step.
-function extent(walk) {
-  const sums = (part) => walk.totals.map((_, k) => Object.values(walk.terms).reduce((sum, term) => sum + part(0, term[k]), 0));
-  return [Math.min(...sums(Math.min), 0), Math.max(...sums(Math.max), 1e-9)];
-}
-
 function column(walk) {
   const box = document.createElement("section");
-  box.innerHTML = `<h2></h2><canvas class="view"></canvas><canvas class="gait"></canvas><canvas class="reward"></canvas>`;
+  const drawn = { view: "walk", gait: "foot contacts on the schedule", reward: "weighted terms of the reward" };
+  box.innerHTML = "<h2></h2>";
+  for (const [name, text] of Object.entries(drawn)) {
+    const canvas = Object.assign(document.createElement("canvas"), { className: name, role: "img" });
+    canvas.setAttribute("aria-label", `${walk.label}: ${text}`);
+    box.append(canvas);
+  }
   box.querySelector("h2").textContent = walk.label;
   const [view, gait, reward] = box.querySelectorAll("canvas");
   if (!walk.schedule) gait.remove();
@@ -376,7 +176,7 @@ async function main() {
   const extents = walks.map(extent); // one scale, so that walks can be compared
   const scale = [Math.min(...extents.map(([low]) => low)), Math.max(...extents.map(([, high]) => high))];
   const finest = Math.min(...walks.map((walk) => walk.step));
-  const state = { time: 0, speed: 1, playing: true };
+  const state = { time: 0, speed: 1, playing: !window.matchMedia("(prefers-reduced-motion: reduce)").matches };
   const slider = byId("time"), speeds = byId("speed"), button = byId("play");
   slider.max = seconds;
   slider.step = finest / 10;
@@ -433,14 +233,12 @@ async function main() {
   slider.addEventListener("change", () => slider.blur());
   speeds.addEventListener("change", () => ((state.speed = Number(speeds.value)), speeds.blur()));
   for (const { walk, gait, reward } of columns) {
-    const clicked = (canvas, toTime) =>
-      canvas?.addEventListener("click", (event) => seek(toTime(event.offsetX, canvas.clientWidth)));
-    clicked(gait, (x, width) => state.time + ((x - LEFT) / (width - LEFT - 8) - 0.5) * WINDOW);
-    clicked(reward, (x, width) => ((x - LEFT) / (width - LEFT - RIGHT)) * walk.step * walk.positions.length);
+    gait?.addEventListener("click", (event) => seek(gaitTime(gait, event.offsetX, state.time)));
+    reward.addEventListener("click", (event) => seek(rewardTime(reward, event.offsetX, walk)));
   }
 
   let last = null, stale = true; // a page at rest draws only what changes
-  for (const { stage } of columns) stage.controls.addEventListener("change", () => (stale = true));
+  for (const { stage } of columns) stage.view.controls.addEventListener("change", () => (stale = true));
   window.addEventListener("resize", () => (stale = true));
   const frame = (now) => {
     if (state.playing && last !== null) {

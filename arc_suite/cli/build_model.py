@@ -6,6 +6,7 @@ The body is a robot of the suite, a spec file, or one made to order:
   arc-suite build_model --legs 6 --links 3 > walker.xml
   arc-suite build_model --legs 5 --layout radial --scale 2 --json --output starfish.json
   arc-suite build_model --seed 7 --summary --render random.png
+  arc-suite build_model --robot varied:7 --summary
   arc-suite build_model --spec spider --summary
   arc-suite build_model --robot tick --task stairs --set difficulty=1 --output stairs.xml
 """
@@ -17,17 +18,17 @@ from absl import flags
 
 from arc_suite import checks, files, models
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.cli.flags import define_body, define_task, made_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_bodies, only_one, task
 from arc_suite.cli.summary import summary
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.robots import generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-flags.DEFINE_enum("robot", None, list(ROBOTS), "A robot of the suite.")
+flags.DEFINE_string("robot", None, f"{ROBOT_HELP}.")
 flags.DEFINE_integer("seed", None, "A random body; with --legs or --links, of that many.", lower_bound=0)
 flags.DEFINE_enum(
     "layout",
@@ -63,7 +64,7 @@ def main() -> None:
             path = stack.enter_context(files.writing(FLAGS.render))
             physics = Physics.from_body(body, arena)
             physics.forward()
-            imageio.imwrite(path, physics.render(camera_id="portrait"))
+            imageio.imwrite(path, physics.render(camera_id="portrait", quality="still"))
         if FLAGS.summary:
             print(summary(body))
 
@@ -77,7 +78,7 @@ def _body() -> Body:
         for name in ("links", "layout"):
             if FLAGS[name].value is not None:
                 raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
-        body = ROBOTS[FLAGS.robot] if FLAGS.robot else made_body()
+        body = only_one(named_bodies(FLAGS.robot), FLAGS.robot) if FLAGS.robot is not None else made_body()
     elif "seed" in sources:
         body = generator.random_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
     else:

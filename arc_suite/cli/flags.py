@@ -9,31 +9,41 @@ from absl import flags
 
 from arc_suite import checks, policies, registry
 from arc_suite.envs.setup import Setup
+from arc_suite.models.families import FAMILIES
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
 from arc_suite.robots import ROBOTS, generator, spec_files
-from arc_suite.robots.spec import Body
+from arc_suite.robots.spec import PALETTES, Body
 from arc_suite.tasks import TASKS
 
 FLAGS = flags.FLAGS
 
 MOST = 100_000  # episodes, or bodies: more than anyone waits for
-ROBOT_HELP = f"{', '.join(ROBOTS)}, module:name of one that another package has"
+ROBOT_HELP = (
+    f"{', '.join(ROBOTS)}, module:name of one that another package has, or a body of a family: "
+    f"{', '.join(f'{family}:7' for family in FAMILIES)}"
+)
 
 
 def define_body() -> None:
-    """Define --spec, --legs and --links, for programs that take any body."""
+    """Define --spec, --legs, --links, --length and --palette, for programs that take any body."""
     examples = ", ".join(spec_files.EXAMPLES)
     flags.DEFINE_string("spec", None, f"A body in place of a robot: a JSON file, or one of {examples}.")
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
     flags.DEFINE_integer(
         "links", None, "Actuated links of each leg of a body made to order. [default: 3]", *generator.LINKS
     )
+    flags.DEFINE_multi_string(
+        "length",
+        [],
+        "Factor on the length of a link of a spec or body made to order: --length lower=1.5; repeatable.",
+    )
+    flags.DEFINE_string("palette", None, f"Colours of a spec or body made to order: {', '.join(PALETTES)}, or a seed.")
 
 
-def define_task() -> None:
+def define_task(default: str = "walk") -> None:
     """Define --task and --set, for programs that take any task."""
-    flags.DEFINE_string("task", "walk", f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
+    flags.DEFINE_string("task", default, f"Task: {', '.join(TASKS)}, or module:name of one that another package has.")
     flags.DEFINE_multi_string(
         "set",
         [],
@@ -81,26 +91,37 @@ def policy_name(name: str) -> str:
 
 
 def made_body() -> Body | None:
-    """Return the body that --spec or --legs ask for, or None.
+    """Return the body that --spec or --legs ask for, as --length and --palette shape it, or None.
 
     Raises:
-        ValueError: both are given, or --links without --legs, or no body in the file.
+        ValueError: both are given, or --links, --length or --palette without them, or no body in the file.
         OSError: the file cannot be read.
     """
     if FLAGS.spec is not None and FLAGS.legs is not None:
         raise ValueError("expected one of --spec and --legs, got both")
     if FLAGS.links is not None and FLAGS.legs is None:
         raise ValueError(f"--links={FLAGS.links}: goes with --legs")
+    if FLAGS.spec is None and FLAGS.legs is None:
+        for name in ("length", "palette"):
+            if FLAGS[name].present:
+                raise ValueError(f"--{name}: goes with --spec or --legs")
+        return None
     if FLAGS.spec is not None:
-        return spec_files.load_body(FLAGS.spec)
-    return FLAGS.legs and generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
+        body = spec_files.load_body(FLAGS.spec)
+    else:
+        body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
+    if FLAGS.length:
+        body = generator.stretched(body, named_values("length", FLAGS.length))
+    palette = FLAGS.palette
+    return body if palette is None else body.replace(palette=int(palette) if palette.isdecimal() else palette)
 
 
 def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
 
-    A robot of another package is named `module:name`, and its module imported. Flaws of the body in a spec file, such
-    as feet in the floor, are warned of with the values that fit, as `arc-suite check` has them.
+    A robot of another package is named `module:name`, and its module imported; `family:0-9` names ten bodies. Flaws of
+    the body in a spec file, such as feet in the floor, are warned of with the values that fit, as `arc-suite check`
+    has them.
 
     Raises:
         ValueError: as `made_body`, or an unknown robot, or a robot and a body.
@@ -108,28 +129,48 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """
     body = made_body()
     if body is None:
-        if ":" in robot.value:
-            body = registry.body_of(robot.value)
-            return {body.name: body}
-        name = checks.name(robot.value, [*ROBOTS, "all"], "robot")
-        return dict(ROBOTS) if name == "all" else {name: ROBOTS[name]}
+        return dict(ROBOTS) if robot.value == "all" else named_bodies(robot.value, ["all"])
     if robot.present:
         raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
-    for flaw in flaws(body) if FLAGS.spec is not None else ():
-        warnings.warn(f"{FLAGS.spec}: {flaw.text}", stacklevel=2)
+    for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
+        warnings.warn(f"{FLAGS.spec or body.name}: {flaw.text}", stacklevel=2)
     return {body.name: body}
+
+
+def named_bodies(robot: str, near: Iterable[str] = ()) -> dict[str, Body]:
+    """Return the bodies by name that a value of --robot names; `near` are other values of the flag.
+
+    Raises:
+        ValueError: an unknown robot or family, or two bodies of one name.
+    """
+    if ":" not in robot:
+        return {robot: ROBOTS[checks.name(robot, ROBOTS, "robot", near)]}
+    found = registry.bodies_of(robot)
+    named = {body.name: body for body in found}
+    if len(named) < len(found):
+        raise ValueError(f"--robot={robot}: expected a name for each body, got two of one name")
+    return named
 
 
 def only_body(robot: flags.FlagHolder) -> Body:
     """Return the body of a program that takes one alone; see `bodies`.
 
     Raises:
-        ValueError: as `bodies`, or "all".
+        ValueError: as `bodies`, or several bodies.
         OSError: as `bodies`.
     """
-    body, *others = bodies(robot).values()
+    return only_one(bodies(robot), robot.value)
+
+
+def only_one(found: dict[str, Body], robot: str) -> Body:
+    """Return the body of those that a value of --robot names.
+
+    Raises:
+        ValueError: they are several.
+    """
+    body, *others = found.values()
     if others:
-        raise ValueError(f"--robot={robot.value}: expected one robot")
+        raise ValueError(f"--robot={robot}: expected one robot")
     return body
 
 

@@ -8,6 +8,7 @@ PROGRAMS = (
     "check",
     "render",
     "animate",
+    "play",
     "view",
     "evaluate",
     "style",

@@ -84,9 +84,10 @@ def main() -> None:
             write_page(temporary, environments, policies, steps)
         else:
             size = (FLAGS.width or _SIZES[extension][0], FLAGS.height or _SIZES[extension][1])
-            footages = []
+            footages, quality = [], "still" if extension == ".png" else "film"
             for name, walker in policies.items():
-                footages.append(films.Footage(name, environments[name], alone(walker, FLAGS.seed), camera, size))
+                walk = alone(walker, FLAGS.seed)
+                footages.append(films.Footage(name, environments[name], walk, camera, size, quality))
                 stack.callback(footages[-1].close)
             footages[0].view()  # finds out at once whether there is OpenGL
             stride = films.steps_per_frame(footages[0].control_timestep)

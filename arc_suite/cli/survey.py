@@ -5,6 +5,7 @@ the time, it moves forward by more than one body length and faster than 0.02 sqr
 less than that.
 
   arc-suite survey --first 0 --count 500
+  arc-suite survey --family varied --count 500
   arc-suite survey --first 7000 --count 100 --legs 4 --picture failures.png
 """
 
@@ -14,20 +15,27 @@ import imageio.v3 as imageio
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, files
+from arc_suite import checks, files, registry
 from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import survey
 from arc_suite.export import films
+from arc_suite.models.families import FAMILIES
 from arc_suite.robots import generator
+from arc_suite.robots.spec import Body
 
 FLAGS = flags.FLAGS
 define_task()
+flags.DEFINE_string(
+    "family", "random", f"Of the bodies: {', '.join(FAMILIES)}, or module:name of one that another package has."
+)
 flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
 flags.DEFINE_integer("count", 500, "Number of bodies.", 1, MOST)
-flags.DEFINE_integer("legs", None, "Number of legs. [default: random]", *generator.LEGS)
-flags.DEFINE_integer("links", None, "Actuated links of each leg. [default: random, 2 to 4]", *generator.LINKS)
+flags.DEFINE_integer("legs", None, "Number of legs, of the family random. [default: random]", *generator.LEGS)
+flags.DEFINE_integer(
+    "links", None, "Actuated links of each leg, of the family random. [default: random, 2 to 4]", *generator.LINKS
+)
 flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0)
 flags.DEFINE_float(
     "froude",
@@ -45,11 +53,26 @@ def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
     for outcome in outcomes[:12]:
         environment, _ = survey.play(outcome.trial)
         caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
-        views.append(films.captioned(environment.physics.render(300, 400, "portrait"), caption))
+        view = environment.physics.render(300, 400, "portrait", quality="still")
+        views.append(films.captioned(view, caption))
         environment.close()
     columns = min(4, len(views))
     views += [np.zeros_like(views[0])] * (-len(views) % columns)
     return films.grid(views, columns)
+
+
+def member(seed: int) -> Body:
+    """Return the body of a seed.
+
+    Raises:
+        ValueError: an unknown family, or a number of legs or links for another than `random`.
+    """
+    if FLAGS.family == "random":
+        return generator.random_body(seed, FLAGS.legs, FLAGS.links)
+    for name in ("legs", "links"):
+        if FLAGS[name].value is not None:
+            raise ValueError(f"--{name}={FLAGS[name].value}: goes with the family random, not with {FLAGS.family}")
+    return registry.family_of(FLAGS.family)(seed)
 
 
 def main() -> None:
@@ -59,7 +82,7 @@ def main() -> None:
     settings |= {"duty_factor": 0.6, "phase_offsets": 0.0} if FLAGS.in_phase else {}
     trials = []
     for seed in range(FLAGS.first, FLAGS.first + FLAGS.count):
-        setup = Setup.of(generator.random_body(seed, FLAGS.legs, FLAGS.links), name, settings)
+        setup = Setup.of(member(seed), name, settings)
         trials.append(survey.Trial(setup, seed, FLAGS.froude))
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:

@@ -62,6 +62,8 @@ class Commanded(ABC):
         pose: in which it stands.
         step: s between two actions.
         cycles: of the gait in a control step.
+        smoothing: share of a new command that takes hold in a control step.
+        onset: share of its full size by which the gait grows in a control step.
         duty_factor: of the gait.
         stance: that it lasts, s.
         offsets: (legs,) over the task's clock, cycles.
@@ -86,6 +88,7 @@ class Commanded(ABC):
         gait, self.parameters, self.body = gait_of(task), parameters, sized(task.scene.body)
         self.pose, self.step = standing(self.body, angles), task.scene.control_timestep
         self.cycles, self.duty_factor = gait.frequency * self.step, gait.duty_factor
+        self.smoothing, self.onset = min(1.0, self.cycles / _SMOOTHING), self.cycles / _ONSET
         self.stance, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead
         self.units = velocity_units(self.body, gait.target_velocity)
         self.stiffness, self.damping = position_gains(self.body, self.pose.inertias)
@@ -111,10 +114,10 @@ class Commanded(ABC):
         """The next state, and what feet are to do, by proportional and integral feedback on the command."""
         numpy, wanted, motion = clock.__array_namespace__(), command[:, :3], command[:, 3:]
         going = clock.any(axis=-1, keepdims=True)
-        smooth = state.command + min(1.0, self.cycles / _SMOOTHING) * (wanted - state.command)
+        smooth = state.command + self.smoothing * (wanted - state.command)
         integral = state.integral + self.parameters.integral * self.cycles * (wanted - motion)
         integral = integral.clip(-1.0, 1.0) * going
-        size = (state.size + numpy.where(going, 1.0, -1.0) * self.cycles / _ONSET).clip(0.0, 1.0)
+        size = (state.size + numpy.where(going, 1.0, -1.0) * self.onset).clip(0.0, 1.0)
         # At rest the clock reads (0, 0), which is no phase.
         phase = numpy.where(going[:, 0], numpy.arctan2(clock[:, 0], clock[:, 1]) / (2.0 * np.pi), state.phase)
         advance = self.cycles * going[:, 0]

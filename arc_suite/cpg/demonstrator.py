@@ -31,6 +31,9 @@ class Demonstrator:
     One whose episode starts below half or above twice the height at which the body stands is warned of,
     since a task may start so. Another robot of as many parts and about the same height cannot be told
     from the body, and walks badly.
+
+    Attributes:
+        law: of the preset, fitted to the task; see `cpg.law`.
     """
 
     def __init__(self, task, preset="medium"):
@@ -59,7 +62,7 @@ class Demonstrator:
         hopeless = [] if isinstance(preset, Preset) else [flaw.text for flaw in flaws(body) if flaw.hopeless]
         if hopeless:
             raise ValueError(f"{body.name} cannot walk: {hopeless[0]}")
-        self._body, self._law = body, law(task or prepared(body, "walk")[0], preset)
+        self._body, self.law = body, law(task or prepared(body, "walk")[0], preset)
         self._state, self._started = None, []
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
@@ -67,7 +70,7 @@ class Demonstrator:
         if self._state is not None:
             mask = np.zeros(len(self._state[0]), bool)
             mask[indices] = True
-            self._state = restarted(self._state, self._law.initial(len(mask)), mask)
+            self._state = restarted(self._state, self.law.initial(len(mask)), mask)
         self._started = list(indices)
 
     def act(self, observation: Mapping[str, np.ndarray], rewards=None) -> np.ndarray:
@@ -83,14 +86,14 @@ class Demonstrator:
         Raises:
             ValueError: not named blocks, those of another body, or a block is missing.
         """
-        blocks = checked(observation, self._law.reads, len(self._body.joint_names), len(self._body.part_names))
+        blocks = checked(observation, self.law.reads, len(self._body.joint_names), len(self._body.part_names))
         alone = blocks["posture"].ndim == 1
         if alone:
             blocks = {name: block[None] for name, block in blocks.items()}
         count = len(blocks["posture"])
         if self._state is None or len(self._state[0]) != count:
-            self._state = self._law.initial(count)
-        self._state, actions = self._law(self._state, blocks)
+            self._state = self.law.initial(count)
+        self._state, actions = self.law(self._state, blocks)
         if self._started:
             self._check_heights(blocks["posture"][self._started, 0])
         return actions[0] if alone else actions

@@ -108,6 +108,35 @@ class Steered(Commanded):
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
         return none, self.neutral + now, later - now
 
+    def constants(self) -> dict:
+        """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
+        p, cycles = self.parameters, self.cycles
+        legs = [
+            leg._asdict() | {"damping": _damping(leg), "offset": offset}
+            for leg, offset in zip(self.legs, self.offsets, strict=True)
+        ]
+        return {
+            "legs": legs,
+            "feet": self.feet,
+            "neutral": self.neutral,
+            "stiffness": self.stiffness,
+            "damping": self.damping,
+            "units": self.units,
+            "gain": p.gain,
+            "smoothing": self.smoothing,
+            "integral": p.integral * cycles,
+            "onset": self.onset,
+            "cycles": cycles,
+            "duty_factor": self.duty_factor,
+            "half_stance": 0.5 * self.stance,
+            "height": self.pose.height,
+            "attitude": p.attitude,
+            "unload": p.unload / p.lift,
+            "across": _ACROSS,
+            "level": p.level,
+            "step": self.step,
+        }
+
     def _legs(self):
         low, high = _ranges(self.body) - self.neutral
         first = 0
@@ -134,7 +163,7 @@ def _sweep(leg: _Leg, path, level: float):
     length = numpy.hypot(path[:, 0], path[:, 1])[:, None]
     along = path / numpy.maximum(length, 1e-9)
     weighted = weights(path, _ACROSS, level) @ leg.jacobian
-    damping = np.diag((_DAMPING * abs(leg.jacobian).max() * _ROOM / leg.room) ** 2)
+    damping = np.diag(_damping(leg))
     turned = weighted.swapaxes(-1, -2)
     angles = numpy.linalg.solve(turned @ weighted + damping, turned[..., :1] * length[..., None])[..., 0]
     moved = (weighted @ angles[..., None])[..., 0]
@@ -143,6 +172,11 @@ def _sweep(leg: _Leg, path, level: float):
     # A product for each environment by itself: one of all would round differently with their number.
     reached = (along * (leg.jacobian[:2] @ angles[..., None])[..., 0]).sum(axis=-1, keepdims=True)
     return angles, numpy.where(length > 1e-9, reached / numpy.maximum(length, 1e-9), 1.0).clip(0.0, 1.0)
+
+
+def _damping(leg: _Leg) -> np.ndarray:
+    """Squared damping (n,) of the least squares, m^2."""
+    return (_DAMPING * abs(leg.jacobian).max() * _ROOM / leg.room) ** 2
 
 
 def _ranges(body: Body) -> np.ndarray:

@@ -4,6 +4,7 @@ Unlike a pickle, arrays of others are data: all are checked before any is used.
 """
 
 from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,11 +36,21 @@ def taken(environment) -> dict[str, np.ndarray]:
     return arrays | {name: np.array(values, kind) for (name, (kind, _)), values in named}
 
 
-def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
-    """Let a `VectorEnv` whose episodes have begun go on from a snapshot.
+class Checked(NamedTuple):
+    """A snapshot that fits an environment: arrays of its batch, memory, streams, other arrays, random states."""
+
+    simulations: Mapping[str, np.ndarray]
+    memory: Any
+    streams: list
+    own: Mapping[str, np.ndarray]
+    states: list[tuple]
+
+
+def checked(environment, arrays: Mapping[str, np.ndarray]) -> Checked:
+    """Return the snapshot of a `VectorEnv` whose episodes have begun, ready for `put`.
 
     Raises:
-        ValueError: an array is missing or does not fit; nothing has changed.
+        ValueError: an array is missing or does not fit.
     """
     try:
         simulations = _of("batch/", arrays)
@@ -52,11 +63,16 @@ def put(environment, arrays: Mapping[str, np.ndarray]) -> None:
         streams = [_refilled(first, _of(f"stream/{index}/", arrays)) for index in range(environment.num_envs)]
     except (KeyError, ValueError, TypeError, AttributeError) as error:
         raise ValueError(f"snapshot: of another task or number of environments: {checks.quoted(error)}") from None
-    environment.batch.restore(simulations)
-    environment._memory, environment._streams = memory, streams
-    for name, array in own.items():
+    return Checked(simulations, memory, streams, own, states)
+
+
+def put(environment, snapshot: Checked) -> None:
+    """Let a `VectorEnv` whose episodes have begun go on from a snapshot."""
+    environment.batch.restore(snapshot.simulations)
+    environment._memory, environment._streams = snapshot.memory, snapshot.streams
+    for name, array in snapshot.own.items():
         setattr(environment, name, array)
-    for random, state in zip(environment._randoms, states, strict=True):
+    for random, state in zip(environment._randoms, snapshot.states, strict=True):
         random.set_state(state)
 
 

@@ -5,8 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import gymnasium
+import mujoco
 import numpy as np
-from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
@@ -15,6 +16,7 @@ from arc_suite.envs import snapshots, trees
 from arc_suite.envs.calls import LiveCommands, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.task_view import TaskView
+from arc_suite.envs.together import Together
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
@@ -23,8 +25,6 @@ from arc_suite.tasks import Task, terms
 
 _MOST_ENVS, _MOST_THREADS = 1 << 20, 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
-_OF_EACH = ("np_random", "np_random_seed", "render")  # attributes that have a value for each environment
-_OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
 
 
 class VectorTask(TaskView):
@@ -56,7 +56,7 @@ class VectorTask(TaskView):
         return self.definition.progress(self._environment._memory)
 
 
-class VectorEnv(gymnasium.vector.VectorEnv):
+class VectorEnv(Together):
     """Environments of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
 
     An environment seeded s is bit-equal to `arc_suite.envs.gym.Env` seeded s, from step to step and from episode
@@ -130,11 +130,12 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
-        self._task, model = prepared(*self.arguments)
-        pictures.check_camera(model, camera_id)
+        self._task, self._tasks, model = self._prepared()
+        pictures.check_camera(model if isinstance(model, mujoco.MjModel) else model[0], camera_id)
         self.step_limit = self._task.step_limit
         if max_episode_steps is not None:
-            self.step_limit = min(self.step_limit, checks.integer("max_episode_steps", max_episode_steps, 1))
+            limit = checks.integer("max_episode_steps", max_episode_steps, 1)
+            self.step_limit = np.minimum(self.step_limit, limit)[()]
 
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
@@ -142,7 +143,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         self._memory = None  # of all environments, with a leading axis
         self._commands = LiveCommands(self._task)
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
-        self._streams = [self._task.first() for _ in range(self.num_envs)]
+        self._streams = [task.first() for task in self._tasks]
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # environments whose next episode is the first of its stream
         if seed is not None:
@@ -153,7 +154,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
-            "render_fps": round(1.0 / self._task.scene.control_timestep),
+            "render_fps": round(1.0 / self._tasks[0].scene.control_timestep),
             "autoreset_mode": self.autoreset_mode,
         }
         self.render_mode = render_mode
@@ -165,7 +166,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         }
         self._observation = np.zeros((self.num_envs, self._task.size), np.float32)  # the latest
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self._task.size,), np.float32)
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (model.nu,), np.float32)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.batch.data.ctrl.shape[1],), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
@@ -312,10 +313,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
-        if self._memory is None:
-            self._begin(np.ones(self.num_envs, bool), self._observation)
-        self._take_commands()
-        snapshots.put(self, arrays)
+        snapshots.put(self, self._checked_snapshot(arrays))
 
     @one_thread_at_a_time
     def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
@@ -337,12 +335,7 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         if self.render_mode is None:
             return None
         self._take_commands()
-        every = range(self.num_envs)
-        indices = every if indices is None else list(indices)
-        for index in indices:
-            if index not in every:
-                raise ValueError(f"indices: expected integers from 0 to {self.num_envs - 1}, got {index!r}")
-        return tuple(self._picture_of(index) for index in indices)
+        return tuple(self._picture_of(index) for index in self._indices(indices))
 
     @one_thread_at_a_time
     def close(self, **kwargs) -> None:
@@ -367,56 +360,27 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         """The seed of each environment's stream of random numbers; -1 where none was given."""
         return tuple(self._stream_seeds.tolist())
 
-    def call(self, name: str, *args, **kwargs) -> tuple:
-        """Call a method, or read an attribute, of every environment, as Gymnasium's own vector environments do.
+    def _prepared(self) -> tuple[Task, list[Task], mujoco.MjModel | list[mujoco.MjModel]]:
+        """The task of all environments, that of each, and the model, or that of each."""
+        task, model = prepared(*self.arguments)
+        return task, [task] * self.num_envs, model
 
-        Args:
-            name: of an attribute of this environment; what environments share is the value of each of them.
-            *args: of the method.
-            **kwargs: of the method.
+    def _part(self, mask: np.ndarray) -> Task:
+        """The task of some environments, (num_envs,) booleans."""
+        return self._task
 
-        Returns:
-            A value for each environment.
-
-        Raises:
-            ValueError: `reset`, `step` or `close`, which are of all environments at once.
-            AttributeError: no such attribute.
-        """
-        if name in ("reset", "step", "close"):
-            raise ValueError(f"call {name!r}: environments do it together; call {name} of the environment itself")
-        value = getattr(self, _OF_ONE.get(name, name))
-        if callable(value):
-            value = value(*args, **kwargs)
-        return value if name in _OF_EACH and value is not None else (value,) * self.num_envs
-
-    def get_attr(self, name: str) -> tuple:
-        """Return an attribute of every environment; see `call`."""
-        return self.call(name)
-
-    def set_attr(self, name: str, values) -> None:
-        """Set an attribute that the environments share.
-
-        Args:
-            name: of the attribute.
-            values: one for all, or a list or tuple of as many equal ones as there are environments.
-
-        Raises:
-            ValueError: another number of values, or different ones.
-        """
-        values = list(values) if isinstance(values, list | tuple) else [values]
-        if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
-            raise ValueError(f"set_attr {name!r}: environments share it; expected one value for all, got {values!r}")
-        setattr(self, name, values[0])
+    def _checked_snapshot(self, arrays: Mapping[str, np.ndarray]) -> snapshots.Checked:
+        """A snapshot that fits; episodes have begun then."""
+        if self._memory is None:
+            self._begin(np.ones(self.num_envs, bool), self._observation)
+        self._take_commands()
+        return snapshots.checked(self, arrays)
 
     def _take_commands(self) -> None:
         self._memory = self._commands.taken(self._memory)
 
-    def _check_open(self, call: str) -> None:
-        if self.closed:
-            raise ClosedEnvironmentError(f"cannot {call}: the environment is closed; make a new one")
-
     def _picture_of(self, index: int) -> np.ndarray:
-        task, scene, marks = self._task, self._task.scene, ()
+        task, scene, marks = self._tasks[index], self._tasks[index].scene, ()
         if self._memory is not None:
             marks = task.markers(trees.at(self._memory, index), task.read(self.batch.part(index)))
         qpos, mocap_pos = self.batch.data.qpos[index], self.batch.mocap_pos[index]
@@ -424,11 +388,13 @@ class VectorEnv(gymnasium.vector.VectorEnv):
 
     def _begin(self, mask: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""
-        task, starts = self._task, []
+        starts = []
         for index in np.flatnonzero(mask).tolist():
+            own = self._tasks[index]
             if not self._streams_begin[index]:
-                self._streams[index] = task.stream_state(trees.at(self._memory, index))
-            starts.append(task.start(self._randoms[index], self._streams[index]))
+                self._streams[index] = own.stream_state(trees.at(self._memory, index))
+            starts.append(own.start(self._randoms[index], self._streams[index]))
+        task = self._part(mask)
         qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         self._streams_begin &= ~mask
         mocap = None if mocap[0] is None else np.stack(mocap)
@@ -457,30 +423,12 @@ class VectorEnv(gymnasium.vector.VectorEnv):
             info |= _marked({"diverged": diverged}, diverged)
         return info
 
-    def _seeds(self, seed) -> list[int | None]:
-        """Return a seed for each environment."""
-        if np.ndim(seed) == 1:
-            if len(seed) != self.num_envs:
-                raise ValueError(f"seed: expected one for each of {self.num_envs} environments, got {len(seed)}")
-            return [None if each is None else checks.seed(each) for each in seed]
-        first = checks.seed(seed)
-        return [checks.seed(first + index) for index in range(self.num_envs)]
-
     def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments, except those whose seed is None."""
         for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
                 self._randoms[index], self._streams[index] = np.random.RandomState(seeds[index]), self._task.first()
                 self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
-
-    def _mask(self, mask, name: str = "reset_mask") -> np.ndarray:
-        """A checked mask; all environments for None."""
-        if mask is None:
-            return np.ones(self.num_envs, bool)
-        mask = np.asarray(mask)
-        if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
-            raise ValueError(f"{name}: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
-        return mask.copy()
 
 
 def usable_cores() -> int:

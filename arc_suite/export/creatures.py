@@ -12,13 +12,13 @@ from arc_suite import rotations
 from arc_suite.export import shapes
 from arc_suite.export.clips import Clip
 from arc_suite.export.gltf import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
+from arc_suite.export.metadata import ROOT_MOTIONS, animations, metadata
 from arc_suite.export.parts import Material, Part
 from arc_suite.export.parts import parts as described
 from arc_suite.export.shapes import Mesh
 from arc_suite.robots.spec import Body
 
 RIGS = ("skin", "nodes")
-ROOT_MOTIONS = {"both": (True, False), "moving": (True,), "in_place": (False,)}
 
 _AXES = (1, 2, 0)  # of ours, that are glTF's x, y and z
 _TOLERANCE = 0.004  # of the standing height, by which a face may cut into a round shape
@@ -61,42 +61,6 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
     for clip in clips:
         _animations(document, clip, parts, root, nodes, ROOT_MOTIONS[root_motion])
     return document.glb()
-
-
-def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
-    """Return, JSON-able, the metrics and foot contact events of clips by name of the animation."""
-    animations = {name: _metadata(clip) for clip in clips for name in _named(clip, ROOT_MOTIONS[root_motion])}
-    return {
-        "body": body.name,
-        "units": {"length": "m", "time": "s", "angle": "rad"},
-        "axes": {"up": "y", "forward": "z", "left": "x"},
-        "clips": animations,
-    }
-
-
-def _metadata(clip: Clip) -> dict[str, Any]:
-    forward, left, turning = (round(float(value), 6) for value in clip.motion.twist)
-    return {
-        "seconds": clip.motion.seconds,
-        "frames": len(clip.times),
-        "loops": clip.loops,
-        "cycles": clip.cycles,
-        "forward_speed": forward,
-        "left_speed": left,
-        "turn_rate": turning,
-        "foot_contacts": [
-            {"foot": contact.foot, "event": contact.event, "time": round(contact.time, 6)}
-            for contact in clip.foot_contacts
-        ],
-    }
-
-
-def _named(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
-    """Return the names of a clip's animations, and whether the root moves in them."""
-    end = "_loop" if clip.loops else ""
-    if not clip.moves:
-        return {f"{clip.name}{end}": False}
-    return {f"{clip.name}{'' if moves else '_in_place'}{end}": moves for moves in moving}
 
 
 def _meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
@@ -199,7 +163,7 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
         elif part.joint is not None:
             tracks.append((node, "rotation", _turn(_hinged(part, motion.joints[:, part.joint]))))
     shared = [(node, target, times, document.accessor(values)) for node, target, values in tracks]
-    for name, moves in _named(clip, moving).items():
+    for name, moves in animations(clip, moving).items():
         # A root that stays has keys too: in players it would otherwise be wherever the clip before left it.
         path = motion.root if moves else np.zeros((2, 3))
         own = times if moves else document.accessor(_float32(clip.times[[0, -1]]), bounds=True)
@@ -219,7 +183,7 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
                     {"sampler": index, "target": {"node": node, "path": target}}
                     for index, (node, target, _, _) in enumerate(channels)
                 ],
-                "extras": _metadata(clip),
+                "extras": metadata(clip),
             },
         )
 

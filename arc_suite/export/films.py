@@ -24,7 +24,9 @@ class Footage:
         advance: cycles that the gait clock made in the latest step; 0 before the first, or without a gait clock.
     """
 
-    def __init__(self, robot: str, environment, policy: Callable, camera: str, size: tuple[int, int]):
+    def __init__(
+        self, robot: str, environment, policy: Callable, camera: str, size: tuple[int, int], quality: str = "film"
+    ):
         """Start the episode.
 
         Args:
@@ -33,6 +35,7 @@ class Footage:
             policy: maps a `TimeStep` to an action.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.
+            quality: of views; see `pictures.QUALITIES`.
         """
         self.robot = robot
         self.earned = 0.0
@@ -40,7 +43,7 @@ class Footage:
         self.advance = 0.0
         self._environment, self._policy = environment, policy
         self._time_step = environment.reset()
-        self._camera, self._size = camera, size
+        self._camera, self._size, self._quality = camera, size, quality
 
     @property
     def ended(self) -> bool:
@@ -71,7 +74,7 @@ class Footage:
     def view(self) -> np.ndarray:
         """Return what the camera sees: (height, width, 3) uint8."""
         width, height = self._size
-        return self._environment.physics.render(height, width, self._camera)
+        return self._environment.physics.render(height, width, self._camera, quality=self._quality)
 
     def close(self) -> None:
         """Free the simulation and its OpenGL context."""

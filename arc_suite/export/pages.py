@@ -24,17 +24,33 @@ from arc_suite.style.tracks import Track
 _DIGITS = 6  # behind the point: micrometres, microradians
 
 
-def viewer() -> str:
-    """Return the script of the viewer, three.js included.
+def built(name: str) -> bytes:
+    """Return a file that `make web` builds.
 
     Raises:
         ValueError: it has not been built.
     """
-    script = resources.files("arc_suite.export").joinpath("web", "viewer.js")
-    if not script.is_file():
+    file = resources.files("arc_suite.export").joinpath("web", name)
+    if not file.is_file():
         cure = "`make web` builds it" if versions.clone() else "install a wheel that `make dist` has built in a clone"
         raise ValueError(f"no viewer for pages: {cure}, which needs Node")
-    return script.read_text(encoding="utf-8")
+    return file.read_bytes()
+
+
+def viewer() -> str:
+    """Return the script of the viewer, three.js included; errors as `built`."""
+    return built("viewer.js").decode()
+
+
+def template(name: str) -> string.Template:
+    """Return the frame of a page."""
+    return string.Template(resources.files("arc_suite.export").joinpath(name).read_text(encoding="utf-8"))
+
+
+def packed(value) -> str:
+    """Return JSON of a value, deflated, in base64."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
 
 
 def page(tracks: Mapping[str, Track]) -> str:
@@ -43,10 +59,11 @@ def page(tracks: Mapping[str, Track]) -> str:
     Raises:
         ValueError: the viewer has not been built.
     """
-    walks = json.dumps([_walk(label, track) for label, track in tracks.items()], separators=(",", ":"), allow_nan=False)
-    data = base64.b64encode(zlib.compress(walks.encode(), 9)).decode()
-    frame = string.Template(resources.files("arc_suite.export").joinpath("page.html").read_text(encoding="utf-8"))
-    return frame.substitute(title=html.escape(", ".join(tracks)), data=data, viewer=viewer())
+    return template("page.html").substitute(
+        title=html.escape(", ".join(tracks)),
+        data=packed([_walk(label, track) for label, track in tracks.items()]),
+        viewer=viewer(),
+    )
 
 
 def _walk(label: str, track: Track) -> dict[str, Any]:
@@ -58,29 +75,34 @@ def _walk(label: str, track: Track) -> dict[str, Any]:
         "height": track.body.torso.standing_height,
         "reach": float(abs(outline(track.body)).max()),
         "step": track.time_step,
-        "parts": [_plain(part._asdict() | {"shapes": [shape._asdict() for shape in part.shapes]}) for part in parts],
-        "materials": {name: _plain(material._asdict()) for name, material in materials.items()},
-        "scenery": _plain(scenery(track)),
-        "positions": _plain(track.positions),
-        "quaternions": _plain(track.quaternions),
-        "joints": _plain(track.joint_angles),
+        "parts": [plain(part._asdict() | {"shapes": [shape._asdict() for shape in part.shapes]}) for part in parts],
+        "materials": {name: plain(material._asdict()) for name, material in materials.items()},
+        "scenery": plain(scenery(track)),
+        "positions": plain(track.positions),
+        "quaternions": plain(track.quaternions),
+        "joints": plain(track.joint_angles),
         "legs": list(track.legs),
         "stance": track.stance.astype(int).tolist() if stance else None,
         "schedule": track.schedule.astype(int).tolist() if stance else None,
-        "terms": {name: _plain(track.weights[name] * values) for name, values in track.terms.items()},
+        "terms": {name: plain(track.weights[name] * values) for name, values in track.terms.items()},
         "colours": of_terms(track.terms),
-        "totals": _plain(track.rewards.cumsum()),
+        "totals": plain(track.rewards.cumsum()),
     }
 
 
-def _plain(value):
-    """The value as JSON has it, with numbers rounded."""
+def plain(value, digits: int | None = _DIGITS):
+    """Return a value of arrays, tuples and dictionaries as JSON has it.
+
+    Args:
+        value: of finite numbers, text, None and truth values.
+        digits: behind the point, to which numbers are rounded; None for all.
+    """
     if isinstance(value, dict):
-        return {name: _plain(item) for name, item in value.items()}
+        return {name: plain(item, digits) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item, digits) for item in value]
     if isinstance(value, np.ndarray):
-        return value.astype(float).round(_DIGITS).tolist()
-    if isinstance(value, float):
-        return round(value, _DIGITS)
+        return (value.astype(float) if digits is None else value.astype(float).round(digits)).tolist()
+    if isinstance(value, float) and digits is not None:
+        return round(value, digits)
     return value

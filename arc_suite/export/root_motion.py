@@ -1,29 +1,30 @@
-"""Root motion of recordings: a root that moves over the ground, and a body that moves relative to it.
+"""Motions: a root that moves over the ground, and a body that moves relative to it."""
 
-A loop is found by recurrence: the pose is compared with the pose a whole number of control steps
-later, as a gait cycle may not be a whole number of them. The difference at the seam is spread over
-the loop.
-"""
-
-from collections.abc import Mapping
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from arc_suite import rotations
 from arc_suite.export.recordings import Recording
-from arc_suite.models.sizing import SUBSTEPS
 
-CLOSED = np.radians(0.5)  # a seam up to which no longer loop is tried
-OPEN = np.radians(2.0)  # a seam from which a loop is refused
-MOST_CYCLES = 12  # of a loop
 
-_RETURNED = 0.3  # of the largest distance between two poses: a cycle later the distance is less
-_USUAL = 0.01  # by which share a loop's speed may differ from the walk's
-_SPEED = 10.0  # how much more a loop's speed matters than its drift and turn, in the choice among loops
-_NEAREST = 1.2  # times the least seam: where none closes, loops that are chosen among
-_TRIED = 200  # loops that are chosen among, at most about
-_STRIDE = 5  # substeps: every so many poses are compared in the search for the cycle
+class Pose(NamedTuple):
+    """A pose in the root's frame, or the difference of two.
+
+    Attributes:
+        position: (3,) of the torso, m.
+        quaternion: (4,) of the torso, w first.
+        joints: (joints,) rad.
+    """
+
+    position: np.ndarray
+    quaternion: np.ndarray
+    joints: np.ndarray
+
+    def relative(self, origin: "Pose") -> "Pose":
+        """Return the difference that leads from another pose to this one."""
+        turn = rotations.product(self.quaternion, _inverse(origin.quaternion))
+        return Pose(self.position - origin.position, turn, self.joints - origin.joints)
 
 
 class Motion(NamedTuple):
@@ -36,7 +37,7 @@ class Motion(NamedTuple):
         quaternions: (samples, 4) of the torso in the root's frame, w first.
         joints: (samples, joints) rad.
         twist: (3,) mean velocity of the root in its own frame: forward and left, m/s, turning, rad/s.
-        seam: rad, difference of the last pose and the first before it was closed; 0 if the motion is no loop.
+        seam: rad, largest difference of poses at an end that was made to meet another pose, before it met.
     """
 
     step: float
@@ -75,6 +76,67 @@ class Motion(NamedTuple):
             positions=rolled(self.positions), quaternions=rolled(self.quaternions), joints=rolled(self.joints)
         )
 
+    def pose(self, sample: int) -> Pose:
+        """Return the pose of a sample."""
+        return Pose(self.positions[sample], self.quaternions[sample], self.joints[sample])
+
+    def stretched(self, seconds: float) -> Self:
+        """Return the motion over another duration, s."""
+        ratio = seconds / self.seconds
+        return self._replace(step=self.step * ratio, twist=self.twist / ratio)
+
+    def moved(self, difference: Pose, shares: np.ndarray) -> Self:
+        """Return the motion with a share (samples,) of a difference of poses added to each sample."""
+        shares = shares[:, None]
+        half = np.arctan2(np.linalg.norm(difference.quaternion[1:]), difference.quaternion[0])
+        half -= np.pi * (half > 0.5 * np.pi)  # q and -q are one orientation
+        axis = difference.quaternion[1:] / max(np.linalg.norm(difference.quaternion[1:]), 1e-12)
+        turns = np.concatenate([np.cos(shares * half), np.sin(shares * half) * axis], axis=-1)
+        return self._replace(
+            positions=self.positions + shares * difference.position,
+            quaternions=rotations.product(turns, self.quaternions),
+            joints=self.joints + shares * difference.joints,
+        )
+
+    def on_root(self, root: np.ndarray) -> Self:
+        """Return the same motion in the world on another path (samples, 3) of the root."""
+        qpos = self.qpos()
+        return on_root(self.step, qpos, root, relative(root, places(qpos)))._replace(twist=self.twist, seam=self.seam)
+
+    def meeting(self, pose: Pose, end: int, samples: int) -> Self:
+        """Return the motion with a pose at one of its ends.
+
+        The root takes up what differs on the ground, over the whole motion, so that feet stay where they are. The
+        rest is spread over the samples next to the end.
+
+        Args:
+            pose: to meet.
+            end: 0 or -1.
+            samples: over which the difference of the poses fades.
+        """
+        count, place = len(self.joints), places(self.qpos()[[end]])[0]
+        wanted = after(place, relative(_place(pose), np.zeros(3)))
+        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
+        error = relative(self.root[end], wanted) * (1.0, 1.0, 0.0)
+        error[2] = rotations.wrapped(wanted[2] - self.root[end, 2])
+        root = after(self.root, fading(from_end / (count - 1))[:, None] * error)
+        motion = self.on_root(root)
+        root = relative(root[0], root)
+        return motion._replace(root=root, twist=logarithm(root[-1]) / motion.seconds).ending(pose, end, samples)
+
+    def ending(self, pose: Pose, end: int, samples: int) -> Self:
+        """Return the motion with a pose at one of its ends, on the same path of the root.
+
+        Args:
+            pose: to end with.
+            end: 0 or -1.
+            samples: next to the end, over which the difference of the poses fades.
+        """
+        count, difference = len(self.joints), pose.relative(self.pose(end))
+        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
+        met = self.moved(difference, fading(from_end / samples))
+        return met._replace(seam=max(self.seam, seam(difference)))
+
     def part(self, first: int, samples: int) -> "Motion":
         """Return a part of the motion, `samples` after the first one, whose root starts at 0."""
         rows = slice(first, first + samples + 1)
@@ -102,117 +164,26 @@ class Motion(NamedTuple):
         )
 
 
-def period(recording: Recording) -> float | None:
-    """Return the period of the poses, s; None if they do not return.
-
-    It is the first minimum of the mean distance of two poses by the time between them, among those that
-    are well below the largest distance.
-    """
-    joints = recording.qpos[:, 7:]
-    longest = len(joints) // 2
-    first = joints[:longest:_STRIDE]
-    distances = np.array(
-        [np.sqrt(((joints[lag : lag + longest : _STRIDE] - first) ** 2).mean()) for lag in range(longest)]
-    )
-    middle = distances[1:-1]
-    returns = (middle <= distances[:-2]) & (middle < distances[2:]) & (middle < _RETURNED * distances.max())
-    return float(recording.step * (1 + returns.argmax())) if returns.any() else None
+def _places(qpos) -> np.ndarray:
+    """Return where the torso is, seen from above: (samples, 3) x, y, m, and yaw, rad, that does not jump."""
+    return np.concatenate([qpos[:, :2], np.unwrap(rotations.yaw(qpos[:, 3:7]))[:, None]], axis=-1)
 
 
-class Closing(NamedTuple):
-    """How well a recording closes to loops of one length.
-
-    Attributes:
-        seam: rad, difference of the poses at both ends of the best of them.
-        samples: of a loop; the sample after the last is the first one again.
-    """
-
-    seam: float
-    samples: int
+def seam(difference: Pose) -> float:
+    """Return the size of a difference of poses, rad: the largest of joint angles and the torso's turn."""
+    turn = 2.0 * np.arctan2(np.linalg.norm(difference.quaternion[1:]), abs(difference.quaternion[0]))
+    return float(max(abs(difference.joints).max(), turn))
 
 
-def closings(recording: Recording, cycle: float) -> Mapping[int, Closing]:
-    """Return how a recording closes, by the number of cycles.
-
-    Args:
-        recording: with some cycles more than the longest loop.
-        cycle: s.
-    """
-    found = {}
-    for cycles in range(1, MOST_CYCLES + 1):
-        length = cycles * cycle / recording.step / SUBSTEPS
-        lengths = {SUBSTEPS * int(np.floor(length)), SUBSTEPS * int(np.ceil(length))}
-        loops = [
-            Closing(float(_seams(recording.qpos[:-samples], recording.qpos[samples:]).min()), samples)
-            for samples in lengths
-            if 0 < samples < len(recording.qpos)
-        ]
-        if loops:
-            found[cycles] = min(loops)
-    return found
+def fading(share: np.ndarray) -> np.ndarray:
+    """Return weights that fall smoothly from 1 at 0 to 0 at 1 and beyond."""
+    share = share.clip(0.0, 1.0)
+    return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
-class Stretch(NamedTuple):
-    """A part of a recording that can be a loop.
-
-    Attributes:
-        first: sample with which it begins.
-        samples: of it; the sample after the last is the first one again.
-        usual: whether its root has the mean speed of the whole recording, to 1 %.
-    """
-
-    first: int
-    samples: int
-    usual: bool
-
-
-def usual(recording: Recording, samples: int) -> Stretch:
-    """Return the most typical loop with a number of samples, among those that close, or nearly so if none does.
-
-    Loops are compared by the displacement of the root, as the torso's depends on where in its sway the loop begins.
-    """
-    place = _places(recording.qpos)
-    mean = logarithm(relative(place[:-samples], place[samples:]))
-    speed, (_, left, turning) = np.hypot(mean[:, 0], mean[:, 1]).mean(), mean.mean(axis=0)
-    seams = _seams(recording.qpos[:-samples], recording.qpos[samples:])
-    firsts = np.flatnonzero(seams <= max(CLOSED, _NEAREST * seams.min()))
-    firsts = firsts[:: -(-len(firsts) // _TRIED)]
-    displacements = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
-    wrong = abs(np.hypot(displacements[:, 0], displacements[:, 1]) - speed)
-    astray = abs(displacements[:, 1] - left) + recording.qpos[:, 2].mean() * abs(displacements[:, 2] - turning)
-    best = (_SPEED * wrong + astray).argmin()
-    return Stretch(int(firsts[best]), samples, bool(wrong[best] <= _USUAL * speed))
-
-
-def loop(recording: Recording, stretch: Stretch) -> Motion:
-    """Return a part of a recording as a loop: a root of constant velocity, and a pose that returns exactly."""
-    qpos = recording.qpos[stretch.first : stretch.first + stretch.samples + 1]
-    displacement, local = _rooted(_places(qpos))
-    root = along(displacement, np.linspace(0.0, 1.0, len(qpos)))
-    motion = _closed(_on_root(recording, qpos, root, local))
-    return motion._replace(twist=displacement / motion.seconds, seam=float(_seams(qpos[:1], qpos[-1:])[0]))
-
-
-def _seams(before, later) -> np.ndarray:
-    """Return the differences of poses (n, nq): the largest of joint angles and the torso's tilt, (n,) rad."""
-    apart = abs(later[:, 7:] - before[:, 7:]).max(axis=-1)
-    # Of two unit vectors, the vertical as the torso sees it: nearly the angle between them.
-    tilt = rotations.matrix(later[:, 3:7])[:, 2] - rotations.matrix(before[:, 3:7])[:, 2]
-    return np.maximum(apart, np.linalg.norm(tilt, axis=-1))
-
-
-def _rooted(place) -> tuple[np.ndarray, np.ndarray]:
-    """Return the displacement (3,) of a loop's root, and the torso's places (samples, 3) in the root's frame.
-
-    The root runs below the middle of the torso's path, with the torso's mean heading.
-
-    Args:
-        place: (samples, 3) of the torso in the world, both ends included.
-    """
-    place = relative(place[0], place)
-    local = relative(along(logarithm(place[-1]), np.linspace(0.0, 1.0, len(place))), place)
-    centre = local[:-1].mean(axis=0)
-    return logarithm(relative(centre, after(place[-1], centre))), relative(centre, local)
+def places(qpos) -> np.ndarray:
+    """Return where the torso is, seen from above: (samples, 3) x, y, m, and yaw, rad, that does not jump."""
+    return np.concatenate([qpos[:, :2], np.unwrap(rotations.yaw(qpos[:, 3:7]))[:, None]], axis=-1)
 
 
 def passage(recording: Recording, first: int, samples: int, window: int) -> Motion:
@@ -225,25 +196,27 @@ def passage(recording: Recording, first: int, samples: int, window: int) -> Moti
         window: samples that the mean is taken over, a gait cycle.
     """
     qpos = recording.qpos
-    place = _places(qpos)
+    place = places(qpos)
     low, sums = first - window // 2, np.cumsum(np.concatenate([np.zeros((1, 3)), place]), axis=0)
     path = (sums[low + window : low + window + samples + 1] - sums[low : low + samples + 1]) / window
     rows = slice(first, first + samples + 1)
-    motion = _on_root(recording, qpos[rows], relative(path[0], path), relative(path, place[rows]))
+    motion = on_root(recording.step, qpos[rows], relative(path[0], path), relative(path, place[rows]))
     path = motion.root
     return motion._replace(twist=logarithm(path[-1]) / motion.seconds)
 
 
-def _places(qpos) -> np.ndarray:
-    """Return where the torso is, seen from above: (samples, 3) x, y, m, and yaw, rad, that does not jump."""
-    return np.concatenate([qpos[:, :2], np.unwrap(rotations.yaw(qpos[:, 3:7]))[:, None]], axis=-1)
+def standing(recording: Recording, first: int, samples: int) -> Motion:
+    """Return a part of a recording whose root stays below the torso of its first sample."""
+    qpos = recording.qpos[first : first + samples + 1]
+    place, root = places(qpos), np.zeros((len(qpos), 3))
+    return on_root(recording.step, qpos, root, relative(place[0], place))
 
 
-def _on_root(recording: Recording, qpos, root, local) -> Motion:
+def on_root(step: float, qpos, root, local) -> Motion:
     """Put poses onto a root, given where the torso is (samples, 3) in the root's frame, seen from above."""
     turn = local[:, 2] - rotations.yaw(qpos[:, 3:7])
     return Motion(
-        step=recording.step,
+        step=step,
         root=root,
         positions=np.concatenate([local[:, :2], qpos[:, 2:3]], axis=-1),
         quaternions=_continuous(rotations.turned(qpos[:, 3:7], turn)),
@@ -252,20 +225,13 @@ def _on_root(recording: Recording, qpos, root, local) -> Motion:
     )
 
 
-def _closed(motion: Motion) -> Motion:
-    """Close a loop: spread the difference of its last pose and its first over it, half to either end."""
-    share = np.linspace(-0.5, 0.5, len(motion.joints))[:, None]
-    joints = motion.joints - share * (motion.joints[-1] - motion.joints[0])
-    positions = motion.positions - share * (motion.positions[-1] - motion.positions[0])
-    first, last = motion.quaternions[0], motion.quaternions[-1]
-    turn = rotations.product(last, first * (1.0, -1.0, -1.0, -1.0))
-    angle = np.arctan2(np.linalg.norm(turn[1:]), turn[0])  # half of that of the turn
-    axis = turn[1:] / max(np.linalg.norm(turn[1:]), 1e-12)
-    back = np.concatenate([np.cos(share * angle), -np.sin(share * angle) * axis], axis=-1)
-    quaternions = rotations.product(back, motion.quaternions)
-    for values in (joints, positions, quaternions):
-        values[-1] = values[0]  # up to rounding they are equal already
-    return motion._replace(joints=joints, positions=positions, quaternions=quaternions)
+def _place(pose: Pose) -> np.ndarray:
+    """Return where the torso is in the root's frame, seen from above, (3,)."""
+    return np.append(pose.position[:2], rotations.yaw(pose.quaternion))
+
+
+def _inverse(quaternion) -> np.ndarray:
+    return quaternion * (1.0, -1.0, -1.0, -1.0)
 
 
 def _continuous(quaternions) -> np.ndarray:
@@ -307,5 +273,7 @@ def logarithm(place) -> np.ndarray:
 
 
 def after(first, second) -> np.ndarray:
-    """Return the place (3,) that `second` is relative to `first`."""
-    return np.append(first[:2] + rotations.headed(np.asarray(second[:2]), -first[2]), first[2] + second[2])
+    """Return the places (..., 3) that `second` are relative to `first`."""
+    first, second = np.asarray(first, float), np.asarray(second, float)
+    moved = first[..., :2] + rotations.headed(second[..., :2], -first[..., 2])
+    return np.concatenate([moved, first[..., 2:] + second[..., 2:]], axis=-1)

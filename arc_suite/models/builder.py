@@ -51,7 +51,8 @@ def build(body: Body) -> mjcf.RootElement:
         _add_solid(torso, ballast, mass=ballast.mass, **_TOUCHES_NOTHING)
     for leg in body.legs:
         _add_leg(root, torso, leg, touches_floor, body.simulation)
-    _add_cameras(torso, body)
+    for name, camera in cameras(body).items():
+        torso.add("camera", name=name, mode="trackcom", **camera)
 
     # The accelerometer is what makes every mj_step fill cfrc_ext, which the task observes: MuJoCo
     # computes contact forces on bodies only where a sensor needs them.
@@ -120,12 +121,11 @@ def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> No
     )
 
 
-def _add_cameras(torso, body: Body) -> None:
-    """Add the cameras `tracking`, of the spec, and `portrait` and `profile`, which frame the body."""
-    camera = body.camera
-    torso.add("camera", name="tracking", mode="trackcom", pos=camera.position, xyaxes=camera.xyaxes)
-    for name, azimuth, elevation in _VIEWS:
-        torso.add("camera", name=name, mode="trackcom", fovy=_FOVY, **_framing(body, azimuth, elevation))
+def cameras(body: Body) -> dict[str, dict]:
+    """Return the cameras by name: `tracking`, of the spec, and `portrait` and `profile`, which frame the body."""
+    tracking = {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}
+    views = {name: {"fovy": _FOVY, **_framing(body, azimuth, elevation)} for name, azimuth, elevation in _VIEWS}
+    return {"tracking": tracking, **views}
 
 
 def _framing(body: Body, azimuth: float, elevation: float) -> dict:

@@ -6,7 +6,7 @@ they stand with every foot on the floor.
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Lin
 LEGS = (4, 12)  # fewest and most
 LINKS = (1, 4)
 SCALE = (0.01, 100.0)
+STRETCH = (0.1, 10.0)
 LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
@@ -27,18 +28,18 @@ PROFILES = {
     3: ((0.25, 10.0), (0.35, -30.0), (0.4, -80.0)),
     4: ((0.2, 10.0), (0.25, 15.0), (0.25, -35.0), (0.3, -80.0)),
 }
-_LINK_NAMES = {
+LINK_NAMES = {
     1: ("upper",),
     2: ("upper", "lower"),
     3: ("upper", "middle", "lower"),
     4: ("upper", "middle", "lower", "toe"),
 }
-_JOINT_NAMES = ("hip", "knee", "ankle", "toe")
+JOINT_NAMES = ("hip", "knee", "ankle", "toe")
 
 _HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-45.0, 45.0))
 _BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
 
-_CHANGED = re.compile("_(scaled|mutated)$")
+_CHANGED = re.compile("_(scaled|stretched|mutated)$")
 
 _HEIGHT = 0.4  # m
 _SPACING = 0.5  # of the height, between neighbouring legs of a side
@@ -182,6 +183,33 @@ def scaled(body: Body, factor: float) -> Body:
     return _changed(body, "scaled", torso=torso, ballast=ballast, legs=tuple(map(leg, body.legs)))
 
 
+def stretched(body: Body, factors: Mapping[str, float]) -> Body:
+    """Return a body with links of other lengths, to be sized anew; it stands on its lowest foot.
+
+    Args:
+        body: to change.
+        factors: by name of the link, in all legs that have it; 0.1 to 10.
+
+    Returns:
+        The body, `<name>_stretched`.
+
+    Raises:
+        ValueError: an unknown link, or a factor or a length out of range.
+    """
+    names = list(dict.fromkeys(link.name for leg in body.legs for link in leg.links))
+    factors = {
+        checks.name(name, names, "link"): checks.number(f"length {name}", factor, *STRETCH)
+        for name, factor in factors.items()
+    }
+
+    def longer(link: Link) -> Link:
+        factor = factors.get(link.name, 1.0)
+        return link.replace(end=tuple(factor * length for length in link.end))
+
+    legs = tuple(leg.replace(links=tuple(map(longer, leg.links))) for leg in body.legs)
+    return _changed(body, "stretched", torso=body.torso.replace(standing_height=None), legs=legs)
+
+
 def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:
     """Return a body that differs a little, the same for the same arguments.
 
@@ -274,9 +302,11 @@ def proportioned(name: str, legs: int, layout: str, proportions: Proportions) ->
     """Return a body of given proportions; checked legs and layout are as in `generate`."""
     p = proportions
     if layout == "radial":
-        all_legs = _around(legs, p)
+        mounts = around(legs, 0.8 * p.half_length, 0.8 * p.half_width)
+        all_legs = tuple(_leg(f"leg{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
     else:
-        left = _left_side(legs // 2, p)
+        mounts = left_side(legs // 2, 0.8 * p.half_length, 0.6 * p.half_width, p.fan)
+        left = tuple(_leg(f"l{i + 1}", *mount, p.reaches[i], p) for i, mount in enumerate(mounts))
         all_legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
     size = (p.half_length, p.half_width, p.thickness * p.height)
     chassis = Solid(name="chassis", shape="ellipsoid", size=size)
@@ -290,21 +320,29 @@ def places(legs: int, layout: str) -> np.ndarray:
     return np.cos(np.radians(_headings(legs)))
 
 
-def _left_side(pairs: int, p: Proportions) -> tuple[Leg, ...]:
-    legs = []
-    for i in range(pairs):
-        along = 1.0 - 2.0 * i / (pairs - 1)  # 1 for the first leg, -1 for the last one
-        mount = (0.8 * p.half_length * along, 0.6 * p.half_width, 0.0)
-        legs.append(_leg(f"l{i + 1}", mount, 90.0 - p.fan * along, p.reaches[i], p))
-    return tuple(legs)
+def left_side(pairs: int, along: float, across: float, fan: float) -> list[tuple[Vector, float]]:
+    """Return mounts and headings, degrees, of the legs on the left of a long torso, the first in front.
+
+    Args:
+        pairs: number of legs, at least 2.
+        along: of the first mount in front of the middle, m.
+        across: of the mounts left of it, m.
+        fan: degrees by which the first leg points forward and the last one backward.
+    """
+    shares = [1.0 - 2.0 * i / (pairs - 1) for i in range(pairs)]
+    return [((along * share, across, 0.0), 90.0 - fan * share) for share in shares]
 
 
-def _around(legs: int, p: Proportions) -> tuple[Leg, ...]:
-    all_legs = []
-    for i, heading in enumerate(_headings(legs)):
-        mount = (0.8 * p.half_length * _cos(heading), 0.8 * p.half_width * _sin(heading), 0.0)
-        all_legs.append(_leg(f"leg{i + 1}", mount, heading, p.reaches[i], p))
-    return tuple(all_legs)
+def around(legs: int, along: float, across: float) -> list[tuple[Vector, float]]:
+    """Return mounts and headings, degrees, of legs all around a torso, counter-clockwise.
+
+    Args:
+        legs: their number.
+        along: half-axis forward of the ellipse of mounts, m.
+        across: the same to the left.
+    """
+    headings = _headings(legs)
+    return [((along * _cos(heading), across * _sin(heading), 0.0), heading) for heading in headings]
 
 
 def _headings(legs: int) -> list[float]:
@@ -324,9 +362,9 @@ def _leg(name: str, mount: Vector, heading: float, reach: float, p: Proportions)
     for i, (share, elevation) in enumerate(p.profile):
         # Links lie in the y-z plane of the first link's frame, which the leg's yaw turns outwards.
         end = (0.0, out * share * _cos(elevation), down * share * _sin(elevation))
-        joint = (_HIP if i == 0 else _BEND).replace(name=_JOINT_NAMES[i])
+        joint = (_HIP if i == 0 else _BEND).replace(name=JOINT_NAMES[i])
         radius = 0.8 * foot_radius * (1.0 + 0.35 * (links - 1 - i))  # thinner than the foot, so that the foot touches
-        chain.append(Link(name=_LINK_NAMES[links][i], end=end, radius=radius, joint=joint))
+        chain.append(Link(name=LINK_NAMES[links][i], end=end, radius=radius, joint=joint))
     return Leg(name=name, mount=mount, links=tuple(chain), foot=Foot(radius=foot_radius), yaw_deg=heading - 90.0)
 
 

@@ -29,6 +29,7 @@ _GEARS = (1e-20, 1e30)
 _LARGEST = 1e35
 _LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
 MAX_NAME = 32  # characters
+PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colours`
 _NAME = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
 
@@ -76,6 +77,13 @@ def _check_lengths(value: Any) -> tuple[float, ...]:
 def _check_choice(value: Any, choices: Iterable[str]) -> str:
     if value not in tuple(choices):
         raise SpecError(f"expected one of {', '.join(choices)}, got {_shown(value)}")
+    return value
+
+
+def _check_palette(value: Any) -> str | int:
+    seed = isinstance(value, int) and not isinstance(value, bool) and 0 <= value < 2**31
+    if not seed and not (isinstance(value, str) and value in PALETTES):
+        raise SpecError(f"expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got {_shown(value)}")
     return value
 
 
@@ -408,6 +416,7 @@ class Body(_Spec):
         ballast: further weight on the torso.
         density: of solids, links and feet, kg/m^3.
         simulation: its constants; None: scaled to the body.
+        palette: of its colours, one of `PALETTES` or a seed; None: the robot's own, or grey.
     """
 
     name: str = _name()
@@ -417,6 +426,7 @@ class Body(_Spec):
     density: float = _number(1e-9, _DENSEST, default=10.0)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
+    palette: str | int | None = _field(_check_palette, default=None, optional=True)
 
     def _check_whole(self):
         _check_unique(self, "legs", [leg.name for leg in self.legs])

@@ -1,4 +1,4 @@
-"""Many simulations of one model at once, on a thread pool."""
+"""Many simulations at once on a thread pool, of one model or of models of one layout."""
 
 import copy
 import types
@@ -12,11 +12,13 @@ from arc_suite.simulation import forks, timers
 from arc_suite.simulation.model import change
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+# Sizes of models that make no difference to `MjData`.
+_TEXTS = ("nbuffer", "nnames", "nnames_map", "npaths", "ntext", "ntextdata")
 _OF_MODEL = "model_"  # with which names of models' fields begin in a snapshot
 
 
 class Batch:
-    """Many simulations of one model on a thread pool, bit-identical to as many `Physics`.
+    """Many simulations on a thread pool, bit-identical to as many `Physics`.
 
     Pickles and copies continue bit-identically.
 
@@ -27,25 +29,28 @@ class Batch:
 
     def __init__(
         self,
-        model: mujoco.MjModel,
+        model: mujoco.MjModel | Sequence[mujoco.MjModel],
         count: int,
         threads: int = 0,
         fields: Iterable[str] = ("qpos", "qvel", "ctrl", "cfrc_ext", "xpos"),
     ):
-        """Allocate the simulations, which share the model.
+        """Allocate the simulations.
 
         Args:
-            model: of them all; copied.
+            model: of them all, copied; or one for each, all of one `layout`, which stay as they are.
             count: number of simulations.
             threads: to step on; 0 for as many as there are CPUs.
             fields: of `MjData` that `data` has; qpos, qvel and ctrl always are among them.
         """
         self._forks = forks.count
-        self._simulations = mujoco.batch.Batch(model, count, threads)
+        # Models as compiled, and as they now are, one for each simulation; None while they share one.
+        self._compiled = None if isinstance(model, mujoco.MjModel) else list(model)
+        self._own = self._compiled
+        self._simulations = mujoco.batch.Batch(model if self._compiled is None else model[0], count, threads)
         forks.keep(self._simulations)
-        self._own: list[mujoco.MjModel] | None = None  # one for each simulation, once one has been changed
-        self._changed: dict[str, np.ndarray] = {}  # fields that ever were, as compiled
-        self._silent = _silent(model)
+        self._simulations.set_models(self._own)
+        self._changed: dict[str, None] = {}  # names of fields that ever were
+        self._silent = _silent(model) if self._compiled is None else [_silent(each) for each in model]
         # What is bound is filled by every call, so it must be bound before the first.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
         self.data = types.SimpleNamespace(**{name: self._simulations.bind(name) for name in fields})
@@ -118,9 +123,9 @@ class Batch:
             ForkError: made before a fork.
         """
         self._check_process()
-        self._simulations.set_models(None)
+        self._simulations.set_models(self._compiled)
         self._simulations.reset(mask)  # runs mj_forward, from whose result the solver starts next
-        if self._own is not None or any(models):
+        if self._own is not self._compiled or any(models):
             self._change(mask, models or [{}] * len(qpos))
         self._simulations.set_models(self._own)
         self.data.qpos[mask], self.data.qvel[mask] = qpos, qvel
@@ -143,14 +148,15 @@ class Batch:
         self._simulations.forward(mask)
 
     def _change(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
-        model = self._simulations.model
-        if self._own is None:
-            self._own, self._silent = ([copy.copy(each) for _ in mask] for each in (model, self._silent))
-        self._changed |= {name: getattr(model, name) for fields in models for name in fields}
-        scratch = mujoco.MjData(model)
-        for index, fields in zip(np.flatnonzero(mask), models, strict=True):
+        compiled = self._compiled or [self._simulations.model] * len(mask)
+        if self._own is self._compiled:
+            self._own, self._silent = [copy.copy(each) for each in compiled], [_silent(each) for each in compiled]
+        self._changed |= dict.fromkeys(name for fields in models for name in fields)
+        scratch = mujoco.MjData(self._simulations.model)
+        for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
+            unchanged = {name: getattr(compiled[index], name) for name in self._changed}
             for own in (self._own[index], self._silent[index]):
-                change(own, {**self._changed, **fields}, scratch)
+                change(own, {**unchanged, **fields}, scratch)
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
@@ -185,7 +191,7 @@ class Batch:
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
         models = {name.removeprefix(_OF_MODEL): array for name, array in arrays.items() if name.startswith(_OF_MODEL)}
-        if models or self._own is not None:
+        if models or self._own is not self._compiled:
             each = range(self._simulations.nsim)
             self._change(np.ones(len(each), bool), [{name: models[name][index] for name in models} for index in each])
             self._simulations.set_models(self._own)
@@ -194,8 +200,8 @@ class Batch:
             _fill(bound, arrays[name])
 
     def __getstate__(self):
-        simulations = self._simulations
-        return simulations.model, simulations.nsim, simulations.nthread, list(vars(self.data)), self.snapshot()
+        simulations, model = self._simulations, self._compiled or self._simulations.model
+        return model, simulations.nsim, simulations.nthread, list(vars(self.data)), self.snapshot()
 
     def __setstate__(self, state):
         *arguments, arrays = state
@@ -205,6 +211,12 @@ class Batch:
     def _check_process(self) -> None:
         if self._forks != forks.count:
             forks.refuse("vector environment")
+
+
+def layout(model: mujoco.MjModel) -> tuple[int, ...]:
+    """Return the sizes of a model that simulations of one batch share; names and texts may differ."""
+    names = (name for name in dir(model) if name.startswith("n") and name not in _TEXTS)
+    return tuple(size for size in (getattr(model, name) for name in names) if isinstance(size, int))
 
 
 def fitting(name: str, array: np.ndarray, like: np.ndarray) -> np.ndarray:

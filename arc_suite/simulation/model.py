@@ -9,6 +9,8 @@ import numpy as np
 
 from arc_suite import models
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.models import direct
+from arc_suite.models.sizing import sized
 from arc_suite.robots.spec import Body
 
 _LARGE = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
@@ -35,7 +37,10 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
-    spec = mujoco.MjSpec.from_string(models.assemble(body, arena).to_xml_string())
+    if arena == FLAT:
+        spec = direct.on_flat_ground(sized(body))
+    else:
+        spec = mujoco.MjSpec.from_string(models.assemble(body, arena).to_xml_string())
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()

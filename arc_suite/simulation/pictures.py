@@ -2,6 +2,7 @@
 
 import functools
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -18,6 +19,22 @@ from arc_suite.simulation import opengl
 _SHAPES = {"arrow": mujoco.mjtGeom.mjGEOM_ARROW, "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER}
 
 
+class Quality(NamedTuple):
+    """How carefully a picture is drawn.
+
+    Attributes:
+        shadows: pixels of the shadow map's sides.
+        scale: a picture is drawn so many times as large and averaged.
+    """
+
+    shadows: int
+    scale: int
+
+
+# For training; for films, whose shadows have finer edges; and for pictures that are kept.
+QUALITIES = {"fast": Quality(2048, 1), "film": Quality(4096, 1), "still": Quality(4096, 2)}
+
+
 class Decorated(dm_mujoco.Physics):
     """A body with its visuals in an arena; it takes poses and is never stepped.
 
@@ -28,9 +45,10 @@ class Decorated(dm_mujoco.Physics):
     markers: Iterable[Marker] = ()
 
     @classmethod
-    def from_body(cls, body: Body, arena: Arena = FLAT) -> "Decorated":
-        """Compile the decorated body in an arena."""
+    def from_body(cls, body: Body, arena: Arena = FLAT, shadows: int = QUALITIES["fast"].shadows) -> "Decorated":
+        """Compile the decorated body in an arena; `shadows` are pixels of the shadow map's sides."""
         decorated = cls.from_xml_string(models.assemble(body, arena, decorated=True).to_xml_string())
+        decorated.model.vis.quality.shadowsize = shadows
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
         buffer.offwidth = buffer.offheight = 1  # grows with the size of pictures
@@ -104,6 +122,7 @@ def picture(
     share: float | None = None,
     mocap_pos: np.ndarray | None = None,
     markers: Iterable[Marker] = (),
+    quality: str = "fast",
     **kwargs,
 ) -> np.ndarray:
     """Draw the decorated body in a pose.
@@ -118,24 +137,32 @@ def picture(
         share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
+        quality: of `QUALITIES`; pictures of depth or segments, and the largest ones, are not averaged.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
         (height, width, 3) uint8; with `depth`, (height, width) float32, m.
 
     Raises:
-        ValueError: no such camera, or an impossible size.
+        ValueError: no such camera or quality, or an impossible size.
         RenderingUnavailable: no OpenGL here.
     """
     check_size(height, width)
+    drawing = QUALITIES[checks.name(quality, QUALITIES, "quality")]
+    large = drawing.scale * height > MAX_HEIGHT or drawing.scale * width > MAX_WIDTH
+    scale = 1 if large or kwargs.get("depth") or kwargs.get("segmentation") else drawing.scale
 
     def draw():
-        decorated = _shared(body, arena)
+        decorated = _shared(body, arena, drawing.shadows)
         check_camera(decorated.model.ptr, camera_id)
         decorated.pose(qpos, share, mocap_pos, markers)
-        return decorated.render(height, width, camera_id, **kwargs)
+        return decorated.render(scale * height, scale * width, camera_id, **kwargs)
 
-    return opengl.call(draw)
+    drawn = opengl.call(draw)
+    if scale == 1:
+        return drawn
+    blocks = drawn.reshape(height, scale, width, scale, 3)
+    return blocks.mean(axis=(1, 3)).round().astype(np.uint8)
 
 
 def check_size(height: int, width: int) -> None:

@@ -58,7 +58,7 @@ def strip(environment, policy: Policy, seed: int = 0) -> np.ndarray | None:
     """
 
     def view():
-        return environment.physics.render(HEIGHT, WIDTH, CAMERA)
+        return environment.physics.render(HEIGHT, WIDTH, CAMERA, quality="still")
 
     parameters, control_timestep = environment.task.definition.parameters, environment.control_timestep()
     if parameters is None or parameters.gait_frequency <= 0.0:

@@ -5,6 +5,7 @@ double precision once, and every run, on a CPU or a GPU, looks them up.
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -58,6 +59,42 @@ class Clock(NamedTuple):
         if not isinstance(tick, int):
             table = tick.__array_namespace__().asarray(table)
         return table[tick % len(self.phases)]
+
+
+class Clocks(NamedTuple):
+    """Clocks of environments of different bodies, with their tables one behind the other.
+
+    Attributes:
+        phases: (all ticks,) rad in [0, 2 pi).
+        circle: (all ticks, 2) sine and cosine of the phases.
+        stance: (all ticks, feet) which feet the gait schedules on the ground.
+        starts: (environments,) where the tables of each begin.
+        counts: (environments,) ticks of each.
+    """
+
+    phases: np.ndarray
+    circle: np.ndarray
+    stance: np.ndarray
+    starts: np.ndarray
+    counts: np.ndarray
+
+    @classmethod
+    def of(cls, clocks: Sequence[Clock]) -> Self:
+        """Join clocks of gaits of as many feet; a clock that several environments share is held once."""
+        different = {id(clock): clock for clock in clocks}
+        lengths = np.array([len(clock.phases) for clock in different.values()])
+        places = {name: place for place, name in enumerate(different)}
+        which = np.array([places[id(clock)] for clock in clocks])
+        tables = (np.concatenate(tables) for tables in zip(*different.values(), strict=True))
+        return cls(*tables, (lengths.cumsum() - lengths)[which], lengths[which])
+
+    def at(self, table: np.ndarray, tick):
+        """Return the entries (environments, n) of a table at ticks (environments,)."""
+        return table[self.starts + tick % self.counts]
+
+    def part(self, indices) -> Self:
+        """Return the clocks of some environments."""
+        return self._replace(starts=self.starts[indices], counts=self.counts[indices])
 
 
 def desired_contacts(phase, duty_factor: float, offsets):

@@ -279,7 +279,7 @@ class CommandTask(Task):
         context, numpy, moved = self.context, place.__array_namespace__(), place - core.place
         turn = rotations.wrapped(moved[..., 2])
         moved = numpy.concatenate([rotations.headed(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1)
-        return (1.0 - context.leak) * core.motion + context.leak * moved / (context.control_timestep * context.units)
+        return (1.0 - context.leaks) * core.motion + context.leaks * moved / context.step_units
 
     def commanded(self, memory: Memory, name: str, value) -> Memory:
         """Return the memory with a live command."""
@@ -292,7 +292,7 @@ class CommandTask(Task):
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
-        core, height, feet = memory.core, self.context.height, len(self.parameters.phase_offsets)
+        core, height, feet = memory.core, self.context.height, self.parameters.feet
         costs = terms.costs(
             readings, core.action, core.previous_action, core.schedule_errors, self.parameters.default_angles
         )
@@ -341,7 +341,7 @@ class CommandTask(Task):
             **self.command.progress(self.context, memory.command, self.judged(memory)),
             "tracking": core.tracking / steps,
             **self.health.progress(memory.health),
-            "gait_compliance": clock.compliance(core.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
+            "gait_compliance": clock.compliance(core.all_schedule_errors, steps, self.parameters.feet),
             "cost_of_transport": energy.cost_of_transport(core.energy, core.path, self.context.pace * steps),
             **self.settings.ground.progress(memory.ground),
         }

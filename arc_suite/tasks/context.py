@@ -19,10 +19,11 @@ class Context(NamedTuple):
         height: h, the standing height, m.
         reach: R, the mean distance of the feet from their centre, m.
         units: (3,) of commands: the target velocity, twice, m/s, and rad/s at which feet move as fast when turning.
-        force_unit: (6,) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
-        control_timestep: s.
+        force_unit: (1, 6) of contact forces: the weight times the standing height, N m, three times, and the weight, N.
+        step_units: (3,) displacements of a control step at these units, m and rad.
         pace: displacement of a control step at the target velocity, m.
         leak: weight of the latest step in leaky means, which reach back over a cycle of the gait.
+        leaks: (3,) the same, for means of vectors.
         steps: control steps over which an episode is judged.
     """
 
@@ -31,9 +32,10 @@ class Context(NamedTuple):
     reach: float
     units: np.ndarray
     force_unit: np.ndarray
-    control_timestep: float
+    step_units: np.ndarray
     pace: float
     leak: float
+    leaks: np.ndarray
     steps: int
 
     @classmethod
@@ -41,14 +43,16 @@ class Context(NamedTuple):
         """Return the context of a task in a `contract.Scene` that prescribes `parameters.Parameters`."""
         body, pose = scene.body, standing(scene.body)
         units = velocity_units(body, parameters.target_velocity)
+        leak = min(parameters.gait_frequency * scene.control_timestep, 1.0)
         return cls(
             arena=scene.arena,
             height=body.torso.standing_height,
             reach=units[0] / units[2],
             units=units,
-            force_unit=pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3),
-            control_timestep=scene.control_timestep,
+            force_unit=pose.mass * GRAVITY * np.repeat((pose.height, 1.0), 3)[None],
+            step_units=scene.control_timestep * units,
             pace=float(units[0] * scene.control_timestep),
-            leak=min(parameters.gait_frequency * scene.control_timestep, 1.0),
+            leak=leak,
+            leaks=np.full(3, leak),
             steps=int(min(step_limit, STEPS)),
         )

@@ -122,6 +122,9 @@ class Task(ABC):
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
+        from_body: cached attributes with numbers that follow from the body. With these and the settings stacked along a
+            leading axis, its functions serve a batch of different bodies. A class that inherits declares its own, as
+            it may have further ones; without it, each body has a batch of its own.
     """
 
     scene: Scene
@@ -136,6 +139,7 @@ class Task(ABC):
     modifiers: ClassVar[Mapping[str, Any]] = {}
     actions: ClassVar[str] = "torque"
     demonstrators: ClassVar[tuple[str, ...]] = ()
+    from_body: ClassVar[tuple[str, ...]] = ()
 
     @classmethod
     @abstractmethod
@@ -228,13 +232,17 @@ class Task(ABC):
 
     def cleared(self, readings: Readings) -> np.ndarray:
         """Return the positions (..., nq) of the readings, raised until every foot is clear of the ground."""
-        radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
-        clear = radii + _CLEAR * self.scene.body.torso.standing_height
         numpy = readings.foot_heights.__array_namespace__()
-        rise = (clear - readings.foot_heights).max(axis=-1).clip(0.0)
+        rise = (self.clearances - readings.foot_heights).max(axis=-1).clip(0.0)
         x, y, z = (readings.torso_position[..., i] for i in range(3))
         position = numpy.stack([x, y, z + rise], axis=-1)
         return numpy.concatenate([position, readings.torso_quaternion, readings.joint_angles], axis=-1)
+
+    @functools.cached_property
+    def clearances(self) -> np.ndarray:
+        """(legs,) heights of the feet's centres at which a start leaves them clear of the ground, m."""
+        radii = np.array([leg.foot.radius for leg in self.scene.body.legs])
+        return radii + _CLEAR * self.scene.body.torso.standing_height
 
     @abstractmethod
     def begin(self, memory, readings: Readings) -> Any:

@@ -132,6 +132,8 @@ class Modified(Task):
         changes: what is changed of it.
     """
 
+    from_body = ("gains", "reach", "noises")
+
     task: Task = dataclasses.field(kw_only=True)
     changes: Modifiers = dataclasses.field(kw_only=True)
 
@@ -332,7 +334,7 @@ class Modified(Task):
         numpy, last = changes.kicks.__array_namespace__(), changes.kick_steps[..., -1:]
         due = changes.elapsed % last + 1 == changes.kick_steps
         push = (due[..., None] * changes.kicks).sum(axis=-2)
-        rest = numpy.zeros((*push.shape[:-1], len(self.scene.standing) - 3))
+        rest = numpy.zeros((*push.shape[:-1], self.scene.standing.shape[-1] - 3))
         push = numpy.concatenate([push, rest], axis=-1)
         return push if kick is None else kick + push
 

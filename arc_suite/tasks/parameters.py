@@ -95,6 +95,11 @@ class Parameters(NamedTuple):
     stance_threshold: float
     default_angles: np.ndarray
 
+    @property
+    def feet(self) -> int:
+        """Number of feet."""
+        return self.phase_offsets.shape[-1]
+
 
 class Noise(NamedTuple):
     """Noise of the start: half-widths of uniform noise on the pose, standard deviations of velocities.

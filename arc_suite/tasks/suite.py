@@ -5,6 +5,8 @@ from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
 from arc_suite.tasks.commanded import CommandTask
 from arc_suite.tasks.ground import Lanes, PillarField
 
+_LEVEL = ("clock", "clearances", "context", "_torques")  # what follows from the body on level ground
+
 # Progress pays for a lane that is walked in part.
 _LANE = {"progress": 0.5, **CommandTask.bonuses}
 
@@ -12,19 +14,19 @@ _LANE = {"progress": 0.5, **CommandTask.bonuses}
 class Steer(CommandTask):
     """Following a velocity forward, sideways and in turning, stops included."""
 
-    name, command = "steer", Schedule()
+    name, command, from_body = "steer", Schedule(), _LEVEL
 
 
 class Shoved(CommandTask):
     """Following a velocity command under kicks."""
 
-    name, command, modifiers = "shoved", Schedule(), {"kicks": 1.5}
+    name, command, modifiers, from_body = "shoved", Schedule(), {"kicks": 1.5}, _LEVEL
 
 
 class Limp(CommandTask):
     """Following a velocity command with a leg, drawn for each episode, whose motors fail."""
 
-    name, command, modifiers = "limp", Schedule(), {"actuator_failure": True}
+    name, command, modifiers, from_body = "limp", Schedule(), {"actuator_failure": True}, _LEVEL
 
 
 class Rough(CommandTask):

@@ -70,7 +70,7 @@ class Memory(NamedTuple):
 class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
-    name = "walk"
+    name, from_body = "walk", ("clock", "clearances", "_torques")
 
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
@@ -161,7 +161,7 @@ class Walk(Task):
         return {
             "forward": terms.triangle(memory.forward_velocity - p.target_velocity, band),
             "healthy": memory.healthy.astype(float),
-            "gait_bonus": 1.0 - memory.schedule_errors / len(p.phase_offsets),
+            "gait_bonus": 1.0 - memory.schedule_errors / p.feet,
             **terms.costs(readings, memory.action, memory.previous_action, memory.schedule_errors, p.default_angles),
         }
 
@@ -185,7 +185,7 @@ class Walk(Task):
         path = abs(self.target_velocity) * time
         return {
             "speed": memory.distance / time,
-            "gait_compliance": clock.compliance(memory.all_schedule_errors, steps, len(self.parameters.phase_offsets)),
+            "gait_compliance": clock.compliance(memory.all_schedule_errors, steps, self.parameters.feet),
             "cost_of_transport": energy.cost_of_transport(memory.energy, abs(memory.distance), path),
         }
 

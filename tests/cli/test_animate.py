@@ -20,15 +20,15 @@ def test_both_files_and_a_row_for_each_clip(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     header, walk, idle, wrote = done.stdout.splitlines()
     assert header.split("  ")[0] == "clip"
-    assert walk.split()[:4] == ["walk", "2.000", "61", "3"]
+    assert walk.split()[:4] == ["walk", "0.667", "21", "1"]
     assert float(walk.split()[4]) == pytest.approx(0.32, abs=0.01)
     assert idle.split()[3:7] == ["0", "0.000", "0.000", "0.0"]
-    assert wrote == "wrote tick.glb and tick.json"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["tick.glb", "tick.json"]
+    assert wrote == "wrote tick.glb and tick.clips.json"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["tick.clips.json", "tick.glb"]
     data = (tmp_path / "tick.glb").read_bytes()
-    file, figures = gltf_reader.read(data), json.loads((tmp_path / "tick.json").read_text())
+    file, figures = gltf_reader.read(data), json.loads((tmp_path / "tick.clips.json").read_text())
     assert list(figures["clips"]) == [animation["name"] for animation in file.json["animations"]]
-    assert figures["clips"]["walk_loop"]["frames"] == 61
+    assert figures["clips"]["walk_loop"]["frames"] == 21
     assert file.json["asset"]["generator"].startswith("arc_suite ")
     animate(*arguments, cwd=tmp_path)
     assert (tmp_path / "tick.glb").read_bytes() == data
@@ -53,8 +53,8 @@ def test_any_body_as_rigid_parts(tmp_path):
         (("-o", "a.glb", "--clips=walk,run"), "unknown clip 'run'"),
         (("-o", "a.glb", "--robot=all"), "--robot=all: expected one robot"),
         pytest.param(
-            ("-o", "a.glb", "--robot=tick", "--clips=walk", "--policy=zero"),
-            "tick, clip walk: the pose does not return",
+            ("-o", "a.glb", "--robot=tick", "--clips=walk,stop", "--policy=zero"),
+            "tick, clip walk: the policy moves at 0 % of its command",
             marks=pytest.mark.slow,
         ),
         (("-o", "a.glb", "--clips="), "clips: expected one or more of walk, slow, fast, turn_left, "),
@@ -71,11 +71,13 @@ def test_errors_are_one_line_and_leave_no_file(tmp_path, arguments, message):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_spec_is_not_written_over(tmp_path):
+@pytest.mark.slow
+def test_a_spec_keeps_its_file_next_to_clips_of_its_name(tmp_path):
     spec = tmp_path / "spider.json"
     spec.write_text(EXAMPLES["spider"].read_text())
     before = spec.read_text()
-    done = animate("--spec=spider.json", "--clips=idle", "--output=spider.glb", cwd=tmp_path)
-    line = "--output=spider.glb: spider.json, which is written too, is the spec; take another name"
-    assert (done.returncode, done.stderr) == (1, f"arc-suite animate: {line}\n")
-    assert spec.read_text() == before and not (tmp_path / "spider.glb").exists()
+    done = animate("--spec=spider.json", "--clips=walk,tuned", "--output=spider.glb", cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr == "arc-suite animate: spider, clip tuned is left out: spider has no preset tuned\n"
+    assert spec.read_text() == before
+    assert {path.name for path in tmp_path.iterdir()} == {"spider.json", "spider.glb", "spider.clips.json"}

@@ -10,9 +10,11 @@ import arc_suite
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.gym import Env
 from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
 SPIDER = EXAMPLES["spider"]
+NO_PALETTE = f"Body(walker_4x3).palette: expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got 'mos'"
 
 
 @pytest.mark.slow
@@ -45,6 +47,9 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--spec=a.json", "--legs=4"], "expected one of --spec and --legs, got both"),
         (["--links=4"], "--links=4: goes with --legs"),
         (["--legs=4", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
+        (["--length=lower=2"], "--length: goes with --spec or --legs"),
+        (["--legs=4", "--length=shin=2"], "unknown link 'shin' (there are: upper, middle, lower)"),
+        (["--legs=4", "--palette=mos"], NO_PALETTE),
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
         (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),

@@ -20,6 +20,12 @@ def test_bodies_walk():
     assert float(lines[5].split()[2]) > 0.17
 
 
+def test_bodies_of_another_family_walk():
+    done = survey("--family=varied", "--first=1", "--count=1", "--seconds=5")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "1 of 1 bodies walk" in done.stdout
+
+
 def test_legs_in_phase_fail_and_their_bodies_are_named():
     done = survey(*BODIES, "--count=1", "--in_phase")
     assert done.returncode == 0, done.stderr
@@ -44,6 +50,7 @@ def test_a_reversed_sweep_walks_backwards():
         ("--picture=missing/a.png", "cannot write missing/a.png: no such file or directory"),
         ("--picture=a.txt", "unknown extension '.txt' (there are: .png)"),
         ("--set=time_limit=Infinity", "time_limit: expected a finite number, as every episode must end, got inf"),
+        ("--family=vared", "unknown family 'vared'; did you mean 'varied'? (there are: random, varied)"),
         ("--froude=2", "froude: expected a number from -1 to 1, got 2.0"),
     ],
 )

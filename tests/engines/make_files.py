@@ -15,7 +15,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 
-FEW = ("walk", "turn_left", "idle")
+FEW = ("walk", "turn_left", "stop", "idle")
 
 
 def main(folder: str, few: str = "") -> None:
@@ -29,7 +29,7 @@ def main(folder: str, few: str = "") -> None:
         bodies |= {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
         bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(50)}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
-        clips = export.clips(Setup(body), FEW if name in ROBOTS else ("walk", "idle"))
+        clips = export.clips(Setup.of(body, "steer"), export.DEFAULT if name in spec_files.EXAMPLES else FEW)
         for rig in export.RIGS if name in ROBOTS else ("skin",):
             (out / f"{name}-{rig}.glb").write_bytes(export.glb(body, clips, rig))
         np.savez(out / f"{name}.npz", **truth(body, clips))
@@ -46,7 +46,7 @@ def truth(body, clips) -> dict[str, np.ndarray]:
                 data.qpos[:] = pose
                 mujoco.mj_kinematics(model, data)
                 frames.append(data.xpos[parts][:, [1, 2, 0]])
-            places[f"{clip.name}{end if clip.moves else ''}_loop"] = np.stack(frames)
+            places[f"{clip.name}{end if clip.moves else ''}{'_loop' if clip.loops else ''}"] = np.stack(frames)
     return places | {"parts": np.array(body.part_names)}
 
 

@@ -204,7 +204,7 @@ class Misnamed(Walk):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "nothing to register: give a body, tasks or arenas"),
+        ({}, "nothing to register: give a body, tasks, arenas or families"),
         ({"parameters": {"walk": ROW}}, "parameters, presets and visuals belong to a body, and none is given"),
         ({"body": "other"}, "body: expected a spec.Body, got 'other'"),
         ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),

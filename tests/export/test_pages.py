@@ -2,9 +2,9 @@
 
 import base64
 import io
+import itertools
 import json
 import re
-import shutil
 import zlib
 
 import mujoco
@@ -130,7 +130,8 @@ def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_pack
 def test_programs_without_a_viewer_write_nothing(tmp_path):
     if built():
         pytest.skip("there is a viewer here")
-    for command in (("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1")):
+    commands = ("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1"), ("play", "-o", "a.html")
+    for command in commands:
         done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
         assert done.returncode == 1 and "make web" in done.stderr and done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
@@ -173,19 +174,6 @@ def test_errors_are_one_line(tmp_path, command, message):
     done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (1, f"arc-suite {command[0]}: {message}\n")
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.fixture(scope="module")
-def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright here: make check-web")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium here: make check-web")
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card needed
-    with playwright.sync_playwright() as running:
-        opened = running.chromium.launch(executable_path=chromium, args=flags)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
@@ -284,3 +272,36 @@ def test_something_is_drawn(shown):
     middle = pictures[0][height // 4 : 3 * height // 4, width // 4 : 3 * width // 4]
     assert middle.std() > 20.0
     assert abs(pictures[0] - pictures[1]).mean() > 1.0
+
+
+@pytest.mark.slow
+@needs_viewer
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390), (320, 256)])
+def test_small_pages(browser, tracks, tmp_path, width, height):
+    """The view is large enough or the page scrolls, nothing overlaps, controls have names and a size to hit."""
+    (tmp_path / "walk.html").write_text(pages.page(tracks), encoding="utf-8")
+    tab = browser.new_page(viewport={"width": width, "height": height}, reduced_motion="reduce")
+    tab.goto((tmp_path / "walk.html").as_uri())
+    tab.wait_for_function("window.viewer", timeout=60_000)
+    assert tab.evaluate("viewer.state.playing") is False
+    tab.evaluate("viewer.seek(1)")
+    tab.wait_for_function("document.querySelector('.reward').style.height")
+    drawn = [box.bounding_box() for box in tab.locator("h2, section canvas").all()]
+    for first, second in itertools.combinations(drawn, 2):
+        aside = first["x"] + first["width"] <= second["x"] + 1 or second["x"] + second["width"] <= first["x"] + 1
+        assert (
+            aside or first["y"] + first["height"] <= second["y"] + 1 or second["y"] + second["height"] <= first["y"] + 1
+        )
+    assert all(box["x"] >= 0 and box["x"] + box["width"] <= width for box in drawn)
+    views = [box.bounding_box()["height"] for box in tab.locator(".view").all()]
+    assert min(views) >= 0.4 * height
+    assert tab.evaluate("document.documentElement.scrollHeight") > height  # it scrolls
+    footer = tab.locator("footer").bounding_box()
+    assert footer["y"] + footer["height"] <= height + 1  # in sight without scrolling
+    for control in tab.locator("button, input, select, summary").all():
+        box = control.bounding_box()
+        assert min(box["width"], box["height"]) >= 24
+        assert control.evaluate("each => each.ariaLabel || each.textContent.trim()")
+    labels = [canvas.get_attribute("aria-label") for canvas in tab.locator("canvas").all()]
+    assert len(set(labels)) == 6 and all(label.startswith("tick, ") for label in labels)
+    tab.close()

@@ -56,7 +56,7 @@ def test_the_spider_of_the_first_steps(tmp_path):
     for command in STEPS["A spider as animation clips"].blocks[0].text.splitlines():
         done = programs.run(*command.split(), *short.get(command.split()[1], ()), cwd=tmp_path)
         assert done.returncode == 0, done.stderr
-    assert {path.name for path in tmp_path.iterdir()} == {"spider.mp4", "clips.glb", "clips.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {"spider.mp4", "clips.glb", "clips.clips.json"}
 
 
 @pytest.mark.slow

@@ -53,6 +53,7 @@ THIRD_PARTY = {
     "robots": set(),
     "robots.generator": {"numpy"},
     "robots.mirror": {"numpy"},
+    "robots.varied": {"numpy"},
     "arenas": {"numpy", "dm_control"},
     "arenas.arena": {"dm_control"},
     "models": {"numpy", "mujoco", "dm_control"},
@@ -219,7 +220,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
     texts = {f"tasks.{path.stem}" for path in (PACKAGE / "tasks").glob("*.py")}
     contract = {"tasks.__init__", "tasks.contract", "tasks.clock", "tasks.readings", "tasks.terms", "tasks.fitting"}
     contract |= {"tasks.mirrors", "tasks.modifiers", "tasks.modified", "tasks.noise"}  # of any task
-    contract |= {"tasks.parameters", "tasks.sensors", "tasks.energy"}
+    contract |= {"tasks.parameters", "tasks.sensors", "tasks.energy", "tasks.tokens"}
     particular = texts - contract
     assert {"tasks.walk", "tasks.commanded", "tasks.suite"} <= particular
     for name in modules():

@@ -18,6 +18,7 @@ from arc_suite.robots import spec_files
 
 ROOT = pathlib.Path(__file__).parents[2]
 NOT_SOURCES = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "out")
+BUILT = ("viewer.js", "play.js", "mujoco.wasm.zlib")  # by `make web`
 
 pytestmark = pytest.mark.slow
 
@@ -27,10 +28,11 @@ def wheel(tmp_path_factory):
     """Builds in a copy: a build leaves files among the sources, and reuses what another one left."""
     folder = tmp_path_factory.mktemp("wheel")
     shutil.copytree(ROOT, folder / "sources", ignore=NOT_SOURCES)
-    viewer = folder / "sources" / "arc_suite" / "export" / "web" / "viewer.js"
-    if not viewer.exists():  # `make web` has not been run here
-        viewer.parent.mkdir(exist_ok=True)
-        viewer.write_text("// in place of the viewer\n")
+    for name in BUILT:
+        file = folder / "sources" / "arc_suite" / "export" / "web" / name
+        if not file.exists():  # `make web` has not been run here
+            file.parent.mkdir(exist_ok=True)
+            file.write_text("// in its place\n")
     command = [sys.executable, "-m", "pip", "wheel", "--no-deps", "--wheel-dir", folder, folder / "sources"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -70,8 +72,8 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
     package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
-    package |= {"arc_suite/design/gallery.html", "arc_suite/export/page.html", "arc_suite/export/web/viewer.js"}
-    package |= {"arc_suite_command.py", "arc_suite/evaluation/anchors.csv"}
+    package |= {f"arc_suite/export/{name}" for name in ("page.html", "play.html", *(f"web/{name}" for name in BUILT))}
+    package |= {"arc_suite_command.py", "arc_suite/design/gallery.html", "arc_suite/evaluation/anchors.csv"}
     package |= {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite" / "policies" / "packaged").iterdir()}
     package |= {f"arc_suite/robots/examples/{name}.json" for name in spec_files.EXAMPLES}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"

@@ -6,7 +6,7 @@ import pytest
 
 import arc_suite
 from arc_suite import models
-from arc_suite.models import builder, standing
+from arc_suite.models import direct, standing
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
@@ -30,7 +30,7 @@ def test_what_stands_is_what_is_built(body):
 
 def test_a_body_is_built_once_to_be_loaded(monkeypatch):
     built = []
-    build = builder.build
-    monkeypatch.setattr(builder, "build", lambda body: built.append(body.name) or build(body))
+    build = direct.on_flat_ground
+    monkeypatch.setattr(direct, "on_flat_ground", lambda body: built.append(body.name) or build(body))
     arc_suite.load(generator.random_body(4711), "walk")
     assert built == ["random_4711"]

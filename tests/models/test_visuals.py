@@ -189,3 +189,17 @@ def test_reward_colours_go_from_red_to_green():
     np.testing.assert_allclose(middle, (red + green) / 2.0)
     np.testing.assert_array_equal(visuals.reward_colour(-3.0), red)
     np.testing.assert_array_equal(visuals.reward_colour(7.0), green)
+
+
+def test_a_palette_colours_the_materials_by_name_or_by_seed():
+    def seen(palette):
+        model = compiled(STRANGER.replace(palette=palette), True)
+        return {name: tuple(map(float, model.material(name).rgba[:3])) for name in ("shell", "limb", "glow")}
+
+    assert seen("moss")["shell"] == pytest.approx((0.42, 0.52, 0.28), abs=1e-6)
+    colours = [seen(palette) for palette in (None, "moss", "night", 1, 2)]
+    assert len({tuple(each.values()) for each in colours}) == len(colours)
+    assert seen(1) == colours[3]
+    for palette in ("mos", -1, 1.5, True):
+        with pytest.raises(ValueError, match=r"palette: expected one of moss, rust, bone, coral, night, or a seed"):
+            STRANGER.replace(palette=palette)

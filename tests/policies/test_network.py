@@ -6,40 +6,15 @@ import zipfile
 
 import numpy as np
 import pytest
+from networks import drawn, made
 
 import arc_suite
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
-from arc_suite.policies.network import Layer, Network
-from arc_suite.robots import ROBOTS, generator
-
-
-def drawn(seed):
-    """A function that draws arrays of a shape."""
-    random = np.random.default_rng(seed)
-    return lambda *shape: random.normal(size=shape).astype(np.float32)
-
-
-def made(robot="tick", task="walk", hidden=32):
-    """A policy of all kinds of layers, for a robot: the same each time."""
-    numbers = drawn(0)
-    environment = arc_suite.load(ROBOTS.get(robot) or robot, task)
-    blocks = dict(environment.task.definition.blocks)
-    size, joints = sum(blocks.values()), environment.action_spec().shape[0]
-    layers = (
-        Layer("normalise", (numbers(size), np.abs(numbers(size)), np.float32(5.0))),
-        Layer("linear", (0.2 * numbers(size, hidden), numbers(hidden))),
-        Layer("layer_norm", (numbers(hidden), numbers(hidden))),
-        Layer("relu"),
-        Layer("linear", (0.2 * numbers(hidden, hidden), numbers(hidden))),
-        Layer("elu"),
-        Layer("linear", (0.1 * numbers(hidden, joints), numbers(joints))),
-        Layer("tanh"),
-        Layer("clip"),
-    )
-    return Network(layers, Setup.of(robot, task), blocks)
+from arc_suite.policies.network import Layer
+from arc_suite.robots import generator
 
 
 @pytest.fixture

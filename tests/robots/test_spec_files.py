@@ -93,7 +93,7 @@ def changed(path, value):
 HIP = ("legs", 1, "links", 0, "joint")
 AT_HIP = "legs[1].links[0].joint"
 SHAPES = "sphere, capsule, cylinder, ellipsoid, box"
-IN_BODY = "name, torso, legs, camera, density, ballast, simulation"
+IN_BODY = "name, torso, legs, camera, density, ballast, simulation, palette"
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,14 @@ from obstacles import Obstacle
 from tiers import tiers, turn
 
 import arc_suite
-from arc_suite import models
+from arc_suite import models, registry
 from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.cpg import Demonstrator
+from arc_suite.models import direct
+from arc_suite.models.sizing import sized
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import random_body
+from arc_suite.robots.spec_files import EXAMPLES, load_body
 from arc_suite.simulation.model import compiled, euler_suffices, list_contacts
 
 BODIES = ROBOTS | {f"random {seed}": random_body(seed) for seed in range(4)}
@@ -23,6 +26,28 @@ CONTACT = ("geom", "pos", "frame", "dist", "includemargin", "dim", "friction", "
 
 def written(body, arena=FLAT):
     return mujoco.MjModel.from_xml_string(models.assemble(body, arena).to_xml_string())
+
+
+def saved(model):
+    """The bytes of a model."""
+    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+@pytest.mark.parametrize(
+    "body",
+    [*ROBOTS, *EXAMPLES, "random:0", "random:1", *(f"varied:{seed}" for seed in range(8))],
+)
+def test_the_model_on_flat_ground_is_that_of_the_builder_byte_for_byte(body):
+    body = load_body(body) if body in EXAMPLES else registry.body_of(body)
+    spec = mujoco.MjSpec.from_string(models.assemble(body).to_xml_string())
+    model = spec.compile()
+    assert saved(direct.on_flat_ground(sized(body)).compile()) == saved(model)
+    list_contacts(spec, model)
+    listed = spec.compile()
+    listed.opt.integrator = compiled(body).opt.integrator
+    assert saved(compiled(body)) == saved(listed)
 
 
 def walk(body):

@@ -11,7 +11,7 @@ from arc_suite.markers import Marker
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.simulation.physics import Physics
-from arc_suite.simulation.pictures import check_camera, picture
+from arc_suite.simulation.pictures import QUALITIES, check_camera, picture
 
 BODY = ROBOTS["queen"]
 
@@ -84,3 +84,19 @@ def test_cameras_are_checked_on_a_model():
         check_camera(model, 3)
     with pytest.raises(ValueError, match=r"^no camera 3: "):
         picture(BODY, FLAT, model.qpos0, 60, 80, 3)
+
+
+def test_qualities_show_the_same_in_finer_pixels():
+    """A still is the mean of a picture of twice its size; pictures of depth are not averaged."""
+    physics = Physics.from_body(ROBOTS["tick"])
+    physics.forward()
+    fast, film, still = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
+    assert_array_equal(physics.render(90, 120, "portrait"), fast)
+    assert (fast != film).any() and abs(fast.astype(int) - film).mean() < 2.0  # edges of shadows alone
+    double = physics.render(180, 240, "portrait", quality="film").astype(float)
+    mean = (double[::2, ::2] + double[1::2, ::2] + double[::2, 1::2] + double[1::2, 1::2]) / 4.0
+    np.testing.assert_allclose(still, mean, atol=0.5)
+    depths = [physics.render(90, 120, "portrait", depth=True, quality=name) for name in ("film", "still")]
+    assert_array_equal(*depths)
+    with pytest.raises(ValueError, match="^unknown quality 'fine'"):
+        physics.render(90, 120, quality="fine")

@@ -44,7 +44,7 @@ def test_a_strip_shows_the_walk_at_its_ticks(tmp_path):
     act, time_step = alone(walker, 3), environment.reset(3)
     for tick in range(at[-1] + 1):
         if tick in at:
-            view = environment.physics.render(strips.HEIGHT, strips.WIDTH, strips.CAMERA)
+            view = environment.physics.render(strips.HEIGHT, strips.WIDTH, strips.CAMERA, quality="still")
             assert np.array_equal(frames[at.tolist().index(tick)], view)
         time_step = environment.step(act(time_step))
 

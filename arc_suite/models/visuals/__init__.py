@@ -9,6 +9,7 @@ from arc_suite.models.visuals import bastion, leaper, queen, tick
 from arc_suite.models.visuals.generic import generic
 from arc_suite.models.visuals.scene import add_scene
 from arc_suite.models.visuals.spec import Visuals
+from arc_suite.robots import palettes
 from arc_suite.robots.spec import Body, Leg, Link
 
 # A creature without an entry has the visuals `generic`.
@@ -43,7 +44,8 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
     """
     visuals = VISUALS.get(body.name) or generic(body)
     add_scene(root, body.torso.standing_height)
-    for name, colour in visuals.colours.items():
+    own = {} if body.palette is None else palettes.colours(body.palette)
+    for name, colour in {**visuals.colours, **own}.items():
         emission, specular, shininess = _FINISHES.get(name, _PLAIN)
         root.asset.add(
             "material", name=name, rgba=(*colour, 1.0), emission=emission, specular=specular, shininess=shininess

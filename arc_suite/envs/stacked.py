@@ -1,0 +1,97 @@
+"""One task for a batch of different bodies: numbers that follow from the body get a leading axis.
+
+The functions of a task stay as they are, as its arrays may have any leading axes. Bodies of one batch have
+the same legs, joints and parts; see `kind`.
+"""
+
+import dataclasses
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import numpy as np
+
+from arc_suite.envs import trees
+from arc_suite.tasks.clock import Clock, Clocks
+from arc_suite.tasks.contract import Task
+from arc_suite.tasks.modified import Modified
+
+_EQUAL = ("weights",)  # fields that tasks of one kind share
+_AGAINST_FEET = ("stance_threshold",)  # numbers that are compared with those of every foot
+
+
+def kind(task: Task) -> Hashable | None:
+    """Return what tasks have in common that can be stacked; None for a task that cannot."""
+    inner = task.task if isinstance(task, Modified) else task
+    if not all(vars(type(each)).get("from_body") for each in (task, inner)):  # of the class itself
+        return None
+    scene = task.scene
+    return type(task), type(inner), repr(scene.layout), scene.arena, tuple(task.settings.weights.items())
+
+
+def stacked(tasks: Sequence[Task]) -> Task:
+    """Return one task for a batch whose environment i does the i-th task.
+
+    It is for the functions that drivers call in steps and resets. `start`, `stream_state` and `markers`, which have
+    no leading axes, are those of each task.
+
+    Args:
+        tasks: of one kind.
+    """
+    return _with_values(tasks[0], {name: _stacked([_value(t, name) for t in tasks]) for name in _names(tasks[0])})
+
+
+def part(task: Task, indices: np.ndarray) -> Task:
+    """Return the task of some environments of a stacked one."""
+    return _with_values(task, {name: _part(_value(task, name), indices) for name in _names(task)})
+
+
+def _names(task: Task) -> tuple[str, ...]:
+    inner = ("task",) if isinstance(task, Modified) else ()
+    return ("settings", "step_limit", "standing", "control_timestep", *inner, *task.from_body)
+
+
+def _value(task: Task, name: str) -> Any:
+    return getattr(task.scene if name in task.scene._fields else task, name)
+
+
+def _with_values(task: Task, values: dict[str, Any]) -> Task:
+    scene = task.scene._replace(**{name: value for name, value in values.items() if name in task.scene._fields})
+    fields = {field.name for field in dataclasses.fields(task)}
+    made = dataclasses.replace(task, scene=scene, **{name: values[name] for name in values if name in fields})
+    # In the places of cached properties, which would follow from one body.
+    made.__dict__.update({name: values[name] for name in task.from_body})
+    return made
+
+
+def _stacked(values: Sequence[Any], name: str = "") -> Any:
+    first = values[0]
+    if isinstance(first, Task):
+        return stacked(values)
+    if isinstance(first, Clock):
+        return Clocks.of(values)
+    if name in _EQUAL:
+        return first
+    if isinstance(first, dict):
+        return {key: _stacked([value[key] for value in values]) for key in first}
+    if isinstance(first, tuple):
+        names = getattr(first, "_fields", ("",) * len(first))
+        return trees.rebuilt(first, [_stacked(items, field) for field, *items in zip(names, *values, strict=True)])
+    if isinstance(first, (np.ndarray, float, int)):
+        numbers = np.stack(values)
+        return numbers[:, None] if name in _AGAINST_FEET else numbers
+    return first
+
+
+def _part(value: Any, indices: np.ndarray, name: str = "") -> Any:
+    if isinstance(value, Task):
+        return part(value, indices)
+    if isinstance(value, Clocks):
+        return value.part(indices)
+    if name in _EQUAL:
+        return value
+    if isinstance(value, dict):
+        return {key: _part(item, indices) for key, item in value.items()}
+    if isinstance(value, tuple):
+        names = getattr(value, "_fields", ("",) * len(value))
+        return trees.rebuilt(value, [_part(item, indices, field) for field, item in zip(names, value, strict=True)])
+    return value[indices] if isinstance(value, np.ndarray) else value

@@ -1,0 +1,57 @@
+"""Families of bodies: a body for every seed, by name of the family."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from arc_suite import checks
+from arc_suite.models.soundness import flaws
+from arc_suite.robots import varied
+from arc_suite.robots.generator import random_body
+from arc_suite.robots.spec import Body, SpecError
+
+TRIES = 100  # draws of one seed
+
+
+def varied_body(seed: int) -> Body:
+    """Return a random body of a wide family, the same for the same seed; see `robots.varied.drawn`.
+
+    Every body passes `soundness.flaws`. Draw k of seed s comes from `numpy.random.default_rng((s, k))`, and the
+    first sound one is the body.
+
+    Args:
+        seed: 0 or more.
+
+    Returns:
+        The body, `varied_<seed>`.
+
+    Raises:
+        ValueError: not a seed.
+    """
+    return sound(varied.drawn, "varied", seed)
+
+
+def sound(draw: Callable[[np.random.Generator], Body], family: str, seed: int) -> Body:
+    """Return the first sound body that is drawn for a seed, `<family>_<seed>`; see `varied_body`.
+
+    Args:
+        draw: returns a body, or raises a SpecError.
+        family: its name.
+        seed: 0 or more.
+
+    Raises:
+        ValueError: not a seed, or a family without sound bodies.
+    """
+    checks.seed(seed)
+    for attempt in range(TRIES):
+        try:
+            body = draw(np.random.default_rng((seed, attempt))).replace(name=f"{family}_{seed}")
+        except SpecError:
+            continue
+        if not flaws(body):
+            return body
+    raise ValueError(f"{family}:{seed}: none of {TRIES} draws stands and can take steps; see arc-suite check")
+
+
+# Functions from a seed to a body, by name. `registration.register` adds those of other packages.
+FAMILIES: dict[str, Callable[[int], Body]] = {"random": random_body, "varied": varied_body}

@@ -1,0 +1,241 @@
+"""What one policy for all bodies observes and does: legs, torso and command, without dimension and padded.
+
+Legs are tokens: a vector for each, the same for every body. They are computed from the blocks that the body's own
+policy observes. Everything is a product, a sum or a root of numbers, which round alike in batches of any size.
+"""
+
+import functools
+import itertools
+import math
+from collections.abc import Sequence
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from arc_suite.models.sizing import GRAVITY, position_gains, sized
+from arc_suite.models.standing import standing
+from arc_suite.robots.spec import Body
+from arc_suite.tasks.contract import Task
+from arc_suite.tasks.fitting import reach, velocity_units
+
+LEGS, JOINTS = 12, 4  # at most, of a body, and of a leg
+
+BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock")  # of a task, that tokens are made from
+
+# Sizes: of a leg, of the torso and of the command in every step, and of a leg and the torso in the description.
+LEG, TORSO, COMMAND = 2 * JOINTS + 4, 12, 6
+LEG_DESCRIPTION, TORSO_DESCRIPTION = 9 + 8 * JOINTS, 10
+
+_CARRIES = 0.05  # share of the weight from which on a foot counts as loaded
+_LARGEST_FORCE = 0.5  # that is asked for, as observed forces are clipped to 1
+
+
+class Description(NamedTuple):
+    """Bodies as a policy knows them: lengths in h, rates in sqrt(g / h), torques in those of the motors.
+
+    Attributes:
+        legs: (..., 12, 41) foot and mount from the torso's origin (6), direction of the foot (2), number of joints as
+            one of four (4), Jacobian of the sole (3 x 4), joint ranges, rad (4 x 2), stiffness, action per rad, and
+            damping of position control (4 + 4), duty factor.
+        torso: (..., 10) number of legs by 12, half-extents of the first solid (3), centre of mass (3), static
+            stability margin, R, duty factor.
+        mask: (..., 12, 4) booleans, which joints there are.
+        reach: (..., 12, 4) angles that an action of 1 asks for, rad.
+    """
+
+    legs: np.ndarray
+    torso: np.ndarray
+    mask: np.ndarray
+    reach: np.ndarray
+
+
+def padded(body: Body, values: np.ndarray) -> np.ndarray:
+    """Return values (joints, ...) of a body's joints as (12, 4, ...), 0 where there is none."""
+    array = np.zeros((LEGS * JOINTS, *np.shape(values)[1:]))
+    array[slots(body)] = values
+    return array.reshape(LEGS, JOINTS, *array.shape[1:])
+
+
+@functools.lru_cache(maxsize=256)
+def _slots(body: Body) -> tuple[int, ...]:
+    counts = [len(leg.joints) for leg in body.legs]
+    if len(counts) > LEGS or max(counts) > JOINTS:
+        most = f"at most {LEGS} legs of at most {JOINTS} joints"
+        raise ValueError(f"{body.name}: expected {most}, got {len(counts)} legs of up to {max(counts)}")
+    return tuple(JOINTS * leg + joint for leg, count in enumerate(counts) for joint in range(count))
+
+
+def slots(body: Body) -> np.ndarray:
+    """Return the places (joints,) of a body's joints among the 12 x 4 of all legs.
+
+    Raises:
+        ValueError: the body has more than 12 legs, or a leg more than 4 joints.
+    """
+    return np.array(_slots(body))
+
+
+def described(task: Task) -> Description:
+    """Return the description of the body of a task, in the gait that the task prescribes; no leading axes.
+
+    Raises:
+        ValueError: too many legs or joints, or a task that prescribes no gait.
+    """
+    if task.parameters is None:
+        raise ValueError(f"task {task.name}: expected one that prescribes a gait")
+    body, pose, duty = task.scene.body, standing(task.scene.body), task.parameters.duty_factor
+    height, first = pose.height, body.torso.solids[0]
+    count, rate = len(body.legs), math.sqrt(GRAVITY / pose.height)
+    stiffness, damping = position_gains(sized(body), pose.inertias)
+    ranges = np.radians([joint.range_deg for leg in body.legs for joint in leg.joints])
+    feet, mounts = np.array([leg.foot_position for leg in body.legs]), np.array([leg.mount for leg in body.legs])
+    away = feet[:, :2] / np.maximum(np.hypot(feet[:, 0], feet[:, 1]), 1e-9)[:, None]
+    counts = np.eye(JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]
+    jacobians = padded(body, np.concatenate([jacobian.T for jacobian in pose.jacobians]))[:count]
+    by_leg = (padded(body, values)[:count] for values in (ranges, stiffness, damping * rate))
+    parts = [feet / height, mounts / height, away, counts, jacobians.swapaxes(1, 2) / height, *by_leg]
+    legs = np.zeros((LEGS, LEG_DESCRIPTION))
+    legs[:count] = np.concatenate([part.reshape(count, -1) for part in parts] + [np.full((count, 1), duty)], axis=-1)
+    half = np.array((*first.size, *(first.size[-1],) * (3 - len(first.size))))
+    lengths = np.array((*half, *pose.centre, pose.margin, reach(body))) / height
+    return Description(
+        legs=legs.astype(np.float32),
+        torso=np.array((count / LEGS, *lengths, duty), np.float32),
+        mask=padded(body, np.ones(len(ranges))).astype(bool),
+        reach=padded(body, abs(ranges).max(axis=-1)).astype(np.float32),
+    )
+
+
+class Tokens(NamedTuple):
+    """How observations of environments become tokens, in float32; all arrays have a leading axis for environments.
+
+    Attributes:
+        places: (environments, n) where in the body's own observation vector the torso's posture and velocity (5 + 6),
+            joint angles and velocities (48 + 48), upward forces on feet (12), clock (2) and command (6, or 0) lie; any
+            place for what is not there.
+        mask: (environments, 12, 4) 1 where there is a joint.
+        legs: (environments, 12) 1 where there is a leg.
+    height: (environments,) h, m.
+        speed: (environments,) sqrt(g h), m/s.
+        rate: (environments,) sqrt(g / h), rad/s.
+        units: (environments, 3) of the command; see `fitting.velocity_units`.
+        turn: (environments,) R / h.
+        forward: (environments,) 1 for a walk forward, -1 for one backward.
+        loaded: (environments,) upward force from which on a foot is loaded, in units of the block.
+        offset: (environments, 12, 2) sine and cosine of the phase of each leg over the clock.
+        middle: (environments, 2) sine and cosine of the phase in the middle of stance.
+    """
+
+    places: np.ndarray
+    mask: np.ndarray
+    legs: np.ndarray
+    height: np.ndarray
+    speed: np.ndarray
+    rate: np.ndarray
+    units: np.ndarray
+    turn: np.ndarray
+    forward: np.ndarray
+    loaded: np.ndarray
+    offset: np.ndarray
+    middle: np.ndarray
+
+    @classmethod
+    def of(cls, tasks: Sequence[Task]) -> Self:
+        """Return the tokens of a batch whose environment i does the i-th task.
+
+        Raises:
+            ValueError: see `described`, or a task that does not observe the blocks `BLOCKS`.
+        """
+        made = {id(task): cls._of_one(task) for task in {id(task): task for task in tasks}.values()}
+        return cls(*(np.stack(values) for values in zip(*(made[id(task)] for task in tasks), strict=True)))
+
+    @classmethod
+    def _of_one(cls, task: Task) -> tuple:
+        if not set(BLOCKS) <= task.blocks.keys():
+            raise ValueError(f"task {task.name}: expected the blocks {', '.join(BLOCKS)}, got {', '.join(task.blocks)}")
+        body, parameters, pose = task.scene.body, task.parameters, standing(task.scene.body)
+        # Forces are in N, or in weights where a task has a command.
+        weight = 1.0 if "command" in task.blocks else pose.mass * GRAVITY
+        phases = np.zeros(LEGS)
+        phases[: len(body.legs)] = parameters.phase_offsets
+        middle = math.pi * parameters.duty_factor
+        mask = padded(body, np.ones(len(body.joint_names)))
+        units = velocity_units(body, parameters.target_velocity)
+        numbers = (
+            mask,
+            mask.any(axis=-1),
+            pose.height,
+            math.sqrt(GRAVITY * pose.height),
+            math.sqrt(GRAVITY / pose.height),
+            units,
+            units[0] / units[2] / pose.height,
+            math.copysign(1.0, parameters.target_velocity),
+            min(_CARRIES * weight, _LARGEST_FORCE),
+            np.stack([np.sin(phases), np.cos(phases)], axis=-1),
+            np.array((math.sin(middle), math.cos(middle))),
+        )
+        return cls._places(task), *(np.asarray(number, np.float32) for number in numbers)
+
+    @staticmethod
+    def _places(task: Task) -> np.ndarray:
+        body, ends = task.scene.body, itertools.accumulate(task.blocks.values())
+        first = {name: end - size for (name, size), end in zip(task.blocks.items(), ends, strict=True)}
+        posture, velocities, forces, clock = (first[name] for name in BLOCKS)
+        joints = padded(body, np.arange(len(body.joint_names))).astype(int).ravel()
+        upward = np.zeros(LEGS, int)
+        upward[: len(body.legs)] = [6 * body.part_names.index(name) + 5 for name in body.foot_names]
+        torso = [posture + np.arange(5), velocities + np.arange(6)]
+        command = first["command"] + np.arange(COMMAND) if "command" in first else []
+        parts = [*torso, posture + 5 + joints, velocities + 6 + joints, forces + upward, clock + np.arange(2), command]
+        return np.concatenate(parts).astype(int)
+
+    def gathered(self, vectors: np.ndarray) -> np.ndarray:
+        """Return the numbers (environments, n) of observation vectors (environments, size) that tokens are made from.
+
+        Vectors of bodies with different joints have different sizes; these numbers have one layout.
+        """
+        return np.take_along_axis(vectors, self.places, axis=-1)
+
+    def observed(self, gathered: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the tokens of gathered numbers (environments, n).
+
+        Returns:
+            legs (environments, 12, 12): joint angles, rad, and velocities (4 + 4), sine and cosine of the leg's phase,
+            whether it is to stand, whether it is loaded; 0 for legs and joints that are not there.
+            torso (environments, 12): height, up axis (3), forward axis (2), velocity (3), angular velocity (3).
+            command (environments, 6): the desired velocity and the present one, as the torso heads, in units of
+            the command.
+        """
+        ends = np.cumsum((5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2))
+        pose, velocities, angles, speeds, forces, clock, command = np.split(gathered.astype(np.float32), ends, axis=-1)
+        angles, speeds = (array.reshape(self.mask.shape) * self.mask for array in (angles, speeds))
+        sine = clock[:, :1] * self.offset[..., 1] + clock[:, 1:] * self.offset[..., 0]
+        cosine = clock[:, 1:] * self.offset[..., 1] - clock[:, :1] * self.offset[..., 0]
+        going = clock.any(axis=-1)[:, None]
+        stands = (sine * self.middle[:, :1] + cosine * self.middle[:, 1:] >= self.middle[:, 1:]) | ~going
+        phase = np.stack([sine, cosine, stands, forces >= self.loaded[:, None]], axis=-1) * self.legs[..., None]
+        legs = np.concatenate([angles, speeds / self.rate[:, None, None], phase], axis=-1)
+
+        height, w, x, y, z = pose.T
+        up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))  # the world's, in the torso
+        ahead, aside = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
+        level = np.maximum(np.sqrt(ahead * ahead + aside * aside), np.float32(1e-6))
+        cos, sin = ahead / level, aside / level
+        vx, vy, vz, *angular = velocities.T
+        linear = [cos * vx + sin * vy, cos * vy - sin * vx, vz]
+        rates = [speed / self.speed for speed in linear] + [speed / self.rate for speed in angular]
+        torso = np.stack([height / self.height, *up, ahead, aside, *rates], axis=-1)
+        if not command.shape[-1]:  # along world x, and back into that direction
+            turn = (-sin * self.turn).clip(-1.0, 1.0)
+            desired = [self.forward * cos, -self.forward * sin, turn]
+            motion = [speed / unit for speed, unit in zip((*linear[:2], angular[2]), self.units.T, strict=True)]
+            command = np.stack([*desired, *motion], axis=-1)
+        return {"legs": legs, "torso": torso, "command": command}
+
+    def part(self, indices) -> Self:
+        """Return the tokens of some environments."""
+        return type(self)(*(values[indices] for values in self))
+
+    def actions(self, actions: np.ndarray) -> np.ndarray:
+        """Return the bodies' own actions (environments, joints) of padded ones (environments, 12, 4)."""
+        flat = actions.reshape(len(actions), -1)
+        return flat[self.mask.reshape(flat.shape) > 0.0].reshape(len(actions), -1)

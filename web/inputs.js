@@ -1,0 +1,65 @@
+// The player's command [forward, left, turning] from keys, a gamepad and a stick on the screen.
+
+const KEYS = {
+  ArrowUp: [1, 0, 0], KeyW: [1, 0, 0],
+  ArrowDown: [-1, 0, 0], KeyS: [-1, 0, 0],
+  ArrowLeft: [0, 0, 1], KeyA: [0, 0, 1],
+  ArrowRight: [0, 0, -1], KeyD: [0, 0, -1],
+  KeyQ: [0, 1, 0], KeyE: [0, -1, 0],
+};
+const LEAST = [-0.5, -0.5, -1], MOST = [1, 0.5, 1]; // of a command, as the tasks draw them
+const DEAD = 0.15; // share of a gamepad's stick that counts as nothing
+
+const sum = (vectors) => vectors.reduce((total, vector) => total.map((value, i) => value + vector[i]), [0, 0, 0]);
+
+// A command within what tasks ask for: the sum of speed and turning is at most 1.
+export function bounded(command) {
+  const within = command.map((value, i) => Math.min(Math.max(value, LEAST[i]), MOST[i]));
+  const size = Math.hypot(within[0], within[1]) + Math.abs(within[2]);
+  return within.map((value) => value / Math.max(size, 1) + 0);
+}
+
+const live = (value = 0) => (Math.abs(value) > DEAD ? value : 0);
+
+function gamepads() {
+  const there = (navigator.getGamepads?.() ?? []).filter((pad) => pad?.connected);
+  return there.map(({ axes }) => [-live(axes[1]), -live(axes[0]), -live(axes[2])]);
+}
+
+export class Inputs {
+  // Takes the element of the stick, whose first child is its knob.
+  constructor(stick) {
+    this.held = new Set();
+    this.stick = [0, 0, 0];
+    window.addEventListener("keydown", (event) => {
+      if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.target.closest("select")) return; // whose keys these are
+      event.preventDefault();
+      this.held.add(event.code);
+    });
+    window.addEventListener("keyup", (event) => this.held.delete(event.code));
+    window.addEventListener("blur", () => this.held.clear()); // keys that are let go elsewhere
+    this.follow(stick);
+  }
+
+  follow(stick) {
+    const knob = stick.firstElementChild;
+    const move = (across, up) => {
+      this.stick = [up, 0, -across];
+      knob.style.transform = `translate(${80 * across}%, ${-80 * up}%)`; // of its own size
+    };
+    const moved = ({ clientX, clientY }) => {
+      const { left, top, width, height } = stick.getBoundingClientRect();
+      const across = (2 * (clientX - left)) / width - 1, up = 1 - (2 * (clientY - top)) / height;
+      const size = Math.max(1, Math.hypot(across, up));
+      move(across / size, up / size);
+    };
+    stick.addEventListener("pointerdown", (event) => (stick.setPointerCapture(event.pointerId), moved(event)));
+    stick.addEventListener("pointermove", (event) => stick.hasPointerCapture(event.pointerId) && moved(event));
+    for (const end of ["pointerup", "pointercancel"]) stick.addEventListener(end, () => move(0, 0));
+  }
+
+  get command() {
+    return bounded(sum([...[...this.held].map((code) => KEYS[code]), ...gamepads(), this.stick]));
+  }
+}

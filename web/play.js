@@ -1,0 +1,219 @@
+// A page to play in: MuJoCo steps a body, a policy drives it, the player commands it.
+import loadMujoco from "@mujoco/mujoco";
+import * as THREE from "three";
+import { bytes, unpacked } from "./data.js";
+import { grounds, triangles } from "./ground.js";
+import { Inputs } from "./inputs.js";
+import { materials, partOf } from "./parts.js";
+import { Simulation } from "./simulation.js";
+import { View } from "./view.js";
+
+const RESTART = 1.5; // s that a fallen body lies
+const BUSY = 20; // ms of a picture's time for physics: a slower machine shows slow motion
+const KICK = 0.8; // sqrt(g h), the velocity that a kick adds
+const GRAVITY = 9.81; // m/s^2
+
+const byId = (id) => document.getElementById(id);
+
+// A body on some ground, as it is simulated and drawn.
+class Play {
+  constructor(mujoco, body, ground, canvas) {
+    this.simulation = new Simulation(mujoco, body, ground);
+    const { height } = body, { field } = this.simulation;
+    this.body = body;
+    this.view = new View(canvas, height, body.reach, (field ? 20 : 34) * height);
+    const looks = materials(body.materials), made = grounds(height);
+    this.parts = body.parts.map((part) => partOf(part, looks));
+    this.floor = made(field ? triangles(field) : new THREE.PlaneGeometry(100 * height, 100 * height), 1);
+    const rope = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(1, 1, 1)]);
+    this.rope = new THREE.Line(rope, new THREE.LineBasicMaterial({ color: "#ffd23f", depthTest: false }));
+    this.rope.frustumCulled = false;
+    this.view.scene.add(...this.parts, this.floor, this.rope);
+    this.debt = 0; // s of simulation that are due
+    this.lain = 0; // s since a fall
+    this.pace = 1; // share of real time
+    this.pose();
+    this.view.place(this.target());
+  }
+
+  restart() {
+    this.simulation.release();
+    this.simulation.restart();
+    this.lain = this.debt = 0;
+  }
+
+  // Steps through some seconds of real time, as far as some milliseconds allow.
+  advance(seconds, command, budget = BUSY) {
+    const { simulation, body } = this, began = performance.now();
+    this.debt += seconds;
+    let stepped = 0;
+    while (this.debt >= body.timestep && performance.now() - began < budget) {
+      simulation.substep(command);
+      this.debt -= body.timestep;
+      stepped += body.timestep;
+    }
+    if (this.debt >= body.timestep) this.debt = 0;
+    if (seconds > 0) this.pace += 0.05 * (Math.min(stepped / seconds, 1) - this.pace);
+    this.lain = simulation.task.fell ? this.lain + stepped : 0;
+    if (this.lain >= RESTART) this.restart();
+  }
+
+  pose() {
+    const { xpos, xquat } = this.simulation.data, first = this.body.task.torso;
+    this.parts.forEach((part, index) => {
+      const [w, x, y, z] = xquat.subarray(4 * (first + index), 4 * (first + index) + 4);
+      part.position.fromArray(xpos, 3 * (first + index));
+      part.quaternion.set(x, y, z, w);
+    });
+    const { pull } = this.simulation;
+    this.rope.visible = pull !== null;
+    if (pull) this.rope.geometry.setFromPoints([pull.point, pull.target].map((point) => new THREE.Vector3(...point)));
+  }
+
+  target() {
+    const { x, y } = this.parts[0].position;
+    return new THREE.Vector3(x, y, this.simulation.task.ground(x, y) + 0.45 * this.body.height);
+  }
+
+  draw() {
+    this.pose();
+    const target = this.target(), { height } = this.body;
+    this.view.follow(target);
+    // A plane goes along by whole tiles.
+    if (!this.simulation.field) for (const axis of ["x", "y"]) this.floor.position[axis] = Math.round(target[axis] / height) * height;
+    this.view.draw();
+  }
+
+  // Kicks the body away from the camera.
+  kick() {
+    const way = this.view.target.clone().sub(this.view.camera.position).setZ(0);
+    way.setLength(KICK * Math.sqrt(GRAVITY * this.body.height));
+    this.simulation.kick([way.x, way.y]);
+  }
+
+  // Takes hold of the part under the pointer; returns a function that drags it to another place, or null.
+  grab(place) {
+    const ray = new THREE.Raycaster();
+    const aim = ({ x, y }) => ray.setFromCamera(new THREE.Vector2(x, y), this.view.camera);
+    aim(place);
+    const [hit] = ray.intersectObjects(this.parts, true);
+    if (!hit) return null;
+    const index = this.parts.indexOf(hit.object.parent);
+    const facing = this.view.camera.getWorldDirection(new THREE.Vector3());
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, hit.point);
+    this.simulation.grab(index, this.parts[index].worldToLocal(hit.point.clone()).toArray(), hit.point.toArray());
+    return (next) => {
+      aim(next);
+      const point = ray.ray.intersectPlane(plane, new THREE.Vector3());
+      if (point && this.simulation.pull) this.simulation.pull.target = point.toArray();
+    };
+  }
+
+  free() {
+    this.view.free();
+    this.simulation.free();
+  }
+}
+
+// Dragging a part pulls it; dragging elsewhere turns the camera, by controls that listen later.
+function pulls(canvas, current) {
+  let drag = null;
+  const place = ({ offsetX, offsetY }) => ({
+    x: (2 * offsetX) / canvas.clientWidth - 1,
+    y: 1 - (2 * offsetY) / canvas.clientHeight,
+  });
+  canvas.addEventListener(
+    "pointerdown",
+    (event) => {
+      if (drag || event.button !== 0 || !(drag = current().grab(place(event)))) return;
+      event.stopImmediatePropagation();
+      canvas.setPointerCapture(event.pointerId);
+    },
+    { capture: true },
+  );
+  canvas.addEventListener("pointermove", (event) => drag?.(place(event)));
+  for (const end of ["pointerup", "pointercancel"])
+    canvas.addEventListener(end, () => {
+      if (drag) current().simulation.release();
+      drag = null;
+    });
+}
+
+function shown({ simulation, body, pace }, command, playing) {
+  const { motion, fell } = simulation.task, { units } = body.task;
+  const speed = Math.hypot(motion[0] * units[0], motion[1] * units[1]);
+  const asked = body.task.headed
+    ? `forward ${command[0].toFixed(1)}, left ${command[1].toFixed(1)}, turn ${command[2].toFixed(1)}`
+    : `course ${((simulation.task.course * 180) / Math.PI).toFixed(0)} degrees`;
+  const state = playing ? (fell ? "fallen" : pace < 0.9 ? `slow motion, ${pace.toFixed(1)} of real time` : "") : "paused";
+  return [`${speed.toFixed(2)} m/s`, asked, state].filter(Boolean).join(" \u00b7 ");
+}
+
+async function main() {
+  const [bodies, wasmBinary] = await Promise.all([
+    unpacked(byId("data").textContent),
+    bytes(byId("engine").textContent),
+  ]);
+  const mujoco = await loadMujoco({ wasmBinary });
+  const inputs = new Inputs(byId("stick"));
+  const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
+  const choice = byId("body"), ground = byId("ground");
+  bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
+  choice.parentElement.hidden = bodies.length === 1;
+  byId("help").open = window.innerWidth > 700 && window.innerHeight > 500;
+
+  const change = () => {
+    state.play?.free();
+    const old = document.querySelector("canvas"), canvas = old.cloneNode(); // with a context of its own
+    old.replaceWith(canvas);
+    const body = bodies[choice.value];
+    state.play = new Play(mujoco, body, body.grounds[ground.value], canvas);
+    canvas.setAttribute("aria-label", `${body.name} on ${ground.value} ground`);
+    pulls(canvas, () => state.play);
+    const stale = () => (state.stale = true);
+    state.play.view.controls.addEventListener("change", stale);
+    stale();
+  };
+  const pause = (playing = !state.playing) => {
+    Object.assign(state, { playing, stale: true });
+    byId("pause").textContent = playing ? "pause" : "go on";
+  };
+  const actions = {
+    kick: () => state.play.kick(),
+    restart: () => (state.play.restart(), (state.stale = true)),
+    pause: () => pause(),
+  };
+  const keys = { Space: "kick", KeyR: "restart", KeyP: "pause" };
+  window.addEventListener("resize", () => (state.stale = true));
+  for (const [name, act] of Object.entries(actions))
+    byId(name).addEventListener("click", (event) => {
+      act();
+      if (event.detail) event.target.blur(); // by a pointer: the space bar kicks
+    });
+  for (const list of [choice, ground]) list.addEventListener("change", () => (list.blur(), change()));
+  window.addEventListener("keydown", (event) => {
+    const name = keys[event.code];
+    const used = event.code === "Space" && event.target.closest("button, select, summary"); // pressed by the space bar
+    if (!name || used || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+    event.preventDefault();
+    actions[name]();
+  });
+  change();
+
+  let last = null;
+  const frame = (now) => {
+    const seconds = last === null ? 0 : Math.min(now - last, 100) / 1000;
+    last = now;
+    if (state.playing) state.play.advance(seconds, inputs.command);
+    if (state.playing || state.stale) {
+      state.stale = false;
+      state.play.draw();
+      byId("state").textContent = shown(state.play, inputs.command, state.playing);
+    }
+    requestAnimationFrame(frame);
+  };
+  requestAnimationFrame(frame);
+  window.play = { state, inputs, pause }; // for tests
+}
+
+main();

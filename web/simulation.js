@@ -1,0 +1,122 @@
+// A body on some ground in MuJoCo's simulation, driven by a policy in a task.
+import { Law } from "./law.js";
+import { Network } from "./network.js";
+import { Task } from "./task.js";
+
+const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
+const GRAVITY = 9.81; // m/s^2
+
+const dot = (first, second) => first.reduce((sum, value, index) => sum + value * second[index], 0);
+const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+
+const POLICIES = { law: Law, network: Network };
+
+// A height field, in whose cells two triangles meet from the corner of lowest to that of highest x and y.
+export class Field {
+  constructor(model) {
+    const [halfX, halfY, top] = model.hfield_size;
+    this.rows = model.hfield_nrow[0];
+    this.columns = model.hfield_ncol[0];
+    this.low = [-halfX, -halfY];
+    this.cell = [(2 * halfX) / (this.columns - 1), (2 * halfY) / (this.rows - 1)];
+    this.nodes = Float64Array.from(model.hfield_data, (share) => top * share);
+  }
+
+  // Rows along y of heights along x.
+  get heights() {
+    const { rows, columns, nodes } = this;
+    return Array.from({ length: rows }, (_, row) => Array.from(nodes.subarray(row * columns, (row + 1) * columns)));
+  }
+
+  // The height under a point, m; beyond the edge that of the edge.
+  height(x, y) {
+    const ends = [this.columns, this.rows];
+    const place = [x, y].map((value, i) => Math.min(Math.max((value - this.low[i]) / this.cell[i], 0), ends[i] - 1));
+    const [column, row] = place.map((value, i) => Math.min(Math.floor(value), ends[i] - 2));
+    const u = place[0] - column, v = place[1] - row, right = u > v;
+    const first = row * this.columns + column;
+    const low = this.nodes[first], high = this.nodes[first + this.columns + 1];
+    const corner = this.nodes[first + (right ? 1 : this.columns)];
+    return low + (right ? u : v) * (corner - low) + (right ? v : u) * (high - corner);
+  }
+}
+
+export class Simulation {
+  // Takes the module of MuJoCo, a body of a page's data, and one of its grounds.
+  constructor(mujoco, body, ground) {
+    this.mujoco = mujoco;
+    this.body = body;
+    this.model = mujoco.MjModel.from_xml_string(ground.xml);
+    this.data = new mujoco.MjData(this.model);
+    this.field = this.model.nhfield ? new Field(this.model) : null;
+    this.policy = body.policy;
+    this.start = ground.start;
+    this.pull = null; // of the player
+    this.restart();
+  }
+
+  // Starts anew, from a pose and velocities that may be given.
+  restart(qpos = this.start, qvel = []) {
+    const { mujoco, model, data } = this;
+    mujoco.mj_resetData(model, data);
+    data.qpos.set(qpos);
+    data.qvel.set(qvel);
+    mujoco.mj_forward(model, data);
+    this.task = new Task(this.body.task, (x, y) => (this.field ? this.field.height(x, y) : 0));
+    this.task.begin(data);
+    this.driver = new POLICIES[this.policy.kind](this.policy.constants);
+    this.count = 0; // substeps
+  }
+
+  // Takes one substep, at the start of a control step with a new action and command [forward, left, turning].
+  substep(command) {
+    const { mujoco, model, data, task, body: { substeps } } = this;
+    if (this.count % substeps === 0) {
+      const action = this.driver.act(task.observe(data));
+      task.command(command);
+      data.ctrl.set(action);
+    }
+    if (this.pull) this.drag(this.pull);
+    mujoco.mj_step(model, data);
+    this.count += 1;
+    if (this.count % substeps === 0) task.after(data);
+  }
+
+  // Takes hold of a part at a point in its frame, which is at a point of the world, m.
+  grab(part, place, point) {
+    this.pull = { body: this.body.task.torso + part, place, point, target: point };
+  }
+
+  // Pulls a part at a point towards a target, like a damped spring: a distance of h weighs STIFFNESS times the body.
+  drag(pull) {
+    const { data, body: { height, timestep, task: { weight } } } = this;
+    const before = pull.point, turn = data.xmat.subarray(9 * pull.body, 9 * pull.body + 9);
+    pull.point = [0, 1, 2].map((i) => data.xpos[3 * pull.body + i] + dot(turn.subarray(3 * i, 3 * i + 3), pull.place));
+    const stretch = pull.point.map((value, i) => pull.target[i] - value);
+    const speed = pull.point.map((value, i) => (value - before[i]) / timestep);
+    const damping = Math.sqrt(STIFFNESS / (height * GRAVITY)); // half of the critical one
+    const most = STRONGEST / Math.max(Math.hypot(...stretch) / height, STRONGEST / STIFFNESS);
+    const force = stretch.map((value, i) => weight * ((most * value) / height - damping * speed[i]));
+    const arm = pull.point.map((value, i) => value - data.xipos[3 * pull.body + i]);
+    data.xfrc_applied.set([...force, ...cross(arm, force)], 6 * pull.body);
+  }
+
+  // Lets go of what is held.
+  release() {
+    this.pull = null;
+    this.data.xfrc_applied.fill(0);
+  }
+
+  // Adds a velocity [x, y] to the torso's, m/s.
+  kick([x, y]) {
+    const qvel = this.data.qvel;
+    qvel[0] += x;
+    qvel[1] += y;
+  }
+
+  // MuJoCo's memory is not collected.
+  free() {
+    this.data.delete();
+    this.model.delete();
+  }
+}

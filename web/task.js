@@ -1,0 +1,100 @@
+// What a task reads from the simulation and remembers, as arc_suite.tasks.commanded and walk define it; no reward.
+
+const TURN = 2 * Math.PI;
+
+const wrapped = (angle) => angle + Math.PI - TURN * Math.floor((angle + Math.PI) / TURN) - Math.PI;
+
+function yaw([w, x, y, z]) {
+  return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+}
+
+// An orientation turned by an angle about the vertical, rad.
+function turned([w, x, y, z], angle) {
+  const cosine = Math.cos(0.5 * angle), sine = Math.sin(0.5 * angle);
+  return [cosine * w - sine * z, cosine * x - sine * y, cosine * y + sine * x, cosine * z + sine * w];
+}
+
+// A vector of the world in the frame of a heading, rad: forward and left.
+function headed(x, y, heading) {
+  const cosine = Math.cos(heading), sine = Math.sin(heading);
+  return [cosine * x + sine * y, cosine * y - sine * x];
+}
+
+// A body in a task. A task with a command observes in the frame of the torso's heading; one without a command, which
+// walks along x, in the frame of a course, by which it is steered.
+export class Task {
+  constructor(constants, ground) {
+    this.constants = constants;
+    this.ground = ground;
+    this.desired = [0, 0, 0]; // command: forward, left and turning, in units of the body
+    this.motion = [0, 0, 0]; // its mean velocity in the same units
+    this.course = 0; // rad
+    this.phase = 0; // of the gait, rad
+    this.fell = false;
+  }
+
+  begin(data) {
+    this.place = this.placed(data);
+  }
+
+  placed({ xpos, qpos }) {
+    const { torso } = this.constants;
+    return [xpos[3 * torso], xpos[3 * torso + 1], yaw(qpos.subarray(3, 7))];
+  }
+
+  // Sets the command of a control step, from -1 to 1 each.
+  command(desired) {
+    const { headed: commanded, units, step } = this.constants;
+    this.desired = desired;
+    if (!commanded) this.course += desired[2] * units[2] * step;
+  }
+
+  get going() {
+    return !this.constants.headed || this.desired.some((value) => value !== 0);
+  }
+
+  // Takes the readings after a control step: clock, health, mean velocity.
+  after(data) {
+    const { turn, leak, units, step } = this.constants;
+    const place = this.placed(data), [x, y, heading] = this.place;
+    if (this.going) this.phase = (this.phase + turn) % TURN;
+    const moved = [...headed(place[0] - x, place[1] - y, heading), wrapped(place[2] - heading)];
+    this.motion = this.motion.map((value, i) => (1 - leak) * value + (leak * moved[i]) / (step * units[i]));
+    this.place = place;
+    this.fell = this.fallen(data);
+  }
+
+  fallen({ qpos, cfrc_ext: forces }) {
+    const { lowest, lying, least_upright: least, weight, torso } = this.constants;
+    const [, x, y] = qpos.subarray(3, 7);
+    return !(this.height(qpos) >= lowest && forces[6 * torso + 5] / weight < lying && 1 - 2 * (x * x + y * y) >= least);
+  }
+
+  height(qpos) {
+    return qpos[2] - this.ground(qpos[0], qpos[1]);
+  }
+
+  // Returns the blocks of an observation by name.
+  observe(data) {
+    const { headed: commanded } = this.constants, qpos = data.qpos, qvel = data.qvel;
+    const heading = commanded ? yaw(qpos.subarray(3, 7)) : this.course;
+    const shown = this.going ? 1 : 0;
+    return {
+      posture: [this.height(qpos), ...turned(qpos.subarray(3, 7), -heading), ...qpos.subarray(7)],
+      velocities: [...headed(qvel[0], qvel[1], heading), ...qvel.subarray(2)],
+      contact_forces: this.forces(data.cfrc_ext, heading),
+      gait_clock: [shown * Math.sin(this.phase), shown * Math.cos(this.phase)],
+      command: [...this.desired, ...this.motion],
+    };
+  }
+
+  // Torque and force on each part, in units of the task, as a heading shows them.
+  forces(forces, heading) {
+    const { torso, parts, force_unit: unit } = this.constants;
+    return Array.from({ length: parts }, (_, part) => {
+      const force = Array.from(forces.subarray(6 * (torso + part), 6 * (torso + part + 1)), (value, i) => value / unit[i]);
+      const across = [0, 3].flatMap((i) => [...headed(force[i], force[i + 1], heading), force[i + 2]]);
+      return across.map((value) => Math.min(Math.max(value, -1), 1));
+    }).flat();
+  }
+}
