@@ -4,20 +4,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from conftest import WORLDS
+from conftest import WORLDS, recorded, stepped
 from mujoco import mjx as upstream
 from mujoco.mjx._src import collision_driver
 
-from arc_suite.cpg import Demonstrator
 from arc_suite.envs import mjx
-from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import generator
 from arc_suite.simulation import device
 
 CAPSULE = collision_driver.GeomType.PLANE, collision_driver.GeomType.CAPSULE
 BODIES = {name: name for name in ("leaper", "queen", "bastion", "tick")} | {"random": generator.random_body(3)}
-# Of a walk; among them the first step, into which feet start in the ground, and places of the gait.
-STEPS = 0, 1, 2, 5, 10, 20, 33, 47
 
 
 @pytest.fixture
@@ -39,22 +35,6 @@ def frames_of_c(monkeypatch):
     monkeypatch.setitem(collision_driver._COLLISION_FUNC, CAPSULE, turned)
 
 
-def recorded(body, preset):
-    """Yield a walk's step, and state and memory of its environments before and after it."""
-    environments = VectorEnv(body, "walk", WORLDS, 1)
-    demonstrator, task = Demonstrator(environments, preset), environments.task.definition
-    warmstart = environments.batch._simulations.bind("qacc_warmstart")
-    observation, _ = environments.reset(seed=0)
-    demonstrator.reset(range(WORLDS))
-    for step in range(max(STEPS) + 1):
-        data = environments.batch.data
-        before = data.qpos.copy(), data.qvel.copy(), warmstart.copy(), environments._memory
-        action = demonstrator.act(task.split(observation))
-        observation, reward, *_ = environments.step(action)
-        if step in STEPS:
-            yield step, before, action, environments, observation, reward
-
-
 @pytest.mark.parametrize("body", BODIES)
 def test_one_control_step(body, frames_of_c):
     with jax.enable_x64(True):
@@ -63,10 +43,7 @@ def test_one_control_step(body, frames_of_c):
         begun, places, terms = start(jnp.arange(WORLDS)), [], []
         preset = "tuned" if body != "random" else "medium"
         for count, before, action, environments, _, reward in recorded(BODIES[body], preset):
-            qpos, qvel, warmstart, memory = jax.tree.map(jnp.asarray, before)
-            time = jnp.full(WORLDS, count * env.dt)
-            data = begun.data.replace(qpos=qpos, qvel=qvel, qacc_warmstart=warmstart, time=time)
-            state = step(begun.replace(data=data, info={**begun.info, "memory": memory}), action)
+            state = stepped(env, begun, step, count, before, action)
 
             theirs = environments.batch.data
             places.append(abs(state.data.qpos - theirs.qpos).max(axis=-1))
