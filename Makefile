@@ -18,6 +18,8 @@
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax
 # make check-agents-release  the same for every algorithm, and for studies that are killed
 # make check-bodies  environments of different bodies of every layout, task and autoreset mode, and a census of varied ones; minutes
+# make check-mjx  worlds on MJX and MuJoCo Warp, on a processor, in an environment of their own; minutes
+# make bench-gpu  measures worlds on this machine's GPU, writes its table into docs/gpu.md
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
@@ -33,7 +35,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-studio check-glb check-blender check-godot check-jax check-agents check-agents-release check-bodies bench survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -185,6 +187,15 @@ check-jax: setup.cfg
 	$(VENV)/bin/python -m pip install -q -e '.[test,jax]'
 	$(VENV)/bin/python -m pytest tests/tasks/test_jax.py
 
+# Compiled functions are kept, and Brax and MuJoCo Playground are there for their wrappers and trainers.
+check-mjx check-mjx-release bench-gpu: VENV := .venv-mjx
+check-mjx: MARKS := not release
+check-mjx-release: MARKS := release
+check-mjx check-mjx-release: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[test,agents,mjx-warp]' playground==0.2.0 brax==0.14.2
+	JAX_COMPILATION_CACHE_DIR=$(VENV)/compiled $(VENV)/bin/python -m pytest -m "$(MARKS)" tests/mjx
+
 # pandas before 3, as what rliable needs does not know it yet.
 check-agents check-agents-release: VENV := .venv-jax
 check-agents: MARKS := not long and not release
@@ -199,6 +210,11 @@ check-bodies: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) -m pytest $(PARALLEL) tests/envs/test_bodies.py tests/models/test_families.py
 	$(VENV)/bin/arc-suite survey --family varied --count 120
+
+bench-gpu: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[agents,mjx-warp]' 'jax[cuda12]>=0.10'
+	$(VENV)/bin/python tools/bench_gpu.py --document docs/gpu.md
 
 bench: $(INSTALLED)
 	$(PYTHON) tools/bench.py --plot docs/performance.png --document docs/performance.md

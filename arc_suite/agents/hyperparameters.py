@@ -173,6 +173,8 @@ class ProximalPolicy:
 
     Attributes:
         start: folder of a run, or a policy file, whose policy learning starts from; "" for none.
+        simulation: what simulates the environments: "mujoco", on a processor; or "mjx" or "warp", the
+            implementations of `arc_suite.envs.mjx`, where all of learning stays on JAX's device.
         num_envs: environments.
         horizon: control steps of each environment between updates.
         symmetry_augmentation: whether a mirrored copy of each transition is learned from, for symmetric bodies.
@@ -196,6 +198,7 @@ class ProximalPolicy:
     """
 
     start: str = ""
+    simulation: str = "mujoco"
     num_envs: int = 64
     horizon: int = 32
     symmetry_augmentation: bool = True
@@ -218,6 +221,7 @@ class ProximalPolicy:
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
         _check(self, {"num_envs": 1, "horizon": 1, "epochs": 1, "minibatch": 1, "hidden": 1, "value_warm_up": 0})
+        checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
         _check_shares(self, "discount", "clip", "policy_rate", "value_rate")
         for name in ("gae_lambda", "normalize_until"):
             checks.number(name, getattr(self, name), 0.0, 1.0)

@@ -54,13 +54,17 @@ class RunContext(NamedTuple):
     threads: int = 1
     checkpoint: Mapping[str, np.ndarray] | None = None
 
+    @property
+    def first_seed(self) -> int:
+        """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
+        return _SEEDS * (1 + self.seed)
+
     def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv:
         """Return environments to learn in, seeded apart from evaluation and from other runs.
 
         Their `reset()` begins the first episodes.
         """
-        seed = _SEEDS * (1 + self.seed)
-        return self.setup.make_vec(num_envs, seed=seed, num_threads=self.threads, autoreset_mode=mode)
+        return self.setup.make_vec(num_envs, seed=self.first_seed, num_threads=self.threads, autoreset_mode=mode)
 
     def next_evaluation(self, step: int) -> int:
         """Return the environment step of the first evaluation after `step`."""

@@ -31,8 +31,8 @@ class Moments(NamedTuple):
     def after(self, vectors: np.ndarray) -> Self:
         """Return the moments with more vectors (..., size) (Chan, Golub and LeVeque, 1979)."""
         vectors = vectors.reshape(-1, vectors.shape[-1])
-        mean = vectors.mean(axis=0, dtype=float)
-        squares = ((vectors - mean) ** 2).sum(axis=0)
+        mean = np.asarray(vectors.mean(axis=0, dtype=float), float)  # of NumPy or JAX
+        squares = np.asarray(((vectors - mean) ** 2).sum(axis=0), float)
         count = self.count + len(vectors)
         apart = mean - self.mean
         return Moments(

@@ -1,22 +1,23 @@
-"""Proximal policy optimisation in a vector environment.
+"""Proximal policy optimisation in a vector environment, or in worlds on a GPU.
 
 With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`).
 A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
 ages, so their time limits fall on different steps.
 """
 
-import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.agents import inputs, learner, networks
+from arc_suite.agents import collecting, inputs, learner, networks
 from arc_suite.agents import proximal_policy as ppo
+from arc_suite.agents.collecting import Collector
 from arc_suite.agents.hyperparameters import ProximalPolicy
-from arc_suite.agents.learner import Diverged, RunContext, Slice, generator
+from arc_suite.agents.learner import RunContext, Slice, generator
 from arc_suite.agents.normaliser import Moments
 from arc_suite.policies import network
 from arc_suite.policies.network import Layer
@@ -33,8 +34,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     """
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
-    seed, environment = context.seed, context.environment(hp.num_envs)
-    task, joints = environment.task.definition, environment.single_action_space.shape[0]
+    seed, collector = context.seed, _collector(hp, context)
+    task, joints = collector.task, collector.joints
     symmetry = inputs.symmetry(task) if hp.symmetry_augmentation else None
     moments, policy = Moments.none(task.size), None
     normalise = moments.layer()
@@ -42,10 +43,6 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         normalise, policy = _read(hp, context, task)
     state = ppo.begin(hp, generator(seed, "networks", 0), task.size, joints, policy)
     iterations = 0
-    observation, _ = environment.reset()
-    if math.isfinite(task.step_limit):
-        ages = np.arange(hp.num_envs) * int(task.step_limit) // hp.num_envs
-        environment.restore(environment.snapshot() | {"steps": ages})
 
     if (saved := context.checkpoint) is not None:
         with learner.restoring():
@@ -53,7 +50,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
             normalise = networks.restored_layer("normaliser", normalise, saved)
             iterations = int(saved["iterations"])
-            observation = learner.restore_environment(environment, saved)
+            collector.restore(saved)
 
     while True:
         # Schedules over the length of the run.
@@ -64,8 +61,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         with_policy = iterations * hp.horizon >= hp.value_warm_up
 
         # Act for the horizon.
-        random = generator(seed, "noise", iterations)
-        rollout, observation = roll_out(hp, environment, observation, state.policy, normalise, std, random, step)
+        rollout = collector.roll_out(state.policy, normalise, std, iterations, step)
 
         # Learn from it, in epochs of minibatches.
         batch = batch_of(hp, rollout, state.values, normalise, symmetry)
@@ -98,47 +94,25 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             **networks.named("moments", moments),
             **networks.named("normaliser", normalise.arrays),
             "iterations": np.array(iterations),
-            **learner.environment_arrays(environment),
+            **collector.arrays(),
         }
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, layers, checkpoint)
 
 
-def roll_out(
-    hp: ProximalPolicy, environment, observation, policy, normalise: Layer, std: float, random, step: int
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Act in all environments for the horizon.
+def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
+    if hp.simulation == "mujoco":
+        return collecting.Environments(hp, context)
+    from arc_suite.agents import worlds  # needs the extra `mjx`
 
-    Returns:
-        The transitions, arrays (horizon, num_envs, ...) by name, and the observations after them.
-
-    Raises:
-        Diverged: an action is not finite.
-    """
-    names = "observations", "actions", "means", "rewards", "terminated", "ended", "next_observations"
-    rollout = {name: [] for name in names}
-    for _ in range(hp.horizon):
-        mean = np.asarray(ppo.mean_action(policy, network.forward([normalise], observation)))
-        if not np.isfinite(mean).all():
-            raise Diverged("an action is not finite", step)
-        action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)
-        after, rewards, terminated, truncated, info = environment.step(action)
-        ended = terminated | truncated
-        next_observation = after.copy()
-        for index in np.flatnonzero(ended):
-            next_observation[index] = info["final_obs"][index]
-        values = observation, action, mean, rewards, terminated, ended, next_observation
-        for array, value in zip(rollout.values(), values, strict=True):
-            array.append(value)
-        observation = after
-    return {name: np.stack(arrays) for name, arrays in rollout.items()}, observation
+    return worlds.Worlds(hp, context)
 
 
-def batch_of(hp: ProximalPolicy, rollout: Mapping[str, np.ndarray], values, normalise: Layer, symmetry) -> ppo.Batch:
+def batch_of(hp: ProximalPolicy, rollout: Mapping[str, Any], values, normalise: Layer, symmetry) -> ppo.Batch:
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
-    size = rollout["observations"].shape[-1]
+    size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
     observations = network.forward([normalise], rollout["observations"])
-    here = np.asarray(ppo.value(values, observations))
-    there = np.asarray(ppo.value(values, network.forward([normalise], rollout["next_observations"])))
+    here = numpy.asarray(ppo.value(values, observations))
+    there = numpy.asarray(ppo.value(values, network.forward([normalise], rollout["next_observations"])))
     rewards = (1.0 - hp.discount) * rollout["rewards"]
     advantages = ppo.advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
     returns = (advantages + here).ravel()
@@ -148,11 +122,11 @@ def batch_of(hp: ProximalPolicy, rollout: Mapping[str, np.ndarray], values, norm
     if symmetry is not None:
         mirror, mirror_action = symmetry
         mirrored = network.forward([normalise], mirror(rollout["observations"]).reshape(-1, size))
-        observations = np.concatenate([observations, mirrored])
+        observations = numpy.concatenate([observations, mirrored])
         # The mirrored action is as probable as the action was. Under the policy's own mean for the mirrored
         # observation, where the policy is not symmetric, its probability would be almost 0 and its gradient huge.
-        actions, means = (np.concatenate([each, mirror_action(each)]) for each in (actions, means))
-        advantages, returns = np.tile(advantages, 2), np.tile(returns, 2)
+        actions, means = (numpy.concatenate([each, mirror_action(each)]) for each in (actions, means))
+        advantages, returns = numpy.tile(advantages, 2), numpy.tile(returns, 2)
     arrays = (observations, actions, means, advantages, returns)
     return ppo.Batch(*(jnp.asarray(array, jnp.float32) for array in arrays))
 

@@ -83,12 +83,13 @@ def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, end
         terminated: (steps, num_envs) booleans: the return after the step is 0.
         ended: (steps, num_envs) booleans: the next step is of another episode.
     """
-    surprise = rewards + hp.discount * np.where(terminated, 0.0, next_values) - values
-    found, last = np.zeros_like(surprise), np.zeros_like(surprise[0])
+    numpy = rewards.__array_namespace__()
+    surprise = rewards + hp.discount * numpy.where(terminated, 0.0, next_values) - values
+    found, last = [], 0.0
     for step in reversed(range(len(surprise))):
-        last = surprise[step] + hp.discount * hp.gae_lambda * np.where(ended[step], 0.0, last)
-        found[step] = last
-    return found
+        last = surprise[step] + hp.discount * hp.gae_lambda * numpy.where(ended[step], 0.0, last)
+        found.append(last)
+    return numpy.stack(found[::-1])
 
 
 @functools.partial(jax.jit, static_argnums=(0, 5), donate_argnums=1)

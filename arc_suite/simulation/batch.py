@@ -60,6 +60,16 @@ class Batch:
         """Positions (count, nmocap, 3) of the arena's movable bodies, live."""
         return self._simulations.bind("mocap_pos")
 
+    @property
+    def models(self) -> list[mujoco.MjModel]:
+        """The model of each simulation."""
+        return self._own or [self._simulations.model] * self._simulations.nsim
+
+    @property
+    def changed(self) -> list[str]:
+        """Names of the models' fields that a reset has ever changed."""
+        return list(self._changed)
+
     def part(self, mask: np.ndarray | int) -> types.SimpleNamespace:
         """Return `data` of some simulations: copies for a mask (count,), views without that axis for an index."""
         return types.SimpleNamespace(**{name: array[mask] for name, array in vars(self.data).items()})

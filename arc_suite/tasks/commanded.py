@@ -164,6 +164,11 @@ class CommandTask(Task):
         command = {"command": mirrors.joined([PLANAR, PLANAR]), **self.command.mirrors}
         return {**paper.symmetry(self.scene.body, self.parameters), **command, **self.settings.ground.mirrors}
 
+    @property
+    def adapts(self) -> bool:
+        """Whether there is a curriculum."""
+        return self.settings.ground.adapts
+
     @functools.cached_property
     def parameters(self) -> Parameters:
         """The prescribed gait."""

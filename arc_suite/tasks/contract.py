@@ -165,6 +165,11 @@ class Task(ABC):
         return None
 
     @property
+    def adapts(self) -> bool:
+        """Whether the start of an episode hangs on the outcome of the one before, as in a curriculum."""
+        return False
+
+    @property
     def parameters(self) -> Parameters | None:
         """What the task prescribes of a walk: its gait and its standing pose; None where it prescribes none."""
         return None
@@ -294,7 +299,8 @@ class Task(ABC):
             ValueError: they are not those that the task declares.
         """
         self._check(blocks)
-        return np.concatenate(list(blocks.values()), axis=-1, dtype=dtype)
+        arrays = list(blocks.values())
+        return arrays[0].__array_namespace__().concatenate(arrays, axis=-1, dtype=dtype)
 
     def named(self, blocks: Mapping[str, np.ndarray]) -> collections.OrderedDict:
         """Return observed blocks by name, in new memory.

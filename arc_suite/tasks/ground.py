@@ -50,6 +50,11 @@ class Ground:
     blocks: ClassVar[Mapping[str, int]] = {}
 
     @property
+    def adapts(self) -> bool:
+        """Whether the outcome of an episode chooses where the next one starts."""
+        return False
+
+    @property
     def settings(self) -> tuple[str, ...]:
         """The names of the fields that a caller may set."""
         return ()
@@ -221,6 +226,11 @@ class Lanes(Ground):
             terrain_seed=checks.integer("terrain_seed", given["terrain_seed"], 0, 2**32 - 1),
             **{name: checks.number(name, given[name], *terrain.SIZES[name]) for name in sizes},
         )
+
+    @property
+    def adapts(self) -> bool:
+        """Whether there is a curriculum."""
+        return self.curriculum
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return the lanes, long enough for the distance at the target velocity, and a seventh more."""

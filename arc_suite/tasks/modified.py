@@ -142,6 +142,7 @@ class Modified(Task):
     reads = property(lambda self: self.task.reads)
     commands = property(lambda self: self.task.commands)
     demonstrators = property(lambda self: self.task.demonstrators)
+    adapts = property(lambda self: self.task.adapts)
     actions = property(lambda self: self.changes.actions)
     parameters = property(lambda self: self.task.parameters)
     target_velocity = property(lambda self: self.task.target_velocity)

@@ -39,10 +39,8 @@ def begun(tmp_path):
 
 def rolled_out(agent):
     """Transitions of a horizon from the latest slice on, and the batch that they make."""
-    hp, random = agent.hp, np.random.default_rng(0)
-    inputs = hp, agent.environment, agent.observation, agent.state.policy, agent.normalise, 0.3, random, 0
-    rollout, _ = on_policy.roll_out(*inputs)
-    return rollout, on_policy.batch_of(hp, rollout, agent.state.values, agent.normalise, agent.symmetry)
+    rollout = agent.collector.roll_out(agent.state.policy, agent.normalise, 0.3, 0, 0)
+    return rollout, on_policy.batch_of(agent.hp, rollout, agent.state.values, agent.normalise, agent.symmetry)
 
 
 def weights(tree):
@@ -173,7 +171,7 @@ def test_time_limits_fall_on_different_steps_and_bootstrap(begun):
     # After the last step of an episode comes its own last observation, not the next one's first.
     last = rollout["next_observations"][1, 3]
     assert rollout["ended"][1, 3] and not np.array_equal(last, rollout["observations"][2, 3])
-    split = agent.environment.task.split
+    split = agent.collector.environment.task.split
     assert_allclose(split(rollout["observations"][2, 3])["gait_clock"], (0.0, 1.0))
     assert split(last)["gait_clock"][0] > 0.1
     value = np.asarray(ppo.value(agent.state.values, network.forward([agent.normalise], last[None])))[0]

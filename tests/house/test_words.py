@@ -85,7 +85,8 @@ ALLOWED = {
     "fitted": r"arenas\.|tasks\.fitting",  # sizes and parameters that are fitted to a body
     "warm_up": r"value_warm_up$",  # the field's word
     "cloning": r" BehaviourCloning$",  # what bc abbreviates
-    "scene": r"tasks\.|models\.|task_view\.",  # arena and body of a task; lights and floor of a picture
+    # Arena and body of a task; lights and floor of a picture; arguments that wrappers of others hand on.
+    "scene": r"tasks\.|models\.|task_view\.|mjx\.Env\.render",
 }
 
 

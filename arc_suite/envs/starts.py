@@ -1,0 +1,68 @@
+"""Tables of starts: the episodes of the first seeds of a task, drawn on the host for batches on a GPU."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from arc_suite import checks
+from arc_suite.envs import trees
+from arc_suite.envs.vector import VectorEnv
+
+MOST = 16_384
+_CHUNK = 256  # seeds that are drawn together: models of their own take memory
+
+# Fields of `MjModel` that `mj_setConst` derives from those that an episode changes, and that simulations read.
+_DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0")
+
+
+class Starts(NamedTuple):
+    """How the episodes of consecutive seeds start; a leading axis for the seeds.
+
+    Attributes:
+        qpos: (seeds, nq) positions.
+        qvel: (seeds, nv) velocities.
+        mocap_pos: (seeds, nmocap, 3) m, of obstacles.
+        memory: of the task, from which the first step starts.
+        observation: (seeds, size) float32.
+        model: fields of the model that differ from seed to seed, by name.
+    """
+
+    qpos: np.ndarray
+    qvel: np.ndarray
+    mocap_pos: np.ndarray
+    memory: Any
+    observation: np.ndarray
+    model: dict[str, np.ndarray]
+
+
+def drawn(
+    domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int
+) -> tuple[Starts, list[str]]:
+    """Return the starts of a number of seeds, and the names of the task's terms.
+
+    Args:
+        domain_name: as in `arc_suite.load`.
+        task_name: as in `arc_suite.load`.
+        task_kwargs: as in `arc_suite.load`.
+        count: how many.
+        seed: the first.
+
+    Raises:
+        ValueError: as `arc_suite.load`, or a count out of range.
+    """
+    checks.integer("num_starts", count, 1, MOST)
+    environments = VectorEnv(domain_name, task_name, min(count, _CHUNK), task_kwargs=task_kwargs)
+    task, batch = environments.task.definition, environments.batch
+    parts = []
+    for first in range(0, count, _CHUNK):
+        observation, _ = environments.reset(seed=seed + first)
+        state = batch.data.qpos.copy(), batch.data.qvel.copy(), batch.mocap_pos.copy()
+        names = [*batch.changed, *_DERIVED] if batch.changed else []
+        model = {name: np.stack([getattr(model, name) for model in batch.models]) for name in names}
+        parts.append(Starts(*state, environments._memory, observation, model))
+    terms = task.terms(environments._memory, task.read(batch.data))
+    environments.close()
+    joined = {name: np.concatenate([part.model[name] for part in parts])[:count] for name in parts[0].model}
+    table = trees.mapped(lambda *arrays: np.concatenate(arrays)[:count], *(part._replace(model=None) for part in parts))
+    return table._replace(model=joined), list(terms)

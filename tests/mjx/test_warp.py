@@ -1,0 +1,32 @@
+"""MuJoCo Warp on a processor: slow, and the only implementation of terrain."""
+
+import numpy as np
+import pytest
+from conftest import compiled, walked
+
+pytest.importorskip("warp", reason="of the extra `mjx-warp`: make check-mjx-release")
+pytestmark = pytest.mark.release
+
+SEEDS = 10
+
+
+@pytest.mark.parametrize(("task", "apart"), [("rough", 0.02), ("stairs", 0.03)])
+def test_terrain(task, apart):
+    env, start, step = compiled("leaper", task, impl="warp", worlds=SEEDS)
+    state, environments, ours, theirs = walked(env, start, step, 300)
+    distances = env.task.progress(state.info["memory"])["distance"], environments.task.progress["distance"]
+    assert np.mean(distances[0]) == pytest.approx(np.mean(distances[1]), rel=0.01)
+    assert ours.sum() == pytest.approx(theirs.sum(), rel=apart)
+    np.testing.assert_array_equal(state.metrics["overflow"], np.zeros(SEEDS))
+
+
+def test_overflow_is_told(monkeypatch):
+    """A table of two contacts: Warp drops the others, and says so."""
+    from arc_suite.simulation import device
+
+    monkeypatch.setattr(device, "table_sizes", lambda model: (2, 64))
+    compiled.cache_clear()
+    _, start, step = compiled("leaper", impl="warp", worlds=2)
+    state = step(start(np.arange(2)), np.zeros((2, 12)))
+    compiled.cache_clear()
+    assert np.asarray(state.metrics["overflow"]).any()
