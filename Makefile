@@ -10,6 +10,7 @@
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
 # make web     bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
+# make check-studio  the studio in Chromium: sliders moved, creature changed, command followed, files saved
 # make check-play  walks bodies of pages in Node against Python, and plays pages in Chromium by keys and pointers
 # make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3; the sample project is linted
@@ -34,7 +35,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -141,6 +142,14 @@ check-web: setup.cfg $(VIEWER)
 	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
 		--outfile=$(ENGINES)/loader.js --log-level=warning
 	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
+
+check-studio: VENV := .venv-studio
+check-studio: setup.cfg $(VIEWER)
+	tools/ensure_venv.sh $(VENV)
+	tools/ensure_egl.sh $(VENV)/bin/python
+	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
+	$(VENV)/bin/python -m pip install -q -e '.[test,studio]' playwright==1.65.2
+	$(VENV)/bin/python -m pytest tests/studio
 
 check-play: VENV := .venv-web
 check-play: setup.cfg $(VIEWER)

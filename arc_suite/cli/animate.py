@@ -1,4 +1,4 @@
-"""Make animation clips of a robot for game engines (.glb), and their metrics (.clips.json).
+"""Make animation clips for game engines (.glb), and their metrics (.clips.json).
 
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb

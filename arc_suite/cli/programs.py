@@ -10,6 +10,7 @@ PROGRAMS = (
     "animate",
     "play",
     "view",
+    "studio",
     "evaluate",
     "style",
     "collect",

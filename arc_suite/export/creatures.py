@@ -40,7 +40,7 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         generator: what the file says that it was made by.
     """
     document, (parts, looks) = Document(generator), described(body)
-    meshes = [_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
+    meshes = [part_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
     materials = {name: document.add("materials", _material(name, look)) for name, look in looks.items()}
     root = document.add("nodes", {"name": "root"})
     nodes = [document.add("nodes", _node(part)) for part in parts]
@@ -63,8 +63,8 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
     return document.glb()
 
 
-def _meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
-    """The shapes of a part by material, those of one as one mesh in the part's frame."""
+def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
+    """Return the shapes of a part by material, those of one as one mesh in the part's frame."""
     meshes: dict[str, list[Mesh]] = {}
     for shape in part.shapes:
         mesh = shapes.shape(shape.kind, shape.size, tolerance)

@@ -33,13 +33,29 @@ def scenery(track: Track) -> dict[str, Any]:
     """
     environment = track.setup.load()
     environment.reset(track.seed)
+    margin = _MARGIN * track.body.torso.standing_height
+    low, high = track.positions[:, :2].min(axis=0) - margin, track.positions[:, :2].max(axis=0) + margin
+    found = ground(environment, low, high)
+    styles, marks = _marks(environment, track)
+    environment.close()
+    return found | {"styles": styles, "marks": marks}
+
+
+def ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
+    """Return the ground and the obstacles of an episode between two corners (2,), m: `level` to `solids` of `scenery`.
+
+    Args:
+        environment: of `arc_suite.load`, in an episode.
+        low: the corner of the least x and y.
+        high: the opposite corner.
+    """
     arena = environment.task.definition.scene.arena
-    model = mujoco.MjModel.from_xml_string(models.assemble(track.body, arena, decorated=True).to_xml_string())
+    model = mujoco.MjModel.from_xml_string(
+        models.assemble(environment.task.body, arena, decorated=True).to_xml_string()
+    )
     data = mujoco.MjData(model)
     data.mocap_pos[:] = environment.physics.data.mocap_pos
     mujoco.mj_kinematics(model, data)
-    margin = _MARGIN * track.body.torso.standing_height
-    low, high = track.positions[:, :2].min(axis=0) - margin, track.positions[:, :2].max(axis=0) + margin
     found: dict[str, Any] = {"level": arena.is_level, "planes": [], "fields": [], "solids": []}
     for geom in range(model.ngeom):
         if not model.geom(geom).name.startswith("floor"):
@@ -51,9 +67,7 @@ def scenery(track: Track) -> dict[str, Any]:
             found["fields"].append(_field(model, model.geom_dataid[geom], place, low, high))
         elif (place[:2] + size[:2].max() > low).all() and (place[:2] - size[:2].max() < high).all():
             found["solids"].append(_solid(model, geom, KINDS[kind], place))
-    styles, marks = _marks(environment, track)
-    environment.close()
-    return found | {"styles": styles, "marks": marks}
+    return found
 
 
 def _field(model: mujoco.MjModel, index: int, place, low, high) -> dict[str, Any]:

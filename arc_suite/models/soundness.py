@@ -1,7 +1,7 @@
 """Flaws that keep a body from standing or walking, found in its standing pose without simulation."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -27,10 +27,12 @@ class Flaw(NamedTuple):
     Attributes:
         text: what is wrong, and a value that fits.
         hopeless: whether no body can walk with it.
+        cure: the body with the value that fits; None where the text names none.
     """
 
     text: str
     hopeless: bool
+    cure: Body | None = None
 
 
 def flaws(body: Body) -> list[Flaw]:
@@ -43,15 +45,18 @@ def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
     """Find feet above or below the floor, and parts of the torso below the feet."""
     height, soles = pose.height, pose.soles[:, 2]
     gap = float(height + soles.min())
-    fits = f"standing_height {-soles.min():.3g} fits"
+    fitting = float(f"{-soles.min():.3g}")
+    fits = f"standing_height {fitting:.3g} fits"
     if abs(gap) > _GAP * height:
         where = "hang {:.3g} m above the floor" if gap > 0.0 else "stand {:.3g} m in the floor"
-        yield Flaw(f"feet {where.format(abs(gap))}: {fits}", abs(gap) > _HOPELESS_GAP * height)
+        cure = body.replace(torso=body.torso.replace(standing_height=fitting)) if fitting > 0.0 else None
+        yield Flaw(f"feet {where.format(abs(gap))}: {fits}", abs(gap) > _HOPELESS_GAP * height, cure)
     short = [leg.name for leg, sole in zip(body.legs, soles, strict=True) if sole - soles.min() > _GAP * height]
     if short:
         missing = max(soles) - min(soles)
         names = ", ".join(short[:4]) + ", ..." * (len(short) > 4)
-        yield Flaw(f"feet of {names} end up to {missing:.3g} m above the lowest foot: legs longer by that fit", False)
+        text = f"feet of {names} end up to {missing:.3g} m above the lowest foot: legs longer by that fit"
+        yield Flaw(text, False, _lengthened(body, soles - soles.min()))
     lowest = min(solid_corners(solid)[:, 2].min() for solid in body.torso.solids)
     deeper = float(soles.min() - lowest)
     if deeper > 0.0:
@@ -69,18 +74,19 @@ def _support(body: Body, pose: Standing) -> Iterator[Flaw]:
         outside = f"the centre of mass lies {-pose.margin:.3g} m outside of the feet"
         sides = {leg.side for leg in body.legs}
         if len(sides) == 1:
-            other = "right" if sides == {"left"} else "left"
+            other, cure = "right" if sides == {"left"} else "left", None
             text = f"{outside}, all on the {sides.pop()}: legs mirrored to the {other} fit"
         else:
             middle = (pose.soles.min(axis=0) + pose.soles.max(axis=0)) / 2.0
             # Legs take the centre of mass along with them.
             x, y, _ = (pose.centre - middle) / (1.0 - _mass_of_legs(body) / pose.mass)
-            text = f"{outside}: legs {_displacement(x, y)} fit"
-        yield Flaw(text, pose.margin < -_HOPELESS_OVERHANG * pose.height)
+            text, cure = f"{outside}: legs {_displacement(x, y)} fit", _moved(body, [(x, y)] * len(body.legs))
+        yield Flaw(text, pose.margin < -_HOPELESS_OVERHANG * pose.height, cure)
     elif pose.margin < _LEAST_TILT * above:
         tilt, missing = np.degrees(np.arctan2(pose.margin, above)), 1.05 * (_LEAST_TILT * above - pose.margin)
         tower = f"a tower that tips over when tilted by {tilt:.2g} degrees"
-        yield Flaw(f"{tower}: feet {missing:.2g} m further out all around fit", False)
+        outwards = missing * np.sign(pose.soles - pose.centre)[:, :2]
+        yield Flaw(f"{tower}: feet {missing:.2g} m further out all around fit", False, _moved(body, outwards))
 
 
 def _mass_of_legs(body: Body) -> float:
@@ -110,17 +116,38 @@ def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
         worst = int((needed / given).argmax())
         lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that hold the body up"
         others = f", as do those of {weak - 1} more joints" * (weak > 1)
-        fits = [joint.motor.gear for leg in sized(_unpowered(body)).legs for joint in leg.joints][worst]
-        yield Flaw(f"the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False)
+        cure = _unpowered(body, given < needed)
+        fits = [joint.motor.gear for leg in sized(cure).legs for joint in leg.joints][worst]
+        yield Flaw(f"the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure)
 
 
-def _unpowered(body: Body) -> Body:
-    """Return the body with its motors left to be sized."""
+def _unpowered(body: Body, joints: np.ndarray) -> Body:
+    """Return the body with the motors of some of its joints, (joints,) booleans, left to be sized."""
+    chosen = iter(joints)
 
     def unpowered(link: Link) -> Link:
-        return link.replace(joint=link.joint and link.joint.replace(motor=None))
+        return link.replace(joint=link.joint.replace(motor=None)) if link.joint and next(chosen) else link
 
     return body.replace(legs=tuple(leg.replace(links=tuple(map(unpowered, leg.links))) for leg in body.legs))
+
+
+def _moved(body: Body, displacements: Iterable) -> Body:
+    """Return the body with its legs moved on the torso by displacements (legs, 2), m."""
+    legs = (
+        leg.replace(mount=(leg.mount[0] + float(x), leg.mount[1] + float(y), leg.mount[2]))
+        for leg, (x, y) in zip(body.legs, displacements, strict=True)
+    )
+    return body.replace(legs=tuple(legs))
+
+
+def _lengthened(body: Body, missing: np.ndarray) -> Body:
+    """Return the body with the feet lower by (legs,) m: the last link of each leg reaches further down."""
+    legs = []
+    for leg, length in zip(body.legs, missing, strict=True):
+        *others, last = leg.links
+        x, y, z = last.end
+        legs.append(leg.replace(links=(*others, last.replace(end=(x, y, z - float(length))))))
+    return body.replace(legs=tuple(legs))
 
 
 def _joints(body: Body, pose: Standing) -> Iterator[Flaw]:

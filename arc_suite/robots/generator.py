@@ -6,7 +6,7 @@ they stand with every foot on the floor.
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from arc_suite.robots.spec import MAX_NAME, Ballast, Body, Foot, Joint, Leg, Lin
 LEGS = (4, 12)  # fewest and most
 LINKS = (1, 4)
 SCALE = (0.01, 100.0)
-STRETCH = (0.1, 10.0)
 LAYOUTS = ("pairs", "radial")
 
 # A leg in its vertical plane, by number of links: of each, its share of the leg's length and its
@@ -39,7 +38,7 @@ JOINT_NAMES = ("hip", "knee", "ankle", "toe")
 _HIP = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=(-45.0, 45.0))
 _BEND = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
 
-_CHANGED = re.compile("_(scaled|stretched|mutated)$")
+_CHANGED = re.compile("_(scaled|mutated)$")
 
 _HEIGHT = 0.4  # m
 _SPACING = 0.5  # of the height, between neighbouring legs of a side
@@ -181,33 +180,6 @@ def scaled(body: Body, factor: float) -> Body:
     torso = Torso(standing_height=factor * body.torso.standing_height, solids=tuple(map(solid, body.torso.solids)))
     ballast = tuple(map(solid, body.ballast))
     return _changed(body, "scaled", torso=torso, ballast=ballast, legs=tuple(map(leg, body.legs)))
-
-
-def stretched(body: Body, factors: Mapping[str, float]) -> Body:
-    """Return a body with links of other lengths, to be sized anew; it stands on its lowest foot.
-
-    Args:
-        body: to change.
-        factors: by name of the link, in all legs that have it; 0.1 to 10.
-
-    Returns:
-        The body, `<name>_stretched`.
-
-    Raises:
-        ValueError: an unknown link, or a factor or a length out of range.
-    """
-    names = list(dict.fromkeys(link.name for leg in body.legs for link in leg.links))
-    factors = {
-        checks.name(name, names, "link"): checks.number(f"length {name}", factor, *STRETCH)
-        for name, factor in factors.items()
-    }
-
-    def longer(link: Link) -> Link:
-        factor = factors.get(link.name, 1.0)
-        return link.replace(end=tuple(factor * length for length in link.end))
-
-    legs = tuple(leg.replace(links=tuple(map(longer, leg.links))) for leg in body.legs)
-    return _changed(body, "stretched", torso=body.torso.replace(standing_height=None), legs=legs)
 
 
 def mutated(body: Body, seed: int, amount: float = 0.1) -> Body:

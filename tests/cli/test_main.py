@@ -29,6 +29,7 @@ TASKED = (
     "train",
     "survey",
     "design",
+    "studio",
     "enter",
 )
 WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export", "design")

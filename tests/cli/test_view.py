@@ -117,7 +117,7 @@ def test_space_pauses_and_backspace_restarts(play):
 def test_arrows_command():
     environment, shown = playing()
     wanted = lambda: environment.task.memory.core.desired  # noqa: E731
-    assert shown.wanted is None  # the task's own schedule
+    assert shown.desired is None  # the task's own schedule
     for key in (glfw.KEY_UP, glfw.KEY_UP, glfw.KEY_LEFT):
         shown.press(key)
     np.testing.assert_array_equal(wanted(), (0.5, 0.0, 0.25))
@@ -147,7 +147,7 @@ def test_markers_of_the_task_are_shown(play):
 def test_arrows_do_nothing_where_the_task_takes_no_command():
     _, shown = playing("walk")
     shown.press(glfw.KEY_UP)
-    assert shown.wanted is None and "forward" not in shown.text()
+    assert shown.desired is None and "forward" not in shown.text()
 
 
 def test_the_mouse_pulls_at_the_body(monkeypatch):

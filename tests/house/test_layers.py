@@ -36,6 +36,7 @@ ROOMS = (
     ("design",),  # creatures found by search
     ("agents",),  # who learns
     ("studies",),  # tables of runs
+    ("studio",),  # a creature is designed while it walks
     ("cli",),  # programs
     ("__main__",),  # that Python starts by name
 )
@@ -88,6 +89,11 @@ THIRD_PARTY = {
     "studies.cluster": {"submitit"},
     "studies.publication": {"numpy", "gymnasium"},
     "studies.runner": {"numpy", "tqdm"},
+    "studio": {"numpy"},
+    "studio.saving": {"numpy", "imageio"},
+    "studio.view": {"numpy", "viser"},
+    "studio.charts": {"numpy", "viser", "PIL"},
+    "studio.page": {"viser"},
     "style.metrics": {"numpy"},
     "style.colours": set(),
     "style.strips": {"numpy", "PIL"},
@@ -229,7 +235,7 @@ def test_only_tasks_and_registration_know_one_task_from_another():
 
 
 def test_import_is_light():
-    heavy = ("torch", "jax", "stable_baselines3", "shimmy", "matplotlib", "imageio", "arc_suite.export")
+    heavy = ("torch", "jax", "stable_baselines3", "shimmy", "matplotlib", "imageio", "viser", "arc_suite.export")
     code = f"import sys, arc_suite; print([m for m in {heavy} if m in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout.strip() == "[]"

@@ -139,7 +139,18 @@ DOUBTFUL = [
     ids=lambda value: value.split(":")[0] if isinstance(value, str) else "",
 )
 def test_a_flaw_is_told_with_what_fits(body, text, hopeless):
-    assert (text, hopeless) in flaws(body)
+    assert (text, hopeless) in [flaw[:2] for flaw in flaws(body)]
+
+
+CURED = ("standing_height", "backward fit", "further out", "longer by that", "gear")
+
+
+@pytest.mark.parametrize(("body", "text"), HOPELESS + DOUBTFUL)
+def test_a_cure_is_the_body_with_the_value_that_fits(body, text):
+    (flaw,) = (flaw for flaw in flaws(body) if flaw.text == text)
+    assert (flaw.cure is not None) == any(words in text for words in CURED)
+    if flaw.cure is not None:
+        assert len(flaws(flaw.cure)) < len(flaws(body))
 
 
 @pytest.mark.parametrize(("body", "text"), HOPELESS)

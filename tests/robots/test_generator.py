@@ -149,22 +149,6 @@ def test_scaled_bodies_have_all_lengths_multiplied():
         generator.scaled(generator.scaled(body, 100.0), 100.0)
 
 
-def test_stretched_bodies_have_longer_links_and_stand_on_their_feet():
-    body = generator.generate(6, 3)
-    longer = generator.stretched(body, {"lower": 1.5})
-    assert longer.name == "walker_6x3_stretched"
-    for before, after in zip(body.legs, longer.legs, strict=True):
-        for link, same in zip(before.links, after.links, strict=True):
-            factor = 1.5 if link.name == "lower" else 1.0
-            np.testing.assert_allclose(same.end, np.multiply(link.end, factor))
-    np.testing.assert_allclose(standing(longer).soles[:, 2], -longer.torso.standing_height, atol=1e-9)
-    assert longer.torso.standing_height > body.torso.standing_height
-    with pytest.raises(ValueError, match="^unknown link 'lowr'; did you mean 'lower'"):
-        generator.stretched(body, {"lowr": 1.5})
-    with pytest.raises(ValueError, match="^length lower: expected a number from 0.1 to 10, got 0"):
-        generator.stretched(body, {"lower": 0.0})
-
-
 def test_mutated_bodies_differ_a_little_and_stay_sound():
     body = generator.random_body(1)
     child = generator.mutated(body, 3)

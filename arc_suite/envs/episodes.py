@@ -1,0 +1,94 @@
+"""Episodes one after another, under a command that a person sets, with poses between control steps."""
+
+from collections.abc import Callable, Sequence
+
+import mujoco
+import numpy as np
+
+from arc_suite.markers import Marker
+
+LONGEST = 0.5  # s of simulated time between two pictures; a slower machine shows slow motion
+_ENDS = ("start", "end")  # of a debug marker
+
+
+class Episodes:
+    """Episodes of one environment under a policy.
+
+    Attributes:
+        environment: of `arc_suite.load`.
+        commanded: whether the task has a command of velocities.
+        desired: (3,) command that a person has set; None for that of the task.
+        timestep: the latest.
+        earned: sum of the rewards of the present episode.
+        steps: control steps of the present episode.
+        control_timestep: s.
+    """
+
+    def __init__(self, environment, act: Callable):
+        """Start the first episode.
+
+        Args:
+            environment: of `arc_suite.load`.
+            act: maps a `TimeStep` to an action.
+        """
+        self.environment, self._act = environment, act
+        self.commanded = environment.task.definition.commands.get("command") == 3
+        self.desired: np.ndarray | None = None
+        self.control_timestep = environment.control_timestep()
+        self.restart()
+
+    def restart(self) -> None:
+        """Start the next episode, with the command that a person has set."""
+        self.timestep, self.earned, self.steps = self.environment.reset(), 0.0, 0
+        self._command()
+        self._before, self._markers = self._qpos(), 2 * (self._asked(),)
+
+    def command(self, desired: Sequence[float] | None) -> None:
+        """Set the command, clipped to [-1, 1], or leave it to the task; a task without a command ignores it."""
+        if self.commanded:
+            self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
+            self._command()
+
+    def step(self, forces: np.ndarray | float = 0.0) -> None:
+        """Advance by a control step, or start the next episode where the last one has ended.
+
+        Args:
+            forces: (bodies, 6) force, N, and torque, N m, on every body of the model, in the world; or 0.
+        """
+        if self.timestep.last():
+            self.restart()
+            return
+        self._before = self._qpos()
+        self.environment.physics.data.xfrc_applied[:] = forces
+        self.timestep = self.environment.step(self._act(self.timestep))
+        self.earned += self.timestep.reward
+        self.steps += 1
+        self._markers = self._markers[1], self._asked()
+
+    def qpos(self, share: float) -> np.ndarray:
+        """Return the positions (nq,) at a share, 0 to 1, of the latest control step."""
+        model = self.environment.physics.model.ptr
+        path, now = np.empty(model.nv), self._before.copy()
+        mujoco.mj_differentiatePos(model, path, 1.0, self._before, self._qpos())
+        mujoco.mj_integratePos(model, now, path, share)
+        return now
+
+    def markers(self, share: float) -> list[Marker]:
+        """Return the task's debug markers at a share, 0 to 1, of the latest control step."""
+        before, now = self._markers
+        if [each._replace(start=0, end=0) for each in before] != [each._replace(start=0, end=0) for each in now]:
+            return now
+        return [
+            new._replace(**{end: (1.0 - share) * getattr(old, end) + share * getattr(new, end) for end in _ENDS})
+            for old, new in zip(before, now, strict=True)
+        ]
+
+    def _command(self) -> None:
+        if self.commanded:
+            self.environment.command("command", self.desired)
+
+    def _asked(self) -> list[Marker]:
+        return self.environment.task.markers(self.environment.physics)
+
+    def _qpos(self) -> np.ndarray:
+        return self.environment.physics.data.qpos.copy()

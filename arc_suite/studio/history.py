@@ -1,0 +1,120 @@
+"""The last seconds of a walk as arrays: rewards by term, foot contacts, speed and cost of transport."""
+
+import collections
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.envs.episodes import Episodes
+from arc_suite.tasks.clock import desired_contacts
+
+_STEPS = 120  # control steps that are kept
+_NOWHERE = 0.05  # standing heights a second; at lower speeds the cost of transport says nothing
+
+
+class Moment(NamedTuple):
+    """A control step.
+
+    Attributes:
+        terms: weighted terms of the reward by name.
+        stance: (feet,) whether the foot is in stance; None in a task without a gait.
+        schedule: (feet,) whether the gait wants it there, all feet at a stop; None in a task without a gait.
+        place: (2,) of the torso, m.
+        desired: m/s that the command asks for; NaN where there is none.
+        work: positive work of the motors by weight, m.
+    """
+
+    terms: dict[str, float]
+    stance: np.ndarray | None
+    schedule: np.ndarray | None
+    place: np.ndarray
+    desired: float
+    work: float
+
+
+class History:
+    """The last control steps of an episode."""
+
+    def __init__(self, episodes: Episodes):
+        """Begin without a step."""
+        self._episodes = episodes
+        self._model = episodes.environment.physics.model.ptr
+        self._weight = float(self._model.body_mass.sum() * -self._model.opt.gravity[2])
+        self._moments: collections.deque[Moment] = collections.deque(maxlen=_STEPS)
+        self._angles: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self._moments)
+
+    def observe(self) -> None:
+        """Remember the control step that the episodes have just taken; a new episode begins anew."""
+        environment, steps = self._episodes.environment, self._episodes.steps
+        task, data = environment.task.definition, environment.physics.data
+        angles = data.qpos[task.scene.layout.joint_angles].copy()
+        if steps == 0:
+            self._moments.clear()
+            self._angles = angles
+            return
+        turned = angles - (angles if self._angles is None else self._angles)
+        torques = data.qfrc_actuator[task.scene.layout.joint_velocities]
+        work = float((torques * turned).clip(0.0).sum()) / self._weight
+        weights, run = task.settings.weights, environment.task
+        stance = schedule = None
+        if task.parameters is not None:
+            p = task.parameters
+            stance = task.read(data).foot_heights < p.stance_threshold
+            phase = np.asarray(task.phase(run.memory))
+            schedule = desired_contacts(phase, p.duty_factor, p.phase_offsets) | self._stops()
+        terms = {name: weights[name] * float(value) for name, value in run.terms.items()}
+        place = data.qpos[:2].copy()
+        self._moments.append(Moment(terms, stance, schedule, place, self._desired(), work))
+        self._angles = angles
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times (steps,) of the control steps, s, 0 for the latest."""
+        return self._episodes.control_timestep * np.arange(1 - len(self._moments), 1)
+
+    def terms(self) -> dict[str, np.ndarray]:
+        """Return the weighted terms of the reward by name, (steps,) each."""
+        names = self._moments[0].terms if self._moments else ()
+        return {name: np.array([moment.terms[name] for moment in self._moments]) for name in names}
+
+    def contacts(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return which feet are in stance and which the gait wants there, (steps, feet); None without a gait."""
+        if not self._moments or self._moments[0].stance is None:
+            return None
+        return np.array([m.stance for m in self._moments]), np.array([m.schedule for m in self._moments])
+
+    def speeds(self) -> np.ndarray:
+        """Return the speeds (steps,) of the torso over the ground, m/s: means over a second, or less at the start."""
+        step, places = self._episodes.control_timestep, np.array([moment.place for moment in self._moments])
+        count = min(max(1, round(1.0 / step)), len(places) - 1)
+        if count < 1:
+            return np.zeros(len(places))
+        means = np.linalg.norm(places[count:] - places[:-count], axis=1) / (count * step)
+        return np.concatenate([np.full(count, means[0]), means])
+
+    def desired(self) -> np.ndarray:
+        """Return the speeds (steps,) that the command asks for, m/s; NaN where there is no command."""
+        return np.array([moment.desired for moment in self._moments])
+
+    def cost_of_transport(self) -> float:
+        """Return the positive work of the motors by weight and path over the steps; NaN where the body gets nowhere."""
+        places = np.array([moment.place for moment in self._moments])
+        path = np.linalg.norm(np.diff(places, axis=0), axis=1).sum() if len(places) > 1 else 0.0
+        height = self._episodes.environment.task.body.torso.standing_height
+        if path <= _NOWHERE * height * len(places) * self._episodes.control_timestep:
+            return np.nan
+        return sum(moment.work for moment in list(self._moments)[1:]) / path
+
+    def _stops(self) -> bool:
+        """Whether the clock of the gait rests, as at a stop."""
+        return not np.any(self._episodes.timestep.observation.get("gait_clock", 1.0))
+
+    def _desired(self) -> float:
+        task = self._episodes.environment.task.definition
+        command = self._episodes.timestep.observation.get("command")
+        if command is not None and task.parameters is not None:
+            return float(np.hypot(*command[:2]) * task.parameters.target_velocity)
+        return np.nan if task.target_velocity is None else float(task.target_velocity)

@@ -1,0 +1,212 @@
+"""What the widgets say, as one value, and the body, task and lines of text that it makes."""
+
+import dataclasses
+import json
+import shlex
+from typing import Any
+
+from arc_suite import checks, registry
+from arc_suite.envs.setup import Setup
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.shaping import Shape, link_names, shaped
+from arc_suite.robots.spec import Body
+from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, load_body
+
+LEGS, RANDOM, FILE = "legs and links", "random", "file"
+_DOING = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # fields that are not the body's
+OWN = "own"  # the gait, layout or preset that the body or task has by itself
+
+
+@dataclasses.dataclass(frozen=True)
+class Sketch:
+    """A creature and what it does.
+
+    Attributes:
+        source: of the body: `LEGS`, `RANDOM`, the name of a robot or an example, or `FILE`.
+        legs: number of legs, of `LEGS`.
+        links: actuated links a leg, of `LEGS`.
+        layout: pairs, radial or `OWN`, of `LEGS`.
+        seed: of `RANDOM`.
+        file: the text of a spec file, of `FILE`.
+        scale, length, width, thickness, fan: see `shaping.Shape`.
+        lengths: factors of links, pairs of a name and a number; those of links that the body lacks are ignored.
+        task: name of the task.
+        gait: name of the gait, or `OWN`.
+        speed: target velocity, as a multiple of the body's own.
+        ground: name of an arena; ignored by a task that has its own.
+        kicks: see `modifiers.Modifiers`.
+        settings: further settings of the task, as the text of a JSON object.
+        policy: see `policies.policy`.
+        preset: of the demonstrator, or `OWN`.
+    """
+
+    source: str = LEGS
+    legs: int = 8
+    links: int = 3
+    layout: str = OWN
+    seed: int = 0
+    file: str = ""
+    scale: float = 1.0
+    length: float = 1.0
+    width: float = 1.0
+    thickness: float = 1.0
+    fan: float = 0.0
+    lengths: tuple[tuple[str, float], ...] = ()
+    task: str = "steer"
+    gait: str = OWN
+    speed: float = 1.0
+    ground: str = "flat"
+    kicks: float = 0.0
+    settings: str = "{}"
+    policy: str = "cpg"
+    preset: str = OWN
+
+
+def sources() -> list[str]:
+    """Return the names of sources that the page lists."""
+    return [LEGS, RANDOM, *ROBOTS, *EXAMPLES]
+
+
+def source_body(sketch: Sketch) -> Body:
+    """Return the body before its proportions change.
+
+    Raises:
+        ValueError: an unknown source, a value out of range, or a file that holds no body.
+    """
+    if sketch.source == LEGS:
+        return generator.generate(sketch.legs, sketch.links, _given(sketch.layout))
+    if sketch.source == RANDOM:
+        return generator.random_body(sketch.seed)
+    if sketch.source == FILE:
+        return body_from_json(sketch.file)
+    name = checks.name(sketch.source, sources(), "source", near=(FILE,))
+    return ROBOTS[name] if name in ROBOTS else load_body(name)
+
+
+def body(sketch: Sketch) -> Body:
+    """Return the body.
+
+    Raises:
+        ValueError: as `source_body`, or proportions out of range.
+    """
+    made = source_body(sketch)
+    return shaped(made, **_shape(sketch, made))
+
+
+def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
+    """Return the settings of the task, `task_kwargs` of `arc_suite.load`; those of the field come before the sliders'.
+
+    Raises:
+        ValueError: the field holds no JSON object, a gait that does not fit, or an arena that is not registered.
+    """
+    try:
+        field = checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
+    except json.JSONDecodeError as error:
+        raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
+    kind, found = registry.task_of(sketch.task), {}
+    if sketch.gait != OWN:
+        found["gait"] = sketch.gait
+    if sketch.speed != 1.0:
+        own = getattr(kind.settings_for(made, found), "parameters", None)
+        if own is None:
+            raise ValueError(
+                f"speed: expected 1 for the task {sketch.task}, which prescribes none, got {sketch.speed:g}"
+            )
+        found["target_velocity"] = float(f"{sketch.speed * own.target_velocity:.4g}")
+    if sketch.ground != "flat" and not kind.own_arena:
+        found["arena"] = sketch.ground
+    if sketch.kicks:
+        found["kicks"] = sketch.kicks
+    found |= field
+    registry.imported("arena", str(found.get("arena", "flat")))  # a visitor of the page imports nothing
+    return found
+
+
+def setup(sketch: Sketch) -> Setup:
+    """Return body, task and settings.
+
+    Raises:
+        ValueError: a name or a value that does not fit.
+    """
+    made = body(sketch)
+    return Setup.of(made, sketch.task, settings(sketch, made))
+
+
+def preset(sketch: Sketch) -> str | None:
+    """Return the demonstrator's preset; None for the one that suits the task and the body."""
+    return _given(sketch.preset)
+
+
+def file_name(made: Body) -> str:
+    """Return the name of a body's spec file."""
+    return f"{made.name}.json"
+
+
+def python_lines(sketch: Sketch) -> str:
+    """Return Python that opens the same environment and policy; a body from a file is read from `file_name`."""
+    made = source_body(sketch)
+    if sketch.source == LEGS:
+        layout = "" if sketch.layout == OWN else f', "{sketch.layout}"'
+        modules, code = ["generator"], f"generator.generate({sketch.legs}, {sketch.links}{layout})"
+    elif sketch.source == RANDOM:
+        modules, code = ["generator"], f"generator.random_body({sketch.seed})"
+    elif sketch.source in ROBOTS:
+        modules, code = ["ROBOTS"], f'ROBOTS["{sketch.source}"]'
+    else:
+        name = file_name(made) if sketch.source == FILE else sketch.source
+        modules, code = ["spec_files"], f'spec_files.load_body("{name}")'
+    if shape := _shape(sketch, made):
+        changes = ", ".join(f"{name}={value!r}" for name, value in shape.items())
+        modules, code = [*modules, "shaping"], f"shaping.shaped({code}, {changes})"
+    options = settings(sketch, body(sketch))
+    return (
+        f"import arc_suite\nfrom arc_suite import policies\nfrom arc_suite.robots import {', '.join(modules)}\n\n"
+        f"body = {code}\n"
+        f'environment = arc_suite.load(body, "{sketch.task}"{f", {options!r}" if options else ""})\n'
+        f"policy = policies.policy({sketch.policy!r}, body, {preset(sketch)!r}, task=environment.task.definition)\n"
+    )
+
+
+def opened_file(sketch: Sketch, text: str) -> Sketch:
+    """Return the sketch with the body of a spec file's text, in its own proportions."""
+    as_it_is = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _DOING}
+    return dataclasses.replace(sketch, **as_it_is | {"source": FILE, "file": text})
+
+
+def cured(sketch: Sketch, cure: Body) -> Sketch:
+    """Return the sketch with another body, as a file in its own proportions."""
+    return opened_file(sketch, body_to_json(cure))
+
+
+def command_line(sketch: Sketch) -> str:
+    """Return the command that shows the same in a window; a body of its own is read from its saved spec."""
+    made = body(sketch)
+    unchanged = made == source_body(sketch)
+    if sketch.source in ROBOTS and unchanged:
+        chosen = ["--robot", sketch.source]
+    elif sketch.source in EXAMPLES and unchanged:
+        chosen = ["--spec", sketch.source]
+    elif sketch.source == LEGS and made == generator.generate(sketch.legs, sketch.links):
+        chosen = ["--legs", str(sketch.legs), "--links", str(sketch.links)]
+    else:
+        chosen = ["--spec", file_name(made)]
+    options = [f"--set={name}={_flag(value)}" for name, value in settings(sketch, made).items()]
+    policy = [] if sketch.policy == "cpg" else ["--policy", sketch.policy]
+    given = [] if sketch.preset == OWN else ["--preset", sketch.preset]
+    return shlex.join(["arc-suite", "view", *chosen, "--task", sketch.task, *options, *policy, *given])
+
+
+def _flag(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _given(choice: str) -> str | None:
+    return None if choice == OWN else choice
+
+
+def _shape(sketch: Sketch, made: Body) -> dict[str, Any]:
+    """The changes of proportions of a body, without those that change nothing."""
+    shape = {name: getattr(sketch, name) for name in Shape._fields if name != "links"}
+    names = link_names(made)
+    shape["links"] = {name: factor for name, factor in sketch.lengths if factor != 1.0 and name in names}
+    return {name: value for name, value in shape.items() if value != getattr(Shape(), name)}
