@@ -81,7 +81,19 @@ def test_settings_of_walk_alone_are_refused_elsewhere(task):
 
 
 # Members of the contract that follow from others, or that only the task itself is asked for before it is wrapped.
-DERIVED = {"symmetry", "size", "vector", "named", "split", "cleared", "arena", "own_arena", "modifiers", "step_limit"}
+DERIVED = {
+    "symmetry",
+    "size",
+    "vector",
+    "named",
+    "split",
+    "cleared",
+    "arena",
+    "own_arena",
+    "modifiers",
+    "step_limit",
+    "clearances",
+}
 FIELDS = {"scene", "settings"}
 
 
