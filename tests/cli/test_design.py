@@ -52,6 +52,7 @@ def test_files(found):
     assert imageio.imread(folder / "gallery.png").ndim == 3
 
 
+@pytest.mark.release
 def test_processes_make_no_difference(found, tmp_path):
     folder, done = found
     again = design("--around=tick", "--goal=speed", "--bodies=20", "--processes=2", f"--output={tmp_path / 'ticks'}")
@@ -59,7 +60,7 @@ def test_processes_make_no_difference(found, tmp_path):
     assert contents(tmp_path / "ticks") == contents(folder)
 
 
-@pytest.mark.slow
+@pytest.mark.release
 def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     straight, broken = tmp_path / "straight", tmp_path / "broken"
     arguments = ("--goal=speed", "--map=legs", "--processes=2")

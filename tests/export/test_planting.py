@@ -48,6 +48,7 @@ def slip(motion):
     return paths.mean() / np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()
 
 
+@pytest.mark.long
 @pytest.mark.slow
 def test_feet_in_stance_neither_slide_nor_sink():
     before, after = (made(plant)["walk"].motion for plant in (False, True))
