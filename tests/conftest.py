@@ -1,6 +1,7 @@
-"""Spares the garbage collector what pytest collects: half a million objects that it would go over again and again."""
+"""What all tests share: a browser, and a garbage collector that spares what pytest collects, half a million objects."""
 
 import gc
+import shutil
 
 import pytest
 
@@ -13,3 +14,19 @@ def pytest_collection(session):
     finally:
         gc.freeze()
         gc.enable()
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """Chromium without a window; tests that need it are skipped where there is none."""
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="no playwright here: make check-web, check-play, check-studio"
+    )
+    chromium = shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("no Chromium here: make check-web, check-play, check-studio")
+    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card needed
+    with playwright.sync_playwright() as running:
+        opened = running.chromium.launch(executable_path=chromium, args=flags)
+        yield opened
+        opened.close()

@@ -14,7 +14,6 @@ the table of all learners.
 """
 
 import re
-import sys
 from pathlib import Path
 
 from absl import flags
@@ -68,17 +67,11 @@ def learned(track: str, places: list[str]) -> int:
     name = f"{track}-{tables.folder_name(FLAGS.algorithm)}"
     runs = [each for each in study.runs if _is_asked(each, places)]
     folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
-    jobs = FLAGS.jobs or usable_cores()
-    show = runner.shown(jobs)
-    states = runner.make(runs, folder, published, jobs, show, progress)
-    show(states, whole=True)
-    failures = runner.failures(states, folder)
-    for line in failures:
-        print(line, file=sys.stderr)
+    states = runner.make_and_show(runs, folder, published, FLAGS.jobs or usable_cores(), progress)
     if found := results.results(study.runs, published):
         print(report.write(name, study, published))
         benchmark.write(published, benchmark.of_results(found))
-    return 1 if failures else 0
+    return int(any(each.word == "failed" for each in states))
 
 
 def scored(track: str) -> int:

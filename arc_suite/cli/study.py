@@ -11,7 +11,6 @@ committed, and the report is made from that folder alone.
   arc-suite study my_studies:MINE
 """
 
-import sys
 from pathlib import Path
 
 from absl import flags
@@ -55,14 +54,8 @@ def main(name: str | None = None) -> int:
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(name, min(FLAGS.submit, len(runs)), folder, results)
-    jobs = FLAGS.jobs or usable_cores()
-    show = runner.shown(jobs)
-    states = runner.make(runs, folder, results, jobs, show, progress)
-    show(states, whole=True)
-    failures = runner.failures(states, folder)
-    for line in failures:
-        print(line, file=sys.stderr)
-    return 1 if failures else 0
+    states = runner.make_and_show(runs, folder, results, FLAGS.jobs or usable_cores(), progress)
+    return int(any(each.word == "failed" for each in states))
 
 
 def submit(name: str, jobs: int, folder: Path, results: Path) -> int:

@@ -86,6 +86,22 @@ def make(
     return list(states(runs, folder, words).values())
 
 
+def make_and_show(
+    runs: Sequence[Run], folder: Path, published: Path, jobs: int, progress: Callable = tqdm
+) -> list[State]:
+    """Make the runs behind a table of their states, print why runs failed, and return the states; see `make`.
+
+    Raises:
+        ValueError, OSError: as `make`.
+    """
+    show = shown(jobs)
+    states = make(runs, folder, published, jobs, show, progress)
+    show(states, whole=True)
+    for line in failures(states, folder):
+        print(line, file=sys.stderr)
+    return states
+
+
 def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable = tqdm) -> dict[str, str]:
     """Collect the prior data of the runs that are not finished, and return words of all runs by name.
 

@@ -8,9 +8,11 @@ import re
 import zlib
 
 import mujoco
+import nodes
 import numpy as np
 import programs
 import pytest
+import tabs
 from PIL import Image
 
 import arc_suite
@@ -128,7 +130,7 @@ def test_without_the_viewer_the_cure_is_one_for_a_clone_or_for_an_installed_pack
 
 
 def test_programs_without_a_viewer_write_nothing(tmp_path):
-    if built():
+    if nodes.ENGINE.is_file():
         pytest.skip("there is a viewer here")
     commands = ("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1"), ("play", "-o", "a.html")
     for command in commands:
@@ -137,17 +139,7 @@ def test_programs_without_a_viewer_write_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def built():
-    try:
-        return pages.viewer()
-    except ValueError:
-        return None
-
-
-needs_viewer = pytest.mark.skipif(not built(), reason="no viewer here: make web")
-
-
-@needs_viewer
+@nodes.needs_viewer
 def test_programs_write_pages(tmp_path):
     done = programs.run("-m", "arc_suite", "render", "--robot=tick", "--steps=400", "-o", "walk.html", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
@@ -181,19 +173,13 @@ def shown(browser, tracks, tmp_path_factory):
     """The page of both tracks, opened from disk, and all that it said and asked for."""
     path = tmp_path_factory.mktemp("page") / "walk.html"
     path.write_text(pages.page(tracks), encoding="utf-8")
-    tab, said, asked = browser.new_page(viewport={"width": 800, "height": 600}), [], []
-    tab.on("console", lambda message: said.append(message.text))
-    tab.on("pageerror", lambda error: said.append(str(error)))
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto(path.as_uri())
-    tab.wait_for_function("window.viewer", timeout=60_000)
-    yield tab
-    assert said == []
+    with tabs.opened(browser, path, "window.viewer", 800, 600) as (tab, asked):
+        yield tab
     assert asked == [path.as_uri()]
 
 
 @pytest.mark.slow
-@needs_viewer
+@nodes.needs_viewer
 def test_the_picture_is_the_track(shown, tracks):
     """At the ends of control steps all parts are where MuJoCo has them, and halfway between two halfway."""
     body = ROBOTS["tick"]
@@ -213,7 +199,7 @@ def test_the_picture_is_the_track(shown, tracks):
 
 
 @pytest.mark.slow
-@needs_viewer
+@nodes.needs_viewer
 def test_keys_and_controls(shown, tracks):
     step, end = tracks["tick, tuned"].time_step, STEPS * tracks["tick, tuned"].time_step
     time = lambda: shown.evaluate("viewer.state.time")  # noqa: E731
@@ -240,7 +226,7 @@ def test_keys_and_controls(shown, tracks):
 
 
 @pytest.mark.slow
-@needs_viewer
+@nodes.needs_viewer
 def test_goals_are_drawn(browser, tmp_path):
     environment = arc_suite.load("tick", "navigate", {"random": 0})
     track = record(environment, policy("cpg", "tick", "steered"), 0, 3)
@@ -259,7 +245,7 @@ def test_goals_are_drawn(browser, tmp_path):
 
 
 @pytest.mark.slow
-@needs_viewer
+@nodes.needs_viewer
 def test_something_is_drawn(shown):
     """The creature stands out from the ground in the middle of its view, and moves over it in time."""
     shown.evaluate("viewer.pause(false)")
@@ -275,7 +261,7 @@ def test_something_is_drawn(shown):
 
 
 @pytest.mark.slow
-@needs_viewer
+@nodes.needs_viewer
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (844, 390), (320, 256)])
 def test_small_pages(browser, tracks, tmp_path, width, height):
     """The view is large enough or the page scrolls, nothing overlaps, controls have names and a size to hit."""

@@ -4,6 +4,7 @@ import itertools
 
 import nodes
 import pytest
+import tabs
 
 from arc_suite.export import play
 from arc_suite.robots import ROBOTS, generator
@@ -24,14 +25,8 @@ def page(tmp_path_factory):
 @pytest.fixture(scope="module")
 def opened(browser, page):
     """The page as opened from disk; nothing is said in the console, and nothing requested."""
-    tab, said, asked = browser.new_page(viewport={"width": 320, "height": 256}), [], []
-    tab.on("console", lambda message: said.append(message.text))
-    tab.on("pageerror", lambda error: said.append(str(error)))
-    tab.on("request", lambda request: asked.append(request.url))
-    tab.goto(page.as_uri())
-    tab.wait_for_function("window.play", timeout=60_000)
-    yield tab
-    assert said == []
+    with tabs.opened(browser, page, "window.play", 320, 256) as (tab, asked):
+        yield tab
     assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
 
 

@@ -1,7 +1,6 @@
 """The page in Chromium: sliders moved, creature changed, command followed, files saved: `make check-studio`."""
 
 import re
-import shutil
 import threading
 import time
 
@@ -53,28 +52,21 @@ def served():
 
 
 @pytest.fixture(scope="module")
-def tab(served):
-    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright here: make check-studio")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium here: make check-studio")
-    flags = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # no graphics card needed
-    with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=chromium, args=flags)
-        context = browser.new_context(viewport={"width": 900, "height": 620}, accept_downloads=True)
-        context.grant_permissions(["clipboard-read", "clipboard-write"])
-        tab, wrong, asked = context.new_page(), [], []
-        tab.set_default_timeout(1000.0 * _PATIENCE)
-        tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-        tab.on("pageerror", lambda error: wrong.append(str(error)))
-        tab.on("request", lambda request: asked.append(request.url))
-        tab.goto(served.addresses[0])
-        tab.wait_for_selector("#status")
-        tab.get_by_text("Fan of the legs").wait_for()
-        yield tab
-        assert wrong == []
-        assert {url for url in asked if not url.startswith((served.addresses[0], "data:", "blob:"))} == set()
-        browser.close()
+def tab(browser, served):
+    context = browser.new_context(viewport={"width": 900, "height": 620}, accept_downloads=True)
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    tab, wrong, asked = context.new_page(), [], []
+    tab.set_default_timeout(1000.0 * _PATIENCE)
+    tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    tab.on("pageerror", lambda error: wrong.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(served.addresses[0])
+    tab.wait_for_selector("#status")
+    tab.get_by_text("Fan of the legs").wait_for()
+    yield tab
+    assert wrong == []
+    assert {url for url in asked if not url.startswith((served.addresses[0], "data:", "blob:"))} == set()
+    context.close()
 
 
 def field(tab, label):
