@@ -11,11 +11,13 @@ import numpy as np
 from arc_suite import checks, versions
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
+from arc_suite.policies.universal import Universal
 from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
@@ -156,7 +158,10 @@ def trained(name: str | os.PathLike) -> Network:
         OSError: a file cannot be read.
     """
     if (zipped := zips.parts(name)) is None:
-        return network.load(name)
+        made = network.load(name)
+        if isinstance(made.setup, BodiesSetup):
+            raise ValueError(f"policy {name}: expected one of a single body, got one of {made.setup.robot}")
+        return made
     if (setup := zips.setup(zipped[0])) is None:
         raise ValueError(f"policy {zipped[0]}: {_UNKNOWN}")
     return _saved(*zipped).network(setup)
@@ -170,6 +175,8 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     if zipped := zips.parts(path):
         return _from_zip(*zipped, body, task)
     made = network.load(path)
+    if isinstance(made.setup, BodiesSetup):
+        return Universal(made, task or prepared(body, "walk")[0])
     _check(path, made.setup, body, task)
     _check_joints(path, made.joints, body)
     return made
