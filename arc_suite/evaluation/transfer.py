@@ -105,8 +105,8 @@ class Result(NamedTuple):
         count: of the bodies.
         walk: share of the bodies that walk.
         demonstrated: share of the bodies that their demonstrators walk.
-        score: mean score.
-        worst: mean score of the worst tenth.
+        score: gain of the policy over standing still, as a share of the demonstrators': sums over bodies.
+        worst: the same of the tenth of the bodies with the lowest scores.
         share: mean of the policy's return as a share of the demonstrator's.
         tracking: mean tracking as a share of the demonstrators' mean; NaN in tasks without this metric.
     """
@@ -165,20 +165,29 @@ def of_family(name: str, network: Network, task: str, settings: Mapping | None =
 
 
 def result(played: list[Trial]) -> Result:
-    """Return the results of trials; bodies without a score count in neither mean."""
-    scores = np.sort([trial.score for trial in played if not math.isnan(trial.score)])
-    worst = scores[: max(1, round(_WORST * len(scores)))]
+    """Return the results of trials; bodies whose demonstrators gain nothing count in no score."""
+    scored = sorted((trial for trial in played if not math.isnan(trial.score)), key=lambda trial: trial.score)
+    worst = scored[: max(1, round(_WORST * len(scored)))]
     tracking = [[episode.tracking for episode in (trial.policy, trial.demonstrator)] for trial in played]
     policy, demonstrator = np.mean(tracking, axis=0)
     return Result(
         count=len(played),
         walk=float(np.mean([trial.policy.walked for trial in played])),
         demonstrated=float(np.mean([trial.demonstrator.walked for trial in played])),
-        score=float(scores.mean()) if len(scores) else math.nan,
-        worst=float(worst.mean()) if len(scores) else math.nan,
+        score=_gain(scored),
+        worst=_gain(worst),
         share=float(np.mean([trial.policy.total / trial.demonstrator.total for trial in played])),
         tracking=float(policy / demonstrator),
     )
+
+
+def _gain(played: list[Trial]) -> float:
+    """The policy's gain over standing still as a share of the demonstrators'; NaN without trials.
+
+    Sums, as the gain of a single demonstrator may be small.
+    """
+    gains = [[trial.policy.total - trial.zero.total, trial.demonstrator.total - trial.zero.total] for trial in played]
+    return float(np.divide(*np.sum(gains, axis=0))) if gains else math.nan
 
 
 def _episodes(environment: FlatBodies, act: Callable[[np.ndarray, int], np.ndarray]) -> list[Episode]:
