@@ -34,7 +34,7 @@ def main() -> None:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
-    network, lines = universal.load(FLAGS.policy), []
+    network, lines = universal.load(FLAGS.policy, name != "walk"), []
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.Result._fields))
     for family in FLAGS.families:
         played = transfer.of_family(family, network, name, settings)

@@ -108,7 +108,7 @@ class BodiesSetup:
         return FlatBodies(BodiesEnv(self.task, num_envs, list(self.bodies), task_kwargs=settings, **options))
 
     def provenance(self) -> dict[str, Any]:
-        """Return, JSON-able, `to_dict` with the task's version, a hash of all bodies, and versions of all that computes."""
+        """Return, JSON-able, `to_dict` with the task's version, a hash of all bodies, and versions of packages."""
         texts = hashlib.sha256()
         for body in self.bodies:
             texts.update(body_to_json(body).encode())

@@ -14,7 +14,7 @@ from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network, zips
+from arc_suite.policies import network, universal, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.policies.universal import Universal
@@ -59,8 +59,14 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
     return _from_file(path, body, task)
 
 
+def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
+    """A trained policy of any body that comes with the package, for walk or for tasks with a command."""
+    task = task or prepared(body, "walk")[0]
+    return Universal(universal.load(universal.NAME, "command" in task.blocks), task)
+
+
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
-POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo}
+POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, universal.NAME: _universal}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
@@ -82,7 +88,8 @@ def policy(
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
-            episode's seed; ppo, a trained policy that comes with the package; the path of a run's folder, of a
+            episode's seed; ppo, a trained policy of one robot that comes with the package; universal, one of any
+            body; the path of a run's folder, of a
             policy file (.npz), see `network`, or of a folder of checkpoints, which take turns from seed to seed,
             see `checkpoints`; that of a zip of stable-baselines3, see `zips`; or `module:attribute`, a function on
             Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a

@@ -16,17 +16,23 @@ from arc_suite.policies.network import Network
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import Tokens
 
-PACKAGED = Path(__file__).with_name("packaged") / f"universal{network.EXTENSION}"
+PACKAGED = Path(__file__).with_name("packaged")
+NAME = "universal"  # of the policies that come with the package
 
 
-def load(name: str | os.PathLike) -> Network:
+def load(name: str | os.PathLike, with_command: bool = False) -> Network:
     """Return a policy of many bodies: `universal`, which comes with the package, a policy file, or that of a run.
+
+    Args:
+        name: of the policy.
+        with_command: whether `universal` follows a command, as in `steer`, or walks ahead, as in `walk`.
 
     Raises:
         ValueError: a damaged file, or a policy of one body.
         OSError: the file cannot be read.
     """
-    made = network.load(PACKAGED if name == "universal" else name)
+    packaged = PACKAGED / f"{NAME}-{'steer' if with_command else 'walk'}{network.EXTENSION}"
+    made = network.load(packaged if name == NAME else name)
     if not isinstance(made.setup, BodiesSetup):
         raise ValueError(f"policy {name}: expected one of many bodies, got one of {made.setup.body.name}")
     return made
