@@ -58,9 +58,8 @@ def test_the_order_of_legs_does_not_matter(vectors):
     for place in (0, 3):
         parts[place] = parts[place].reshape(tokens.LEGS, -1)[order].ravel()
     other = np.concatenate(parts)
-    actions, turned = (
-        np.asarray(architecture.actions(of_actions, each)).reshape(12, 4) for each in (vectors[0], other)
-    )
+    both = np.stack([vectors[0], other])
+    actions, turned = np.asarray(architecture.actions(of_actions, both)).reshape(2, 12, 4)
     assert_allclose(turned, actions[order], atol=1e-5)
     values = np.asarray(architecture.values(of_values, both))
     assert values[0] == pytest.approx(values[1], abs=1e-5)
