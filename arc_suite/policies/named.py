@@ -167,7 +167,7 @@ def trained(name: str | os.PathLike) -> Network:
     if (zipped := zips.parts(name)) is None:
         made = network.load(name)
         if isinstance(made.setup, BodiesSetup):
-            raise ValueError(f"policy {name}: expected one of a single body, got one of {made.setup.robot}")
+            raise ValueError(f"policy {name}: expected one of one body, or --robot; got one of {made.setup.robot}")
         return made
     if (setup := zips.setup(zipped[0])) is None:
         raise ValueError(f"policy {zipped[0]}: {_UNKNOWN}")

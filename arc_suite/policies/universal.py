@@ -46,6 +46,10 @@ class Universal:
     Attributes:
         network: of many bodies.
         task: that it acts in.
+        tokens: that the network sees, of one environment.
+        descriptions: of the legs (1, 12, 41) and of the torso (1, 10).
+        reach: (joints,) angles that an action of 1 asks for, rad.
+        gains: stiffness (joints,), action per rad, and damping (joints,), action per rad/s, of position control.
     """
 
     def __init__(self, trained: Network, task: Task):
@@ -57,11 +61,11 @@ class Universal:
         """
         self.network, self.task = trained, task
         described, body = tokens.described(task), task.scene.body
-        self._descriptions = described.legs[None], described.torso[None]
-        self._reach = described.reach[described.mask]
-        self._tokens = Tokens.of([task])
-        self._gains = position_gains(sized(body), standing(body).inertias)
-        self._batch = functools.lru_cache(maxsize=4)(lambda count: self._tokens.part(np.zeros(count, int)))
+        self.descriptions = described.legs[None], described.torso[None]
+        self.reach = described.reach[described.mask]
+        self.tokens = Tokens.of([task])
+        self.gains = position_gains(sized(body), standing(body).inertias)
+        self._batch = functools.lru_cache(maxsize=4)(lambda count: self.tokens.part(np.zeros(count, int)))
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
@@ -72,13 +76,13 @@ class Universal:
         Raises:
             ValueError: an observation of another body, or without a block of the task.
         """
-        blocks = checked(observation, self.task.blocks, len(self._reach), len(self.task.scene.body.part_names))
+        blocks = checked(observation, self.task.blocks, len(self.reach), len(self.task.scene.body.part_names))
         vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
         own = self._batch(len(vectors))
         seen = own.observed(own.gathered(vectors))
-        descriptions = (np.repeat(part, len(vectors), axis=0) for part in self._descriptions)
+        descriptions = (np.repeat(part, len(vectors), axis=0) for part in self.descriptions)
         positions = own.actions(self.network.actions(tokens.flat(seen, *descriptions))).astype(float)
         if self.task.actions == "position":
             return positions
-        _, angles, speeds = proprioception(checked(observation, Clocked.reads, len(self._reach)))
-        return torques(self._reach * positions, angles, speeds, *self._gains)
+        _, angles, speeds = proprioception(checked(observation, Clocked.reads, len(self.reach)))
+        return torques(self.reach * positions, angles, speeds, *self.gains)

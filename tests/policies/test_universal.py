@@ -98,7 +98,7 @@ def test_what_does_not_fit_is_one_line(trained, tmp_path):
     excluded = Setup.of("tick", "walk", {"exclude_blocks": ["contact_forces"]}).definition
     with pytest.raises(ValueError, match=r"^task walk: expected the blocks posture, velocities, contact_forces, "):
         policies.policy(trained, "tick", task=excluded)
-    with pytest.raises(ValueError, match=r"expected one of a single body, got one of random:0-1$"):
+    with pytest.raises(ValueError, match=r"expected one of one body, or --robot; got one of random:0-1$"):
         policies.trained(trained)
     single = Setup.of("leaper").definition
     layers = (network.Layer("linear", (np.zeros((single.size, 12), np.float32), np.zeros(12, np.float32))),)
