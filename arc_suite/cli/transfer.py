@@ -7,16 +7,21 @@ motors sized anew; 20 mutants of them; and 10 random bodies a quarter, and ten t
 
   arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
   arc-suite transfer --policy universal --task steer --families varied,robots -o steer.csv
+  arc-suite transfer --page docs/any_body.md
+
+With --page nothing is played: the tables of episodes in studies/bodies become the table of a page.
 """
 
-import csv
+from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, files
+from arc_suite import checks
 from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.program import marked_page
 from arc_suite.evaluation import transfer
 from arc_suite.policies import universal
+from arc_suite.studies import bodies
 
 FLAGS = flags.FLAGS
 define_task()
@@ -24,26 +29,25 @@ flags.DEFINE_string("policy", "universal", "Folder of a run of many bodies, a po
 flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with.")
 flags.DEFINE_string("output", None, "File to write every episode to, as CSV.", short_name="o")
 
-_HEADS = ("family", "body", "who", "return", "walked", "tracking")
+flags.DEFINE_string("page", None, "Page to write a table into, between the lines <!-- table --> and <!-- end -->.")
+flags.DEFINE_string("results", "studies/bodies", "Folder of the tables of episodes for --page.")
 
 
 def main() -> None:
-    """Play, print the table and write the episodes."""
+    """Play, print the table and write the episodes; or write a page."""
+    if FLAGS.page:
+        marked_page("page", FLAGS.page)(bodies.text(Path(FLAGS.results)))
+        return
     name, settings = task()
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
-    network, lines = universal.load(FLAGS.policy, name != "walk"), []
+    network, every = universal.load(FLAGS.policy, name != "walk"), {}
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.Result._fields))
     for family in FLAGS.families:
         played = transfer.of_family(family, network, name, settings)
         print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in transfer.result(played)), flush=True)
-        for trial in played:
-            for who in ("policy", "demonstrator", "zero"):
-                lines.append((family, trial.body, who, *getattr(trial, who)))
+        every[family] = played
     if FLAGS.output:
-        with files.writing(FLAGS.output) as path, path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(_HEADS)
-            writer.writerows(lines)
+        bodies.write(Path(FLAGS.output), every)

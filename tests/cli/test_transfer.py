@@ -2,8 +2,8 @@
 
 import csv
 
-import pytest
 import programs
+import pytest
 from legs import network as drawn
 
 from arc_suite.policies import network
