@@ -63,7 +63,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
+        (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (
             ("zero", "quen"),
             f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
