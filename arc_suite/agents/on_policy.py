@@ -144,7 +144,7 @@ def batch_of(
 
 def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Layer, tuple]:
     """The normaliser and the network of the policy that learning starts from."""
-    found = start(hp, context, task)
+    found = _start(hp, context, task)
     first, *layers, last = getattr(found, "layers", ()) or (Layer("none"), Layer("none"))
     if (first.kind, last.kind) != ("normalise", "clip"):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
@@ -159,12 +159,12 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
-        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {policy[0]['weight'].shape[1]}")
+        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
     return first, policy
 
 
-def start(hp: ProximalPolicy, context: RunContext, task):
-    """Return the policy that learning starts from."""
+def _start(hp: ProximalPolicy, context: RunContext, task):
+    """The policy that learning starts from."""
     if isinstance(context.setup, BodiesSetup):
         return universal.load(hp.start)
     return policies.policy(Path(hp.start), context.setup.body, task=task)

@@ -47,6 +47,8 @@ def main(run: str | None = None) -> None:
         setup = only_setup(_ROBOT)
         onnx_file.save_universal(output, universal.load(name, setup.task != "walk"), setup)
         size, joints = setup.definition.size, len(setup.body.joint_names)
+    elif run == universal.NAME:
+        raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
     else:
         policy = policies.trained(name)
         onnx_file.save(output, policy)

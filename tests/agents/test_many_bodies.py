@@ -125,6 +125,14 @@ def test_what_learns_with_one_body_alone_is_one_line():
         Configuration.of(SETUP, "sac")
 
 
+def test_a_start_of_other_layers_is_one_line(tmp_path):
+    run = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
+    assert train(run, tmp_path / "start")
+    begun = learning("finetune_bodies", PPO | {"start": str(tmp_path / "start"), "hidden": 16}, tmp_path, SETUP)
+    with pytest.raises(ValueError, match=r"start: expected 16 hidden units, got 8$"):
+        begun.advance()
+
+
 def test_a_start_of_one_body_is_one_line(tmp_path):
     run = Configuration.of(Setup.of("leaper", "steer"), "dagger", SMALL, steps=64, evaluate_every=64)
     assert train(run, tmp_path / "one")
