@@ -1,0 +1,64 @@
+"""Parts of Markdown pages, as text."""
+
+import html
+import inspect
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+_FIELD = re.compile(r"^    (?P<names>\w+(?:, \w+)*): (?P<text>.*(?:\n {8,}.*)*)", re.MULTILINE)
+
+
+def table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """Return a table."""
+    rows = (heads, ["---"] * len(heads), *lines)
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
+
+
+def page(title: str, *parts: str) -> str:
+    """Return a page of paragraphs, headings and tables; empty parts are left out."""
+    return "\n\n".join([f"# {title}", *filter(None, parts)]) + "\n"
+
+
+def dropdown(title: str, heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
+    """Return a long table that a click unfolds, as HTML, which Sphinx takes as it is."""
+    rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in cells) for cells in lines]
+    head = "".join(f"<th>{name}</th>" for name in heads)
+    body = "\n".join(f"<tr>{row}</tr>" for row in rows)
+    table = f'<table class="docutils">\n<tr>{head}</tr>\n{body}\n</table>'
+    return f"<details>\n<summary>{title}</summary>\n{table}\n</details>"
+
+
+def cards(texts: Mapping[str, str]) -> str:
+    """Return a grid of cards by their links, whose texts are those of the pages."""
+    each = [f":::{{grid-item-card}}\n:link: {link}\n:link-type: doc\n\n{text}\n:::" for link, text in texts.items()]
+    return "\n\n".join(["::::{grid} 1 2 2 2\n:gutter: 2", *each, "::::"])
+
+
+def number(value) -> str:
+    """Return a number, several numbers, a name or None as a cell of a table."""
+    if isinstance(value, tuple | list | np.ndarray):
+        values = np.asarray(value).tolist()
+        same = len(values) > 2 and len(set(values)) == 1
+        return number(values[0]) if same else f"({', '.join(map(number, values))})"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {number(each)}" for name, each in value.items()) or "none"
+    if isinstance(value, str) or value is None or isinstance(value, bool):
+        return {"None": "none", "True": "true", "False": "false"}.get(str(value), str(value))
+    return f"{float(value):.4g}"
+
+
+def summary(documented) -> str:
+    """Return the first sentence of a docstring."""
+    return " ".join(inspect.getdoc(documented).partition("\n\n")[0].split())
+
+
+def fields(documented) -> dict[str, str]:
+    """Return the meanings of a class's attributes by name, from the section `Attributes` of its docstring."""
+    _, _, section = inspect.getdoc(documented).partition("Attributes:\n")
+    meanings = {}
+    for found in _FIELD.finditer(section):
+        for name in found["names"].split(", "):
+            meanings[name] = " ".join(found["text"].split()).removesuffix(".")
+    return meanings
