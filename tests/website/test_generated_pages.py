@@ -10,7 +10,7 @@ import arc_suite
 from arc_suite.cli.programs import PROGRAMS
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
-from arc_suite.tasks import TASKS, walk
+from arc_suite.tasks import TASKS, modifiers, walk
 
 
 def row(page, first, section=""):
@@ -66,6 +66,11 @@ def test_the_page_of_a_task_is_complete(name):
     headings = re.findall("^## (.*)$", page, re.MULTILINE)
     asks, *others = ("What it asks", "Observation", "Reward", "End", "Metrics", "Settings", "Demonstrators", "Learners")
     assert headings == [asks, *others]
+
+
+def test_the_page_of_settings_names_every_modifier():
+    page = reference.settings_page()
+    assert all(row(page, f"`{name}`")[-1] for name in (*modifiers.NAMES, "time_limit", "arena", "random"))
 
 
 BOUNDED = [
