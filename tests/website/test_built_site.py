@@ -5,12 +5,23 @@ import urllib.parse
 
 import pytest
 import tabs
+from website import players
 from website.returns import ROOT
 from website.sources import BELOW
 
 SITE = ROOT / "out" / "docs" / "html"
-pytestmark = pytest.mark.skipif(not (SITE / "index.html").is_file(), reason="no site here: make docs")
+PAGES = [*ROOT.glob("docs/*.md"), ROOT / "README.md"]
 
+
+def of_these_pages():
+    """Whether the site is there, and not one of earlier pages."""
+    index = SITE / "index.html"
+    return index.is_file() and index.stat().st_mtime > max(page.stat().st_mtime for page in PAGES)
+
+
+pytestmark = pytest.mark.skipif(not of_these_pages(), reason="no site of these pages here: make docs")
+
+PLAYERS = (players.GAME, *players.films().values())
 FIRST_STEPS = ROOT / "docs" / "first_steps.md"
 
 
@@ -30,8 +41,8 @@ class Page(html.parser.HTMLParser):
 
 @pytest.fixture(scope="module")
 def pages():
-    """Pages of Sphinx by path; others are files of one piece."""
-    return {path: Page(path) for path in sorted(SITE.rglob("*.html")) if path.name not in ("play.html",)}
+    """Pages of Sphinx by path; those in which creatures walk are of one piece."""
+    return {path: Page(path) for path in sorted(SITE.rglob("*.html")) if path.name not in PLAYERS}
 
 
 def test_every_link_leads_somewhere(pages):

@@ -1,9 +1,9 @@
 """Parts of Markdown pages, as text."""
 
-import html
 import inspect
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from xml.etree.ElementTree import Element, indent, tostring
 
 import numpy as np
 
@@ -23,11 +23,27 @@ def page(title: str, *parts: str) -> str:
 
 def dropdown(title: str, heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
     """Return a long table that a click unfolds, as HTML, which Sphinx takes as it is."""
-    rows = ["".join(f"<td>{html.escape(cell)}</td>" for cell in cells) for cells in lines]
-    head = "".join(f"<th>{name}</th>" for name in heads)
-    body = "\n".join(f"<tr>{row}</tr>" for row in rows)
-    table = f'<table class="docutils">\n<tr>{head}</tr>\n{body}\n</table>'
-    return f"<details>\n<summary>{title}</summary>\n{table}\n</details>"
+    rows = [_row("th", heads), *(_row("td", cells) for cells in lines)]
+    table = element("table", children=rows, **{"class": "docutils"})
+    return as_html(element("details", children=[element("summary", title), table]))
+
+
+def _row(tag: str, cells: Sequence[str]) -> Element:
+    return element("tr", children=[element(tag, cell) for cell in cells])
+
+
+def element(tag: str, text: str = "", children: Sequence[Element] = (), **attributes: str) -> Element:
+    """Return an element of HTML."""
+    made = Element(tag, attributes)
+    made.text = text
+    made.extend(children)
+    return made
+
+
+def as_html(made: Element) -> str:
+    """Return an element as text, with a row of a table on each line."""
+    indent(made, space="")
+    return tostring(made, encoding="unicode", method="html")
 
 
 def cards(texts: Mapping[str, str]) -> str:

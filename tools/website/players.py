@@ -6,6 +6,7 @@ import arc_suite
 from arc_suite import policies, style
 from arc_suite.export import pages, play
 from arc_suite.robots import ROBOTS
+from website import markdown
 
 GAME = "play.html"
 STEPS = 200  # control steps of a film
@@ -34,4 +35,5 @@ def write(folder: Path) -> None:
 
 def frame(source: str, title: str) -> str:
     """Return the HTML that shows a page within another."""
-    return f'<iframe class="creature" src="{source}" title="{title}" loading="lazy"></iframe>'
+    attributes = {"class": "creature", "src": source, "title": title, "loading": "lazy"}
+    return markdown.as_html(markdown.element("iframe", **attributes))

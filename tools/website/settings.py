@@ -23,6 +23,7 @@ _MEANINGS = {
     "cost_limit": "bound of the weighted sum of the costs of a step",
     "time_limit": f"of an episode, s; {STEPS} control steps without it",
     "arena": f"another ground: {', '.join(ARENAS)}",
+    "on_divergence": "raise, or terminate: what a step does whose physics diverges; terminate in vector environments",
     "random": "seed of the episodes, for `load`; Gymnasium takes it in `reset`",
 }
 MEANINGS = {
@@ -53,7 +54,7 @@ def of_task(kind: type[Task]) -> str:
 
 def of_all_tasks() -> str:
     """Return the table of the settings that every task has."""
-    names = ("random", "time_limit", "arena", *modifiers.NAMES)
+    names = ("random", "time_limit", "arena", "on_divergence", *modifiers.NAMES)
     defaults = {"": {name: default for name, default in Modifiers()._asdict().items()}}
     return markdown.table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in names))
 
