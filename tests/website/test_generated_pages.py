@@ -7,6 +7,7 @@ import pytest
 from website import observations, reference, robots, settings, sources, tasks
 
 import arc_suite
+from arc_suite import registry
 from arc_suite.cli.programs import PROGRAMS
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
@@ -98,6 +99,14 @@ def test_robots_have_the_torques_and_ranges_of_their_specs():
             assert name.strip("`") == body.joint_names[index]
             assert degrees == f"{joint.range_deg[0]:.0f} to {joint.range_deg[1]:.0f}"
             assert float(torque) == pytest.approx(joint.motor.gear, rel=1e-3)
+
+
+def test_the_gallery_has_bodies_of_the_family():
+    page = robots.gallery("")
+    legs, joints, mass, *_ = row(page, "`varied:7`")
+    body = registry.body_of("varied:7")
+    assert (int(legs), int(joints)) == (len(body.legs), len(body.joint_names))
+    assert float(mass) > 0.0
 
 
 def test_the_front_page_has_every_page():

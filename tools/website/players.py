@@ -3,12 +3,13 @@
 from pathlib import Path
 
 import arc_suite
-from arc_suite import policies, style
+from arc_suite import policies, registry, style
 from arc_suite.export import pages, play
 from arc_suite.robots import ROBOTS
 from website import markdown
 
-GAME = "play.html"
+GAME, GALLERY = "play.html", "gallery.html"  # pages to play in: the robots, generated creatures
+CREATURES = tuple(f"varied:{seed}" for seed in range(24))
 STEPS = 200  # control steps of a film
 
 
@@ -18,14 +19,14 @@ def films() -> dict[str, str]:
 
 
 def write(folder: Path) -> None:
-    """Write the page to play in, and the film of each robot.
+    """Write the pages to play in, and the film of each robot.
 
     Raises:
         ValueError: the scripts have not been built.
     """
-    game = play.page([play.creature(body) for body in ROBOTS.values()])
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / GAME).write_text(game, encoding="utf-8")
+    for name, bodies in {GAME: ROBOTS.values(), GALLERY: map(registry.body_of, CREATURES)}.items():
+        page = play.page([play.creature(body) for body in bodies])
+        (folder / name).write_text(page, encoding="utf-8")
     for robot, name in films().items():
         environment = arc_suite.load(robot, "walk", {"random": 0})
         policy = policies.policy("ppo", robot, task=environment.task.definition)

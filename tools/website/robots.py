@@ -4,7 +4,7 @@ import importlib
 import math
 
 from arc_suite.envs.setup import Setup
-from website import markdown, observations, returns
+from website import markdown, observations, players, returns
 
 
 def page(robot: str, film: str = "") -> str:
@@ -94,3 +94,29 @@ def _gait(task) -> str:
             ("healthy heights of the torso", f"{markdown.number(settings.healthy_range)} m"),
         ],
     )
+
+
+def gallery(frame: str) -> str:
+    """Return the page of generated creatures.
+
+    Args:
+        frame: Markdown of a page to play in; empty without one.
+    """
+    return markdown.page(
+        "24 generated creatures",
+        f"Every program takes these names: `arc-suite render --robot {players.CREATURES[0]} -o a.mp4` renders a walk, "
+        f"and `arc-suite animate --robot {players.CREATURES[0]} -o a.glb` exports clips. "
+        "Nothing was trained or tuned for them.",
+        frame,
+        markdown.table(
+            ("body", "legs", "joints", "mass, kg", "standing height, m", "v*, m/s", "frequency, Hz", "duty factor"),
+            map(_creature, players.CREATURES),
+        ),
+    )
+
+
+def _creature(name: str) -> list[str]:
+    task, model = Setup.of(name).prepared()
+    body, gait = task.scene.body, task.parameters
+    numbers = model.body_mass.sum(), body.torso.standing_height, *gait[:3]
+    return [f"`{name}`", f"{len(body.legs)}", f"{model.nu}", *map(markdown.number, numbers)]

@@ -17,6 +17,7 @@ FRONT = (ROOT / "README.md", ROOT / "docs" / "README.md")  # whose texts the fro
 # Page -> pages that lie below it, most of them generated, with what their cards say.
 BELOW = {
     "docs/robots.md": {f"robots/{robot}": robots.about(robot) for robot in players.films()},
+    "docs/bodies.md": {"robots/gallery": "24 generated creatures"},
     "docs/tasks.md": {f"tasks/{name}": f"`{name}`: {markdown.summary(task)}" for name, task in TASKS.items()},
     "docs/reference.md": {f"reference/{name}": title for name, title in reference.TITLES.items()},
     "studies/README.md": {f"{path.parent.name}/README": path.parent.name for path in ROOT.glob("studies/*/README.md")},
@@ -79,6 +80,8 @@ def generated(walks: bool) -> Iterator[tuple[str, str]]:
     """Yield names of generated pages, as in `BELOW`, and their texts."""
     for robot, name in players.films().items():
         yield f"robots/{robot}", robots.page(robot, players.frame(f"../../{name}", f"{robot} walks") if walks else "")
+    shown = players.frame(f"../../{players.GALLERY}#walk", "Creatures to play with") if walks else ""
+    yield "robots/gallery", robots.gallery(shown)
     yield from ((f"tasks/{task}", tasks.page(task)) for task in TASKS)
     yield from ((f"reference/{name}", text) for name, text in reference.pages())
 
