@@ -54,7 +54,7 @@ def counts() -> dict[str, Count]:
 
 def short(sentences: list[int]) -> float:
     """Return the share of sentences that have at most `LONG` words."""
-    return sum(length <= LONG for length in sentences) / len(sentences)
+    return 1.0 - sum(length > LONG for length in sentences) / max(len(sentences), 1)
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ import pathlib
 import re
 import shlex
 
+import package_page
 import programs
 import pytest
 import test_layers
@@ -117,6 +118,13 @@ def test_table_of_returns():
     for robot, returns in _rows(README, "robot | standing").items():
         standing, _, medium, _, best, _, ppo, paper = (round(float(cell.split()[0])) for cell in results[robot])
         assert returns == [str(value) for value in (standing, medium, best, ppo, paper)]
+
+
+def test_the_text_for_package_indexes_is_made_from_the_readme():
+    """By python tools/package_page.py."""
+    page = package_page.page(README)
+    assert _page("package") == page
+    assert "](docs/" not in page and "make demo" not in page and "pip install 'arc_suite[agents,video]'" in page
 
 
 def test_every_program_has_a_row():
