@@ -1,5 +1,7 @@
 """Clips of robots, examples and random bodies: `make clip-sets`, half an hour.
 
+python tests/clip_sets.py [NUMBER OF RANDOM BODIES]
+
 Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
 before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
 heights. Fails if a body has no file, fewer than 85 % of the random bodies have loops of one cycle, or fewer than 95 %
@@ -21,7 +23,6 @@ from arc_suite.export.recorder import Recorder
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 
-RANDOM = 100
 ONE_CYCLE, CONNECTED, APART = 0.85, 0.95, 0.08
 LOW = 0.01  # of a sole that slips
 
@@ -68,9 +69,9 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     return found, left_out
 
 
-def main() -> int:
+def main(count: str = "100") -> int:
     """Measure the bodies, and return the exit status."""
-    bodies = {f"random_{seed}": generator.random_body(seed) for seed in range(RANDOM)}
+    bodies = {f"random_{seed}": generator.random_body(seed) for seed in range(int(count))}
     others = dict(ROBOTS) | {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
     numbers = {}
     for name, body in tqdm((others | bodies).items(), disable=None, unit="body"):
@@ -101,4 +102,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*sys.argv[1:]))
