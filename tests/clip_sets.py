@@ -8,6 +8,7 @@ heights. Fails if a body has no file, fewer than 85 % of the random bodies have 
 of the bodies stop from a pose within 0.08 of the walk's.
 """
 
+import functools
 import sys
 
 import mujoco
@@ -25,6 +26,12 @@ from arc_suite.simulation.model import compiled
 
 ONE_CYCLE, CONNECTED, APART = 0.85, 0.95, 0.08
 LOW = 0.01  # of a sole that slips
+
+
+class Kept(Recorder):
+    """A recorder that records each passage once."""
+
+    transition = functools.cache(Recorder.transition)
 
 
 def apart(body, one, other) -> float:
@@ -53,7 +60,7 @@ def slip(body, motion) -> tuple[float, float]:
 
 def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the default clips of a body by name, and the reasons of those that are left out."""
-    recorder, left_out = Recorder(Setup.of(body, "steer"), "cpg", None), {}
+    recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
     made = drafts(recorder, DEFAULT, iter, left_out)
     loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], Walk)]
     found = {"clips": len(DEFAULT) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}

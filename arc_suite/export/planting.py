@@ -74,6 +74,8 @@ def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndar
         follows = waits & (missed <= _SINKS * height) & (_paces(reached) <= fastest)
         found = np.where(follows[:, None], reached, found)
         waits &= ~follows
+        if not waits.any():
+            break
     joints = legs.by_joint(found)
     if loops:
         joints[-1] = joints[0]
