@@ -2,6 +2,7 @@
 
 Example:
   python tools/package_policies.py runs/tick-walk-ppo-0
+  python tools/package_policies.py runs/varied.0-511-steer-dagger_bodies-0
 """
 
 import dataclasses
@@ -12,10 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import evaluation, files, policies
-from arc_suite.agents import configuration
+from arc_suite.agents import configuration, run_folder
 from arc_suite.cli import program
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network
+from arc_suite.policies import network, universal
 from arc_suite.policies.named import PACKAGED
 
 INDEX = PACKAGED / "policies.json"
@@ -26,11 +28,28 @@ def command(run: configuration.Configuration) -> str:
     defaults = dataclasses.asdict(run.definition.hyperparameters.__class__())
     values = dataclasses.asdict(run.hyperparameters)
     hyperparameters = {name: value for name, value in values.items() if value != defaults[name]}
-    flags = [f"--robot={run.setup.body.name}", f"--task={run.setup.task}", f"--algorithm={run.algorithm}"]
+    flags = [f"--robot={robot(run.setup)}", f"--task={run.setup.task}", f"--algorithm={run.algorithm}"]
     flags += [f"--steps={run.steps}", f"--seed={run.seed}", f"--evaluate_every={run.evaluate_every}"]
     flags += [f"--hp={name}={value}" for name, value in hyperparameters.items()]
     flags += [f"--set={name}={json.dumps(value)}" for name, value in run.setup.task_kwargs.items()]
-    return shlex.join(["arc-suite", "train", *flags])
+    trained = shlex.join(["arc-suite", "train", *flags])
+    start = Path(hyperparameters.get("start", ""), run_folder.CONFIG)
+    return f"{command(configuration.read(start))} -o {start.parent} && {trained}" if start.exists() else trained
+
+
+def robot(setup: Setup | BodiesSetup) -> str:
+    """Return what --robot names."""
+    return setup.robot if isinstance(setup, BodiesSetup) else setup.body.name
+
+
+def returns(path: Path) -> list[float]:
+    """Return the returns of a packaged policy in the episodes of evaluation."""
+    packaged = network.load(path)
+    setup = packaged.setup.validation(evaluation.EPISODES)
+    if isinstance(setup, Setup):
+        setup = Setup.of(setup.body, setup.task)  # observes all
+    environment = setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled")
+    return [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
 
 
 def main(run: str | None = None) -> None:
@@ -39,15 +58,14 @@ def main(run: str | None = None) -> None:
         raise ValueError("expected the folder of a run, got none")
     found, known = network.load(Path(run)), configuration.read(Path(run) / "config.json")
     layers = [layer._replace(arrays=tuple(a.astype(np.float16) for a in layer.arrays)) for layer in found.layers]
-    name = f"{known.setup.body.name}-{known.setup.task}"
+    several = isinstance(known.setup, BodiesSetup)
+    name = f"{universal.NAME if several else known.setup.body.name}-{known.setup.task}"
     PACKAGED.mkdir(exist_ok=True)
     path = PACKAGED / f"{name}{network.EXTENSION}"
     network.save(path, found._replace(layers=tuple(layers)))
-    environment = Setup.of(known.setup.body, known.setup.task).make_vec(10, autoreset_mode="Disabled")
-    returns = [episode.total for episode in evaluation.episodes_in_batch(environment, network.load(path))]
     entry = {
         "command": command(known),
-        "return": round(float(np.mean(returns)), 1),
+        "return": round(float(np.mean(returns(path))), 1),
         "sha256": policies.digest(str(path)),
     }
     index = files.read_json(INDEX) if INDEX.exists() else {}

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from arc_suite import checks, versions
 from arc_suite.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
 from arc_suite.arenas import FLAT
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 
 SOURCES = ("nothing", "prior data", "a demonstrator", "a policy")
@@ -26,6 +27,7 @@ class Algorithm(NamedTuple):
         terrain_steps: the same in another arena than the flat one; None for as many.
         extends: whether a run can be extended to more steps, as no schedule hangs on them.
         source: what it learns from, other than its own steps: one of `SOURCES`.
+        several: whether it can learn with several bodies.
     """
 
     learner: str
@@ -36,6 +38,7 @@ class Algorithm(NamedTuple):
     terrain_steps: int | None = None
     extends: bool = False
     source: str = "nothing"
+    several: bool = False
 
     @property
     def module(self) -> ModuleType:
@@ -51,7 +54,7 @@ class Algorithm(NamedTuple):
                 raise ValueError(f"learner {self.learner}: {error}") from None
             raise versions.MissingExtra("training needs JAX", "agents", error) from None
 
-    def steps_of(self, setup: Setup) -> int:
+    def steps_of(self, setup: Setup | BodiesSetup) -> int:
         """Return the environment steps of a run, by default.
 
         Raises:
@@ -140,6 +143,7 @@ ALGORITHMS = {
         "proximal policy optimisation",
         evaluate_every=100_000,
         terrain_steps=3_000_000,
+        several=True,
     ),
     # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": Algorithm(
@@ -156,6 +160,7 @@ ALGORITHMS = {
         evaluate_every=100_000,
         steps=500_000,
         source="a policy",
+        several=True,
     ),
     "dagger": Algorithm(
         "arc_suite.agents.dagger",
@@ -164,6 +169,40 @@ ALGORITHMS = {
         evaluate_every=25_600,
         steps=25_600,
         source="a demonstrator",
+        several=True,
+    ),
+    # One policy for many bodies: two environments of each of 128, small batches as a network of legs is large.
+    "dagger_bodies": Algorithm(
+        "arc_suite.agents.dagger",
+        DAgger(num_envs=256, round=60, updates=500, last_updates=1100, batch=128, hidden=128),
+        "imitation of the demonstrators of many bodies, by one policy",
+        evaluate_every=46_080,
+        steps=46_080,
+        source="a demonstrator",
+        several=True,
+    ),
+    "finetune_bodies": Algorithm(
+        "arc_suite.agents.on_policy",
+        ProximalPolicy(
+            num_envs=256,
+            horizon=24,
+            epochs=2,
+            minibatch=512,
+            symmetry_augmentation=False,
+            discount=0.96,
+            initial_std=0.08,
+            final_std=0.08,
+            initial_desired_kl=0.06,
+            final_desired_kl=0.03,
+            policy_rate=8e-5,
+            value_warm_up=96,
+            hidden=128,
+        ),
+        "proximal policy optimisation with many bodies from the policy of another run, --hp start=FOLDER",
+        evaluate_every=122_880,
+        steps=270_336,
+        source="a policy",
+        several=True,
     ),
     # Its steps are updates.
     "bc": Algorithm(

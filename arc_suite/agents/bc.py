@@ -10,6 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from arc_suite.agents import dagger, networks, priors
+from arc_suite.agents.architectures import Perceptron
 from arc_suite.agents.hyperparameters import BehaviourCloning
 from arc_suite.agents.learner import RunContext, Slice, generator, restoring
 from arc_suite.agents.normaliser import Moments
@@ -35,8 +36,8 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
     for first in range(0, len(data), _CHUNK):
         moments = moments.after(data.at(np.arange(first, min(first + _CHUNK, len(data)))).observations)
     normalise = moments.layer()
-    sizes = (task.size, hp.hidden, hp.hidden, len(context.setup.body.joint_names))
-    state = dagger.begin(networks.mlp(generator(context.seed, "networks", 0), sizes, "orthogonal", gain=2**0.5))
+    architecture = Perceptron(task.size, len(context.setup.body.joint_names))
+    state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
     step = 0
 
     if (saved := context.checkpoint) is not None:
@@ -51,6 +52,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
             batch = data.at(random.integers(len(data), size=updates * hp.batch))
             rates = hp.learning_rate * (1.0 - (step + np.arange(updates)) / context.steps)
             state, error = dagger.fit(
+                architecture,
                 state,
                 forward([normalise], batch.observations),
                 batch.actions,
@@ -60,4 +62,4 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
             errors.append(float(error))
             step += updates
         checkpoint = {**networks.named("state", state), "step": np.array(step)}
-        yield Slice(step, {"error": float(np.mean(errors))}, dagger.policy(normalise, state), checkpoint)
+        yield Slice(step, {"error": float(np.mean(errors))}, dagger.policy(architecture, normalise, state), checkpoint)

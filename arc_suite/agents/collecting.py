@@ -6,8 +6,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from arc_suite.agents import learner
+from arc_suite.agents import architectures, learner
 from arc_suite.agents import proximal_policy as ppo
+from arc_suite.agents.architectures import Architecture
 from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.learner import Diverged, RunContext, generator
 from arc_suite.policies import network
@@ -23,11 +24,11 @@ class Collector(Protocol):
 
     Attributes:
         task: of the environments.
-        joints: numbers of an action.
+        architecture: of networks for it.
     """
 
     task: Task
-    joints: int
+    architecture: Architecture
 
     def roll_out(self, policy, normalise: Layer, std: float, iteration: int, step: int) -> dict[str, Any]:
         """Act in all environments for a horizon.
@@ -64,7 +65,7 @@ class Environments:
     def __init__(self, hp: ProximalPolicy, context: RunContext):
         """Begin the first episodes."""
         self._hp, self._seed, self.environment = hp, context.seed, context.environment(hp.num_envs)
-        self.task, self.joints = self.environment.task.definition, self.environment.single_action_space.shape[0]
+        self.task, self.architecture = self.environment.task.definition, architectures.of(self.environment)
         self.observation, _ = self.environment.reset()
         steps = ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
@@ -74,7 +75,8 @@ class Environments:
         random = generator(self._seed, "noise", iteration)
         rollout = {name: [] for name in TRANSITIONS}
         for _ in range(self._hp.horizon):
-            mean = np.asarray(ppo.mean_action(policy, network.forward([normalise], self.observation)))
+            normalised = network.forward([normalise], self.observation)
+            mean = np.asarray(ppo.mean_action(self.architecture, policy, normalised))
             if not np.isfinite(mean).all():
                 raise Diverged("an action is not finite", step)
             action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)

@@ -8,6 +8,8 @@ from typing import Any, Self
 from arc_suite import checks, evaluation, files, versions
 from arc_suite.agents import algorithms
 from arc_suite.agents.learner import MOST_SEEDS
+from arc_suite.envs import bodies_setup
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 
 # Names in the record of a run that follow from its configuration, the data and the installed packages.
@@ -20,7 +22,7 @@ class Configuration:
     """Everything that a run depends on, apart from installed packages; make it by `of` or `from_dict`.
 
     Attributes:
-        setup: body, task and settings.
+        setup: body, or bodies, task and settings.
         algorithm: name, or `module:attribute`; see `algorithms.algorithm`.
         hyperparameters: of the algorithm, a frozen dataclass.
         seed: of all random numbers.
@@ -29,7 +31,7 @@ class Configuration:
         prior: id of a dataset of prior data; None for none.
     """
 
-    setup: Setup
+    setup: Setup | BodiesSetup
     algorithm: str
     hyperparameters: Any
     seed: int
@@ -40,7 +42,7 @@ class Configuration:
     @classmethod
     def of(
         cls,
-        setup: Setup,
+        setup: Setup | BodiesSetup,
         algorithm: str = "ppo",
         hyperparameters: Mapping[str, Any] | None = None,
         seed: int = 0,
@@ -54,6 +56,9 @@ class Configuration:
             ValueError: an unknown algorithm or hyperparameter, or a value out of its range.
         """
         definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters or {})
+        if isinstance(setup, BodiesSetup) and not definition.several:
+            those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
+            raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
         steps = definition.steps_of(setup) if steps is None else steps
         evaluate_every = definition.evaluate_every if evaluate_every is None else evaluate_every
         checks.integer("seed", seed, 0, MOST_SEEDS)
@@ -71,7 +76,7 @@ class Configuration:
     @property
     def name(self) -> str:
         """Name of the run's folder, if no other is given."""
-        return f"{self.setup.body.name}-{self.setup.kind.name}-{self.algorithm}-{self.seed}".replace(":", ".")
+        return f"{self.setup.name}-{self.setup.kind.name}-{self.algorithm}-{self.seed}".replace(":", ".")
 
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as files hold it, JSON-able."""
@@ -96,7 +101,7 @@ class Configuration:
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         checks.mapping("hyperparameters", fields.get("hyperparameters"))
-        setup = Setup.of(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
+        setup = bodies_setup.of_any(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
         return cls.of(setup, **{name: fields[name] for name in own if name in fields})
 
     def record(self) -> dict[str, Any]:

@@ -15,15 +15,14 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from arc_suite import policies
-from arc_suite.agents import learner, networks
+from arc_suite.agents import architectures, learner, networks
+from arc_suite.agents.architectures import Architecture
 from arc_suite.agents.hyperparameters import DAgger
 from arc_suite.agents.learner import RunContext, Slice, generator
 from arc_suite.agents.normaliser import Moments
-from arc_suite.cpg import suited_preset
 from arc_suite.policies.network import Layer, forward
+from arc_suite.policies.teachers import Teacher
 
-ACTIVATION = "elu"
 CHUNK = 20  # updates of one call
 
 
@@ -46,21 +45,17 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         ValueError: the body has no such preset, or the run is too short to learn.
     """
     environment = context.environment(hp.num_envs)
-    task, joints = environment.task.definition, environment.single_action_space.shape[0]
-    preset = hp.preset or suited_preset(task)
-    teacher = policies.policy("cpg", context.setup.body, preset, hp.num_envs, task=task)
-    layers = networks.mlp(
-        generator(context.seed, "networks", 0), (task.size, hp.hidden, hp.hidden, joints), "orthogonal", gain=2**0.5
-    )
-    state = begin(layers)
-    normalise = Moments.none(task.size).layer()
+    architecture, teacher = architectures.of(environment), Teacher(environment, hp.preset)
+    state = begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
+    moments = Moments.none(architecture.inputs)
+    normalise = architecture.normalise(moments)
     length = -(-context.steps // hp.num_envs)  # control steps of each environment
     if length <= hp.left_out:
         first = f"as the first {hp.left_out} control steps of an episode are not learned from"
         raise ValueError(f"steps: expected more than {hp.left_out * hp.num_envs}, {first}, got {context.steps}")
     dataset = {
-        "observations": np.zeros((length, hp.num_envs, task.size), np.float32),
-        "labels": np.zeros((length, hp.num_envs, joints), np.float32),
+        "observations": np.zeros((length, hp.num_envs, architecture.size), np.float32),
+        "labels": np.zeros((length, hp.num_envs, architecture.joints), np.float32),
         "ages": np.zeros((length, hp.num_envs), int),  # control steps since the episode's start
     }
     done, step = 0, 0  # control steps of each environment, environment steps
@@ -76,16 +71,15 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
                 array[:done] = saved[name]
             normalise = networks.restored_layer("normaliser", normalise, saved)
             observation = learner.restore_environment(environment, saved)
-        for earlier in range(done):  # the demonstrator's memory is not saved
-            _label(teacher, task, dataset["observations"][earlier], dataset["ages"][earlier])
+            teacher.restore(saved)
 
     while True:
         # Act for a round, by the demonstrator in the first half of the environments, and store its labels.
         rewards, random = [], generator(context.seed, "round", done)
         for _ in range(min(hp.round, -(-(context.next_evaluation(step) - step) // hp.num_envs))):
-            label = _label(teacher, task, observation, age).clip(-1.0, 1.0)
+            label = teacher.labels(observation, age).clip(-1.0, 1.0)
             action, own = label.copy(), slice(hp.num_envs // 2, None)
-            action[own] = _act(state.layers, forward([normalise], observation[own]))
+            action[own] = _act(architecture, state.layers, forward([normalise], observation[own]))
             action += hp.noise * random.standard_normal(action.shape)
             for array, value in zip(dataset.values(), (observation, label, age), strict=True):
                 array[done] = value
@@ -102,7 +96,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         )
         error = 0.0
         if len(labels):
-            normalise = Moments.none(task.size).after(observations).layer()
+            normalise = architecture.normalise(moments.after(architecture.seen(observations)))
             if done < length:
                 rates = hp.learning_rate * np.ones(hp.updates)
             else:
@@ -115,7 +109,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             for first in range(0, len(rates), CHUNK):
                 part = rates[first : first + CHUNK].astype(np.float32)
                 batches = random.integers(len(labels), size=(len(part), hp.batch))
-                state, error = fit(state, inputs, outputs, batches, part)
+                state, error = fit(architecture, state, inputs, outputs, batches, part)
 
         metrics = {"reward": float(np.mean(rewards)), "error": float(error)}
         checkpoint = {
@@ -124,8 +118,9 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             "age": age,
             **networks.named("normaliser", normalise.arrays),
             **learner.environment_arrays(environment),
+            **teacher.snapshot(),
         }
-        yield Slice(step, metrics, policy(normalise, state), checkpoint)
+        yield Slice(step, metrics, policy(architecture, normalise, state), checkpoint)
 
 
 def begin(layers) -> State:
@@ -133,16 +128,17 @@ def begin(layers) -> State:
     return jax.tree.map(jnp.asarray, State(layers, optax.scale_by_adam().init(layers)))
 
 
-def policy(normalise: Layer, state: State) -> tuple[Layer, ...]:
+def policy(architecture: Architecture, normalise: Layer, state: State) -> tuple[Layer, ...]:
     """Return the layers of a policy file."""
-    return normalise, *networks.exported(state.layers, ACTIVATION), Layer("clip")
+    return normalise, *architecture.exported(state.layers), Layer("clip")
 
 
-@functools.partial(jax.jit, donate_argnums=0)
-def fit(state: State, observations, labels, batches, rates) -> tuple[State, Any]:
+@functools.partial(jax.jit, static_argnums=0, donate_argnums=1)
+def fit(architecture: Architecture, state: State, observations, labels, batches, rates) -> tuple[State, Any]:
     """Make updates by Adam towards the least squared distance from labels.
 
     Args:
+        architecture: of the network.
         state: before.
         observations: (n, size), normalised.
         labels: (n, joints)
@@ -154,7 +150,7 @@ def fit(state: State, observations, labels, batches, rates) -> tuple[State, Any]
     """
 
     def error(layers, batch):
-        actions = networks.forward(layers, observations[batch], ACTIVATION)
+        actions = architecture.actions(layers, observations[batch])
         return ((actions - labels[batch]) ** 2).mean()
 
     def update(state, given):
@@ -168,11 +164,4 @@ def fit(state: State, observations, labels, batches, rates) -> tuple[State, Any]
     return state, losses.mean()
 
 
-_act = jax.jit(lambda layers, observations: networks.forward(layers, observations, ACTIVATION).clip(-1.0, 1.0))
-
-
-def _label(teacher, task, observation: np.ndarray, age: np.ndarray) -> np.ndarray:
-    """Return the demonstrator's actions; its episodes begin in environments of age 0."""
-    starts = np.flatnonzero(age == 0).tolist()
-    teacher.reset(starts, [0] * len(starts))  # demonstrators are the same in all episodes
-    return teacher.act(task.split(observation), np.zeros(len(age)))
+_act = jax.jit(lambda architecture, layers, x: architecture.actions(layers, x).clip(-1.0, 1.0), static_argnums=0)

@@ -10,6 +10,8 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from arc_suite import checks
+from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.flat_bodies import FlatBodies
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.network import Layer
@@ -35,7 +37,7 @@ class RunContext(NamedTuple):
     """The run that a learner learns in.
 
     Attributes:
-        setup: body, task and settings.
+        setup: body, or bodies, task and settings.
         seed: of the run.
         steps: environment steps of the run.
         evaluate_every: environment steps between evaluations.
@@ -45,7 +47,7 @@ class RunContext(NamedTuple):
         checkpoint: arrays of the latest `Slice` to resume from; None for a new run.
     """
 
-    setup: Setup
+    setup: Setup | BodiesSetup
     seed: int
     steps: int
     evaluate_every: int
@@ -59,7 +61,7 @@ class RunContext(NamedTuple):
         """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
         return _SEEDS * (1 + self.seed)
 
-    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv:
+    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv | FlatBodies:
         """Return environments to learn in, seeded apart from evaluation and from other runs.
 
         Their `reset()` begins the first episodes.

@@ -9,17 +9,20 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
 from arc_suite.agents import collecting, inputs, learner, networks
 from arc_suite.agents import proximal_policy as ppo
+from arc_suite.agents.architectures import Architecture
 from arc_suite.agents.collecting import Collector
 from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.learner import RunContext, Slice, generator
 from arc_suite.agents.normaliser import Moments
-from arc_suite.policies import network
+from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.policies import network, universal
 from arc_suite.policies.network import Layer
 
 
@@ -35,13 +38,13 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     seed, collector = context.seed, _collector(hp, context)
-    task, joints = collector.task, collector.joints
+    task, architecture = collector.task, collector.architecture
     symmetry = inputs.symmetry(task) if hp.symmetry_augmentation else None
-    moments, policy = Moments.none(task.size), None
-    normalise = moments.layer()
+    moments, policy = Moments.none(architecture.inputs), None
+    normalise = architecture.normalise(moments)
     if hp.start and context.checkpoint is None:
-        normalise, policy = _read(hp, context, task)
-    state = ppo.begin(hp, generator(seed, "networks", 0), task.size, joints, policy)
+        normalise, policy = _read(hp, context, task, architecture)
+    state = ppo.begin(hp, architecture, generator(seed, "networks", 0), policy)
     iterations = 0
 
     if (saved := context.checkpoint) is not None:
@@ -64,21 +67,21 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         rollout = collector.roll_out(state.policy, normalise, std, iterations, step)
 
         # Learn from it, in epochs of minibatches.
-        batch = batch_of(hp, rollout, state.values, normalise, symmetry)
+        batch = batch_of(hp, architecture, rollout, state.values, normalise, symmetry)
         count = len(batch.returns)
         random = generator(seed, "orders", iterations)
         orders = np.concatenate([random.permutation(count) for _ in range(hp.epochs)])
         orders = orders.reshape(hp.epochs, count)[:, : count // hp.minibatch * hp.minibatch].reshape(-1, hp.minibatch)
         schedules = np.float32(std), np.float32(desired_kl)
-        state, kl, value_loss = ppo.update(hp, state, batch, orders, schedules, with_policy)
+        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, with_policy)
         iterations += 1
 
         # Update the normaliser.
         if not hp.start and done < hp.normalize_until:
-            moments = moments.after(rollout["observations"])
+            moments = moments.after(architecture.seen(rollout["observations"]))
             if symmetry is not None:
-                moments = moments.after(symmetry.observation(rollout["observations"]))
-            normalise = moments.layer()
+                moments = moments.after(architecture.seen(symmetry.observation(rollout["observations"])))
+            normalise = architecture.normalise(moments)
 
         metrics = {
             "reward": float(rollout["rewards"].mean()),
@@ -88,7 +91,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             "policy_rate": float(state.rate),
             "value_loss": float(value_loss),
         }
-        layers = normalise, *networks.exported(state.policy, ppo.ACTIVATION), Layer("clip")
+        layers = normalise, *architecture.exported(state.policy), Layer("clip")
         checkpoint = {
             **networks.named("state", state),
             **networks.named("moments", moments),
@@ -107,12 +110,20 @@ def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
     return worlds.Worlds(hp, context)
 
 
-def batch_of(hp: ProximalPolicy, rollout: Mapping[str, Any], values, normalise: Layer, symmetry) -> ppo.Batch:
+def batch_of(
+    hp: ProximalPolicy,
+    architecture: Architecture,
+    rollout: Mapping[str, Any],
+    values,
+    normalise: Layer,
+    symmetry,
+) -> ppo.Batch:
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
     size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
     observations = network.forward([normalise], rollout["observations"])
-    here = numpy.asarray(ppo.value(values, observations))
-    there = numpy.asarray(ppo.value(values, network.forward([normalise], rollout["next_observations"])))
+    here = numpy.asarray(ppo.value(architecture, values, observations))
+    after = network.forward([normalise], rollout["next_observations"])
+    there = numpy.asarray(ppo.value(architecture, values, after))
     rewards = (1.0 - hp.discount) * rollout["rewards"]
     advantages = ppo.advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
     returns = (advantages + here).ravel()
@@ -131,18 +142,29 @@ def batch_of(hp: ProximalPolicy, rollout: Mapping[str, Any], values, normalise: 
     return ppo.Batch(*(jnp.asarray(array, jnp.float32) for array in arrays))
 
 
-def _read(hp: ProximalPolicy, context: RunContext, task) -> tuple[Layer, tuple]:
+def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Layer, tuple]:
     """The normaliser and the network of the policy that learning starts from."""
-    found = policies.policy(Path(hp.start), context.setup.body, task=task)
-    kinds = [layer.kind for layer in getattr(found, "layers", ())]
-    if kinds != ["normalise", "linear", "elu", "linear", "elu", "linear", "clip"]:
-        raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo, with two hidden layers")
+    found = start(hp, context, task)
+    first, *layers, last = getattr(found, "layers", ()) or (Layer("none"), Layer("none"))
+    if (first.kind, last.kind) != ("normalise", "clip"):
+        raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
+    try:
+        policy = architecture.imported(tuple(layers))
+    except ValueError as error:
+        raise ValueError(f"{hp.start}: expected {error}") from None
     for name in {**found.blocks, **task.blocks}:
         there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.blocks))
         if there != here:
             other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
-    linear = [layer.arrays for layer in found.layers if layer.kind == "linear"]
-    if linear[0][0].shape[1] != hp.hidden or linear[1][0].shape[1] != hp.hidden:
-        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {linear[0][0].shape[1]}")
-    return found.layers[0], tuple({"weight": weight, "bias": bias} for weight, bias in linear)
+    shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
+    if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
+        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {policy[0]['weight'].shape[1]}")
+    return first, policy
+
+
+def start(hp: ProximalPolicy, context: RunContext, task):
+    """Return the policy that learning starts from."""
+    if isinstance(context.setup, BodiesSetup):
+        return universal.load(hp.start)
+    return policies.policy(Path(hp.start), context.setup.body, task=task)

@@ -12,10 +12,9 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from arc_suite.agents import networks
+from arc_suite.agents.architectures import Architecture
 from arc_suite.agents.hyperparameters import ProximalPolicy
 
-ACTIVATION = "elu"
 _MOST_RATE, _LEAST_RATE = 1e-2, 1e-6  # of the policy
 _STEP = 1.5  # factor by which it follows the divergence
 
@@ -55,21 +54,20 @@ class Batch(NamedTuple):
 
 
 def begin(
-    hp: ProximalPolicy, random: np.random.Generator, size: int, joints: int, policy: tuple | None = None
+    hp: ProximalPolicy, architecture: Architecture, random: np.random.Generator, policy: tuple | None = None
 ) -> State:
     """Draw the networks; with a given policy only that of values."""
-    sizes = (size, hp.hidden, hp.hidden)
-    drawn = networks.mlp(random, (*sizes, joints), "orthogonal", gain=2**0.5, last_gain=0.01)
+    drawn = architecture.drawn(random, hp.hidden, last_gain=0.01)
     policy = drawn if policy is None else policy
-    values = networks.mlp(random, (*sizes, 1), "orthogonal", gain=2**0.5)
+    values = architecture.drawn_values(random, hp.hidden)
     adam = optax.scale_by_adam()
     return jax.tree.map(
         jnp.asarray, State(policy, values, (adam.init(policy), adam.init(values)), np.float32(hp.policy_rate))
     )
 
 
-mean_action = jax.jit(lambda policy, observations: networks.forward(policy, observations, ACTIVATION))
-value = jax.jit(lambda values, observations: networks.forward(values, observations, ACTIVATION)[..., 0])
+mean_action = jax.jit(lambda architecture, policy, x: architecture.actions(policy, x), static_argnums=0)
+value = jax.jit(lambda architecture, values, x: architecture.values(values, x), static_argnums=0)
 
 
 def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, ended):
@@ -92,12 +90,21 @@ def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, end
     return numpy.stack(found[::-1])
 
 
-@functools.partial(jax.jit, static_argnums=(0, 5), donate_argnums=1)
-def update(hp: ProximalPolicy, state: State, batch: Batch, orders, schedules, with_policy: bool = True):
+@functools.partial(jax.jit, static_argnums=(0, 1, 6), donate_argnums=2)
+def update(
+    hp: ProximalPolicy,
+    architecture: Architecture,
+    state: State,
+    batch: Batch,
+    orders,
+    schedules,
+    with_policy: bool = True,
+):
     """Make an update with each minibatch.
 
     Args:
         hp: hyperparameters.
+        architecture: of the networks.
         state: before.
         batch: transitions.
         orders: (updates, minibatch) indices of transitions.
@@ -111,18 +118,18 @@ def update(hp: ProximalPolicy, state: State, batch: Batch, orders, schedules, wi
     adam = optax.scale_by_adam()
 
     def divergence(policy, part: Batch):
-        apart = networks.forward(policy, part.observations, ACTIVATION) - part.means
+        apart = architecture.actions(policy, part.observations) - part.means
         return (apart**2).sum(axis=-1).mean() / (2.0 * std**2)
 
     def policy_loss(policy, part: Batch):
-        means = networks.forward(policy, part.observations, ACTIVATION)
+        means = architecture.actions(policy, part.observations)
         nearer = ((part.actions - part.means) ** 2 - (part.actions - means) ** 2).sum(axis=-1)
         ratio = jnp.exp(nearer / (2.0 * std**2))
         clipped = ratio.clip(1.0 - hp.clip, 1.0 + hp.clip)
         return -jnp.minimum(ratio * part.advantages, clipped * part.advantages).mean()
 
     def value_loss(values, part: Batch):
-        return ((networks.forward(values, part.observations, ACTIVATION)[..., 0] - part.returns) ** 2).mean()
+        return ((architecture.values(values, part.observations) - part.returns) ** 2).mean()
 
     def stepped(network, gradient, moments, rate):
         length = jnp.sqrt(sum((leaf**2).sum() for leaf in jax.tree.leaves(gradient)))

@@ -9,6 +9,7 @@ import numpy as np
 
 from arc_suite.agents import networks
 from arc_suite.agents import proximal_policy as ppo
+from arc_suite.agents.architectures import Perceptron
 from arc_suite.agents.collecting import TRANSITIONS, ages
 from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.learner import ENVIRONMENT, Diverged, RunContext
@@ -31,7 +32,7 @@ class Worlds:
         impl = _IMPLEMENTATIONS[hp.simulation]
         first = context.first_seed
         self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, first_seed=first, num_envs=hp.num_envs)
-        self.task, self.joints = self.env.task, self.env.action_size
+        self.task, self.architecture = self.env.task, Perceptron(self.env.task.size, self.env.action_size)
         self._key = jax.random.key(context.seed)
         self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
@@ -53,7 +54,7 @@ class Worlds:
         """Step all worlds; return what the next step goes on from, and the transitions."""
         state, steps = carry
         noise, restart = jax.random.split(key)
-        mean = ppo.mean_action(policy, network.forward([normalise], state.obs))
+        mean = ppo.mean_action(self.architecture, policy, network.forward([normalise], state.obs))
         action = mean + std * jax.random.normal(noise, mean.shape)
         after = jax.vmap(self.env.step)(state, action)
         steps = steps + 1

@@ -13,13 +13,12 @@ the table of all learners.
   arc-suite benchmark --page docs/benchmark.md
 """
 
-import re
 from pathlib import Path
 
 from absl import flags
 
 from arc_suite import checks, files
-from arc_suite.cli.program import progress
+from arc_suite.cli.program import marked_page, progress
 from arc_suite.envs.vector import usable_cores
 from arc_suite.studies import benchmark, leaderboard, report, results, runner, tables
 from arc_suite.studies.tracks import PLACES, SEEDS, TRACKS
@@ -35,25 +34,17 @@ flags.DEFINE_string("runs", "runs", "Folder of the runs.")
 flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
 flags.DEFINE_string("page", None, "Page to write the table into, between the lines <!-- table --> and <!-- end -->.")
 
-_MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
-
 
 def main(track: str | None = None) -> int:
     """Run a track, and print or write the table; the exit status is 0 if no run has failed."""
     places = [checks.name(each, ["-".join(each) for each in PLACES], "place") for each in FLAGS.places]
-    page = FLAGS.page and Path(FLAGS.page).read_text(encoding="utf-8")
-    if page is not None and not _MARKS.search(page):
-        raise ValueError(f"--page={FLAGS.page}: expected the lines <!-- table --> and <!-- end -->, got none")
+    write = FLAGS.page and marked_page("page", FLAGS.page)
     status = 0
     if track is not None:
         checks.name(track, TRACKS, "track")
         status = scored(track) if FLAGS.policies else learned(track, places)
     table = benchmark.text(Path(FLAGS.results))
-    if page is None:
-        print(table)
-    else:
-        with files.writing(Path(FLAGS.page)) as temporary:
-            temporary.write_text(_MARKS.sub(lambda match: f"\n{table}\n\n", page), encoding="utf-8")
+    (write or print)(table)
     return status
 
 

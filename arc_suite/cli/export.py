@@ -6,7 +6,9 @@ gears of the motors and the rule of the gait's clock.
   arc-suite export runs/tick-walk-sac-0
   arc-suite export runs/tick-walk-sac-0 -o tick.onnx
   arc-suite export ppo.zip
+  arc-suite export universal --spec spider --task steer -o spider.onnx
 
+A policy of many bodies is exported for the body of --robot, --spec or --legs.
 A zip of stable-baselines3 must have been trained in arc_suite.envs.sb3.VecEnv: then it holds its robot and task.
 Demonstrators and functions of one's own are not networks, and are not exported.
 """
@@ -16,11 +18,22 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import policies
-from arc_suite.cli.flags import define_vecnormalize, policy_name
-from arc_suite.policies import onnx_file
+from arc_suite.cli.flags import (
+    ROBOT_HELP,
+    define_body,
+    define_task,
+    define_vecnormalize,
+    made_body,
+    only_setup,
+    policy_name,
+)
+from arc_suite.policies import onnx_file, universal
 
 FLAGS = flags.FLAGS
 define_vecnormalize()
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string("robot", None, f"Body of a policy of many bodies: {ROBOT_HELP}.")
 flags.DEFINE_string("output", None, "File to write. [default: policy.onnx next to the policy]", short_name="o")
 
 
@@ -28,8 +41,14 @@ def main(run: str | None = None) -> None:
     """Write the file, and print what it is."""
     if run is None:
         raise ValueError("expected the folder of a run, a policy file or a zip of stable-baselines3; see --help")
-    policy = policies.trained(policy_name(run))
-    source = Path(run)
+    source, name = Path(run), policy_name(run)
     output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
-    onnx_file.save(output, policy)
-    print(f"wrote {output}: {policy.size} observations, {policy.joints} actions, {output.stat().st_size} bytes")
+    if _ROBOT.present or made_body() is not None:
+        setup = only_setup(_ROBOT)
+        onnx_file.save_universal(output, universal.load(name, setup.task != "walk"), setup)
+        size, joints = setup.definition.size, len(setup.body.joint_names)
+    else:
+        policy = policies.trained(name)
+        onnx_file.save(output, policy)
+        size, joints = policy.size, policy.joints
+    print(f"wrote {output}: {size} observations, {joints} actions, {output.stat().st_size} bytes")

@@ -5,6 +5,7 @@ import functools
 import inspect
 import io
 import os
+import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
@@ -16,7 +17,10 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
+from arc_suite import files
 from arc_suite.simulation.opengl import RenderingUnavailable
+
+_MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 VERSION = f"arc_suite {arc_suite.__version__}"
 
@@ -62,6 +66,24 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
         return main(*rest)
 
     guard(work, name or Path(script).name)
+
+
+def marked_page(flag: str, path: str) -> Callable[[str], None]:
+    """Return a function that writes a table into a page, between the lines <!-- table --> and <!-- end -->.
+
+    Raises:
+        ValueError: the page has no such lines.
+        OSError: it cannot be read.
+    """
+    page = Path(path).read_text(encoding="utf-8")
+    if not _MARKS.search(page):
+        raise ValueError(f"--{flag}={path}: expected the lines <!-- table --> and <!-- end -->, got none")
+
+    def write(table: str) -> None:
+        with files.writing(Path(path)) as temporary:
+            temporary.write_text(_MARKS.sub(lambda match: f"\n{table}\n\n", page), encoding="utf-8")
+
+    return write
 
 
 def guard(work: Callable[[], int | None], name: str) -> NoReturn:

@@ -21,6 +21,7 @@ PROGRAMS = (
     "enter",
     "export",
     "survey",
+    "transfer",
     "design",
     "doctor",
 )

@@ -10,6 +10,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
   arc-suite train --spec spider --algorithm speq --hp phase_updates=7500
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
+  arc-suite train --robot varied:0-127 --algorithm dagger_bodies
   arc-suite evaluate --robot tick --policy runs/tick-walk-ppo-0
 """
 
@@ -24,16 +25,18 @@ from arc_suite import evaluation, files, versions
 from arc_suite.agents import algorithms, configuration, run_folder
 from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.training import train
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, named_values, only_body, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_values, only_body, task
 from arc_suite.cli.program import progress, use_one_thread
-from arc_suite.envs.setup import Setup
+from arc_suite.envs import bodies_setup
 from arc_suite.evaluation import anchors
 from arc_suite.policies import network, onnx_file
 
 FLAGS = flags.FLAGS
 define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
+_ROBOT = flags.DEFINE_string(
+    "robot", "queen", f"{ROBOT_HELP}; or several with commas, such as varied:0-127,queen, for a policy of any body."
+)
 flags.DEFINE_string(
     "algorithm",
     "ppo",
@@ -71,7 +74,7 @@ def main() -> None:
             finished = train(run, folder, **limits, progress=progress, on_metrics=on_metrics)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"interrupted; the same command resumes {folder}") from None
-    if finished and importlib.util.find_spec("onnx"):
+    if finished and importlib.util.find_spec("onnx") and not bodies_setup.is_several(run.setup.robot):
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
 
@@ -90,7 +93,9 @@ def configured() -> Configuration:
         return configuration.read(Path(FLAGS.config))
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior
-    return Configuration.of(Setup.of(only_body(_ROBOT), *task()), FLAGS.algorithm, hyperparameters, *run)
+    several = made_body() is None and bodies_setup.is_several(_ROBOT.value)
+    setup = bodies_setup.of_any(_ROBOT.value if several else only_body(_ROBOT), *task())
+    return Configuration.of(setup, FLAGS.algorithm, hyperparameters, *run)
 
 
 def earned(run: Configuration, folder: Path) -> str:

@@ -10,6 +10,7 @@ from arc_suite import checks
 from arc_suite.cpg.law import checked, restarted
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import law, presets_of
+from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepared
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS
@@ -97,6 +98,22 @@ class Demonstrator:
         if self._started:
             self._check_heights(blocks["posture"][self._started, 0])
         return actions[0] if alone else actions
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return what it remembers as arrays by name, from which `restore` goes on; empty before the first action."""
+        leaves = [] if self._state is None else trees.leaves(self._state)
+        return {str(place): np.array(leaf) for place, leaf in enumerate(leaves)}
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from a snapshot of as many environments.
+
+        Raises:
+            KeyError: an array is missing.
+        """
+        if not arrays:
+            return
+        like, places = self.law.initial(len(arrays["0"])), iter(range(len(arrays)))
+        self._state, self._started = trees.mapped(lambda leaf: arrays[str(next(places))].copy(), like), []
 
     def __call__(self, timestep) -> np.ndarray:
         """Return the action (joints,) of a dm_env `TimeStep` with named blocks."""

@@ -38,6 +38,7 @@ class BodiesEnv(Together):
     Attributes:
         bodies: of each environment.
         tasks: of each environment, for demonstrators.
+        step_limit: control steps after which every episode is over, may be infinite.
         description: of each environment, (num_envs, ...) float32; see `tasks.tokens.Description`.
         autoreset_mode: what happens to an environment whose episode has ended.
     """
@@ -107,6 +108,7 @@ class BodiesEnv(Together):
             group = Group([members[which_body[index]] for index in indices], task_name, **options)
             self._places.append(Place(group, np.array(indices), self._tokens.part(indices)))
         first = self._places[0].group
+        self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
         self.autoreset_mode, self.metadata, self.render_mode = first.autoreset_mode, first.metadata, render_mode
         described = [tokens.described(member.task) for member in members]
         columns = zip(*(described[which] for which in which_body), strict=True)
@@ -169,6 +171,10 @@ class BodiesEnv(Together):
         `tasks[i].split` gives its blocks by name.
         """
         return self._of_each(lambda group: group._observation.copy())
+
+    def positions(self) -> np.ndarray:
+        """Return the positions (num_envs, 3) of the torsos in the world, m."""
+        return np.array(self._of_each(lambda group: group.batch.data.qpos[:, :3]))
 
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments; see `VectorEnv.command`."""
@@ -263,50 +269,6 @@ class BodiesEnv(Together):
         return self._tokens.observed(gathered)
 
 
-class FlatBodies(gymnasium.vector.VectorWrapper):
-    """Environments of different bodies with one vector of observation and one of actions, for plain learners.
-
-    Observations are (num_envs, 664): legs, torso and command of the step, then legs and torso of the description.
-    Actions are (num_envs, 48).
-    """
-
-    def __init__(self, env: BodiesEnv):
-        """Wrap environments of different bodies."""
-        super().__init__(env)
-        description = self.unwrapped.description
-        self._description = np.concatenate([_flat(description.legs), _flat(description.torso)], axis=-1)
-        size = sum(int(np.prod(box.shape)) for box in env.single_observation_space.values())
-        size += self._description.shape[-1]
-        self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (size,), np.float32)
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS * tokens.JOINTS,), np.float32)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-
-    def reset(self, *, seed=None, options=None):
-        """Start episodes; see `BodiesEnv.reset`."""
-        observation, info = self.env.reset(seed=seed, options=options)
-        return self._vectors(observation), info
-
-    def step(self, actions):
-        """Advance by one control step; see `BodiesEnv.step`."""
-        actions = np.asarray(actions)
-        if actions.shape == self.action_space.shape:
-            actions = actions.reshape(self.env.action_space.shape)
-        observation, reward, terminated, truncated, info = self.env.step(actions)
-        for index in np.flatnonzero(info.get("_final_obs", ())):
-            last = {name: array[None] for name, array in info["final_obs"][index].items()}
-            info["final_obs"][index] = self._vectors(last, [index])[0]
-        return self._vectors(observation), reward, terminated, truncated, info
-
-    def _vectors(self, observation: Mapping[str, np.ndarray], indices=slice(None)) -> np.ndarray:
-        parts = [_flat(observation[name]) for name in ("legs", "torso", "command")]
-        return np.concatenate([*parts, self._description[indices]], axis=-1)
-
-
 def _of_tasks(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings of a task, without that of its driver."""
     return {name: value for name, value in settings.items() if name != "on_divergence"}
-
-
-def _flat(array: np.ndarray) -> np.ndarray:
-    return array.reshape(len(array), -1)

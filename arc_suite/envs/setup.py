@@ -81,6 +81,15 @@ class Setup:
         return registry.importable("domain", self.body.name) if is_robot(self.body) else body_to_json(self.body)
 
     @property
+    def name(self) -> str:
+        """Name of the body in names of files."""
+        return self.body.name
+
+    def validation(self, count: int) -> "Setup":
+        """Return the setup that evaluates a policy while it learns: this one."""
+        return self
+
+    @property
     def env_id(self) -> str:
         """Gymnasium's id, `arc_suite/<robot>-<task>-v<version>`."""
         return registry.env_id(self.body.name, self.kind)

@@ -16,7 +16,8 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite import policies
-from arc_suite.cpg.selection import suited_presets
+from arc_suite.cpg.selection import suited_preset, suited_presets
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.robots import is_robot
@@ -66,13 +67,27 @@ def of_returns(played: Returns) -> Anchors:
     return Anchors(zero, None if best is None else means[best], best)
 
 
-def anchors(setup: Setup) -> Anchors:
+def anchors(setup: Setup | BodiesSetup) -> Anchors:
     """Return the anchors of a robot, a task and settings, measured where they are not committed.
 
     Raises:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
     """
+    if isinstance(setup, BodiesSetup):
+        return _of_several(setup.validation(protocol.EPISODES))
     return of_returns(known(setup) or measured(setup))
+
+
+@functools.lru_cache(maxsize=16)
+def _of_several(setup: BodiesSetup) -> Anchors:
+    """The anchors of bodies, each in an episode with its own suited demonstrator."""
+    zero, demonstrators = [], []
+    members = setup.members()
+    for seed in tqdm(range(protocol.EPISODES), desc=f"anchors of {setup}", unit="body", leave=False, disable=None):
+        member = members[seed % len(members)]
+        zero.append(played(member, ZERO, range(seed, seed + 1)))
+        demonstrators.append(played(member, suited_preset(member.definition), range(seed, seed + 1)))
+    return Anchors(float(np.mean(zero)), float(np.mean(demonstrators)), "of each body")
 
 
 def known(setup: Setup) -> Returns | None:

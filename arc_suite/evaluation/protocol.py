@@ -47,7 +47,7 @@ def published_finals(setup: Setup, algorithms: Iterable[str]) -> dict[str, float
 
 
 def _is_published(setup: Setup) -> bool:
-    return setup.kind.name == "walk" and not setup.task_kwargs
+    return isinstance(setup, Setup) and setup.kind.name == "walk" and not setup.task_kwargs
 
 
 def check_ends(limit: float) -> None:

@@ -11,11 +11,13 @@ import numpy as np
 from arc_suite import checks, versions
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import network, zips
+from arc_suite.policies import network, universal, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
+from arc_suite.policies.universal import Universal
 from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
@@ -57,8 +59,14 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
     return _from_file(path, body, task)
 
 
+def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
+    """A trained policy of any body that comes with the package, for walk or for tasks with a command."""
+    task = task or prepared(body, "walk")[0]
+    return Universal(universal.load(universal.NAME, "command" in task.blocks), task)
+
+
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
-POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo}
+POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, universal.NAME: _universal}
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
@@ -80,7 +88,8 @@ def policy(
 
     Args:
         name: cpg, the demonstrator; zero, which does nothing; random, uniform in [-1, 1] by the
-            episode's seed; ppo, a trained policy that comes with the package; the path of a run's folder, of a
+            episode's seed; ppo, a trained policy of one robot that comes with the package; universal, one of any
+            body; the path of a run's folder, of a
             policy file (.npz), see `network`, or of a folder of checkpoints, which take turns from seed to seed,
             see `checkpoints`; that of a zip of stable-baselines3, see `zips`; or `module:attribute`, a function on
             Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a
@@ -156,7 +165,10 @@ def trained(name: str | os.PathLike) -> Network:
         OSError: a file cannot be read.
     """
     if (zipped := zips.parts(name)) is None:
-        return network.load(name)
+        made = network.load(name)
+        if isinstance(made.setup, BodiesSetup):
+            raise ValueError(f"policy {name}: expected one of one body, or --robot; got one of {made.setup.robot}")
+        return made
     if (setup := zips.setup(zipped[0])) is None:
         raise ValueError(f"policy {zipped[0]}: {_UNKNOWN}")
     return _saved(*zipped).network(setup)
@@ -170,6 +182,8 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     if zipped := zips.parts(path):
         return _from_zip(*zipped, body, task)
     made = network.load(path)
+    if isinstance(made.setup, BodiesSetup):
+        return Universal(made, task or prepared(body, "walk")[0])
     _check(path, made.setup, body, task)
     _check_joints(path, made.joints, body)
     return made

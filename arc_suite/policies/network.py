@@ -18,7 +18,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import archives, checks, files, registry
+from arc_suite.envs import bodies_setup
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
+from arc_suite.tasks import tokens
 
 EXTENSION = ".npz"
 FILE = f"policy{EXTENSION}"  # in the folder of a run
@@ -50,16 +53,38 @@ def _layer_norm(x, scale, offset):
     return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(EPSILON)) * scale + offset
 
 
+def _legs(x, first, first_bias, second, second_bias, own, mean, bias, last, last_bias):
+    """The network of `agents.architectures.PerLeg`, computed for the legs that there are."""
+    inputs, mask = tokens.leg_inputs(x)
+    there = mask.any(axis=-1)
+    found = _elu(_linear(_elu(_linear(inputs[there], first, first_bias)), second, second_bias))
+    features = np.zeros((*there.shape, found.shape[-1]), np.float32)
+    features[there] = found
+    context = _linear(features.sum(axis=1) / there.sum(axis=1, dtype=np.float32)[:, None], mean, bias)
+    hidden = np.einsum("ri,io->ro", found, own) + context[np.nonzero(there)[0]]
+    outputs = np.zeros(mask.shape, np.float32)
+    outputs[there] = _linear(_elu(hidden), last, last_bias)
+    return (outputs * mask).reshape(len(x), -1)
+
+
+def _elu(x):
+    return np.where(x > 0.0, x, np.expm1(np.minimum(x, np.float32(0.0))))
+
+
 class Kind(NamedTuple):
     """What a layer computes.
 
     Attributes:
         function: of inputs (num_envs, i) float32 and of arrays; returns outputs (num_envs, o) or (num_envs, i).
         shapes: of the arrays, a letter for each axis.
+        sizes: of axes that are given, by letter.
+        outputs: number of outputs, where no letter says it.
     """
 
     function: Callable
     shapes: tuple[str, ...] = ()
+    sizes: Mapping[str, int] = {}
+    outputs: int | None = None
 
 
 # Arrays are weight and bias; scale and offset; mean, factor and limit of inputs, which become (x - mean) * factor
@@ -69,9 +94,17 @@ KINDS = {
     "layer_norm": Kind(_layer_norm, ("i", "i")),
     "normalise": Kind(lambda x, mean, factor, limit: ((x - mean) * factor).clip(-limit, limit), ("i", "i", "")),
     "relu": Kind(lambda x: np.maximum(x, np.float32(0.0))),
-    "elu": Kind(lambda x: np.where(x > 0.0, x, np.expm1(np.minimum(x, np.float32(0.0))))),
+    "elu": Kind(_elu),
     "tanh": Kind(np.tanh),
     "clip": Kind(lambda x: x.clip(np.float32(-1.0), np.float32(1.0))),
+    # Of legs: weights and biases of two layers for the features of a leg; of the layer that takes features of the
+    # leg, and those of the mean of all; of the last.
+    "legs": Kind(
+        _legs,
+        ("tf", "f", "fg", "g", "gh", "gh", "h", "hj", "j"),
+        {"i": sum(tokens.FLAT.values()), "t": tokens.LEG_INPUTS, "j": tokens.JOINTS},
+        tokens.LEGS * tokens.JOINTS,
+    ),
 }
 
 
@@ -87,12 +120,12 @@ class Network(NamedTuple):
 
     Attributes:
         layers: from the flat observation (num_envs, size) to actions (num_envs, joints).
-        setup: body, task and settings.
+        setup: body, or bodies, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
     """
 
     layers: tuple[Layer, ...]
-    setup: Setup
+    setup: Setup | BodiesSetup
     blocks: Mapping[str, int]
 
     @property
@@ -169,7 +202,7 @@ def load(path: str | os.PathLike) -> Network:
         for index, kind in enumerate(known["layers"]):
             layer, width = _layer(kind, index, arrays, width)
             layers.append(layer)
-        return Network(tuple(layers), Setup.from_dict(known), blocks)
+        return Network(tuple(layers), bodies_setup.from_dict(known), blocks)
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except registry.NotImported as error:
@@ -186,8 +219,11 @@ def checkpoint_files(folder: Path) -> list[Path]:
 
 def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray], width: int) -> tuple[Layer, int]:
     """Return a layer that takes inputs of a width, and the width of its outputs."""
-    sizes, found = {"i": width}, []
-    for place, letters in enumerate(KINDS[checks.name(kind, KINDS, "layer")].shapes):
+    made, found = KINDS[checks.name(kind, KINDS, "layer")], []
+    sizes = {"i": width} | dict(made.sizes)
+    if sizes["i"] != width:
+        raise ValueError(f"layer {index}, {kind}: expected {sizes['i']} inputs, got {width}")
+    for place, letters in enumerate(made.shapes):
         array = arrays[f"{index}.{place}"]
         array = array.astype(np.float32) if array.dtype == np.float16 else array  # as packaged ones are stored
         sizes = dict(zip(letters, array.shape, strict=False)) | sizes  # the first array tells an axis' size
@@ -197,4 +233,4 @@ def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray], width: int) 
         if not np.isfinite(array).all():
             raise ValueError(f"layer {index}, {kind}: array {place} is not finite")
         found.append(array)
-    return Layer(kind, tuple(found)), sizes.get("o", width)
+    return Layer(kind, tuple(found)), made.outputs or sizes.get("o", width)

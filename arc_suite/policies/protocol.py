@@ -76,7 +76,7 @@ class Positioned:
     The torques are exact if the observation is, within the range of the joints.
     """
 
-    def __init__(self, policy: Policy, task: Modified):
+    def __init__(self, policy, task: Modified):
         """Take a policy of torques, and a task with `actions="position"`."""
         self._policy, self._task = policy, task
 
@@ -93,6 +93,14 @@ class Positioned:
         torques = self._policy.act(observation, rewards).clip(-1.0, 1.0)
         _, angles, speeds = proprioception(checked(observation, Clocked.reads, torques.shape[-1]))
         return self._task.positions(torques, angles, speeds)
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return what a demonstrator remembers; see `Demonstrator.snapshot`."""
+        return self._policy.snapshot()
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from a snapshot."""
+        self._policy.restore(arrays)
 
 
 class Mixture:

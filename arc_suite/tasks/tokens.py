@@ -7,7 +7,7 @@ policy observes. Everything is a product, a sum or a root of numbers, which roun
 import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -25,6 +25,19 @@ BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock")  # of a task,
 # Sizes: of a leg, of the torso and of the command in every step, and of a leg and the torso in the description.
 LEG, TORSO, COMMAND = 2 * JOINTS + 4, 12, 6
 LEG_DESCRIPTION, TORSO_DESCRIPTION = 9 + 8 * JOINTS, 10
+
+# Sizes of the blocks of one vector that holds all of it.
+FLAT = {
+    "legs": LEGS * LEG,
+    "torso": TORSO,
+    "command": COMMAND,
+    "leg_descriptions": LEGS * LEG_DESCRIPTION,
+    "torso_description": TORSO_DESCRIPTION,
+}
+
+# What a network of legs sees of one leg: its token and description, and those of the torso, and the command.
+LEG_INPUTS = LEG + LEG_DESCRIPTION + TORSO + COMMAND + TORSO_DESCRIPTION
+_COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as one of four
 
 _CARRIES = 0.05  # share of the weight from which on a foot counts as loaded
 _LARGEST_FORCE = 0.5  # that is asked for, as observed forces are clipped to 1
@@ -74,6 +87,50 @@ def slots(body: Body) -> np.ndarray:
     return np.array(_slots(body))
 
 
+def flat(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) -> np.ndarray:
+    """Return tokens and a description as one vector (environments, 664), blocks as in `FLAT`.
+
+    Args:
+        tokens: see `Tokens.observed`.
+        legs: (environments, 12, 41) of the description.
+        torso: (environments, 10) of the description.
+    """
+    parts = *(tokens[name] for name in ("legs", "torso", "command")), legs, torso
+    return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=-1)
+
+
+def leg_inputs(vectors):
+    """Return the inputs (..., 12, 81) of a network of legs, and which joints there are (..., 12, 4).
+
+    Args:
+        vectors: (..., 664) of `flat`, of NumPy or JAX; normalised ones keep the number of joints as it is.
+    """
+    numpy = vectors.__array_namespace__()
+    ends = np.cumsum(list(FLAT.values()))
+    firsts = ends - np.array(list(FLAT.values()))
+    legs, torso, command, leg_descriptions, torso_description = (
+        vectors[..., first:end] for first, end in zip(firsts.tolist(), ends.tolist(), strict=True)
+    )
+    leading = vectors.shape[:-1]
+    descriptions = leg_descriptions.reshape(*leading, LEGS, LEG_DESCRIPTION)
+    shared = numpy.concatenate([torso, command, torso_description], axis=-1)[..., None, :]
+    shared = numpy.broadcast_to(shared, (*leading, LEGS, shared.shape[-1]))
+    inputs = numpy.concatenate([legs.reshape(*leading, LEGS, LEG), descriptions, shared], axis=-1)
+    counts = descriptions[..., _COUNTS]
+    # A leg of k joints has the first k.
+    mask = numpy.stack([counts[..., joint:].sum(axis=-1) for joint in range(JOINTS)], axis=-1) > 0.5
+    return inputs, mask
+
+
+def of_all_legs(values: np.ndarray, counts: float) -> np.ndarray:
+    """Return numbers (81,) of the inputs of one leg as those (664,) of the vector; `counts` for numbers of joints."""
+    leg, description, torso, command, about = np.split(values, np.cumsum((LEG, LEG_DESCRIPTION, TORSO, COMMAND)))
+    description = description.copy()
+    description[_COUNTS] = counts
+    parts = np.tile(leg, LEGS), torso, command, np.tile(description, LEGS), about
+    return np.concatenate(parts).astype(np.float32)
+
+
 def described(task: Task) -> Description:
     """Return the description of the body of a task, in the gait that the task prescribes; no leading axes.
 
@@ -114,7 +171,7 @@ class Tokens(NamedTuple):
             place for what is not there.
         mask: (environments, 12, 4) 1 where there is a joint.
         legs: (environments, 12) 1 where there is a leg.
-    height: (environments,) h, m.
+        height: (environments,) h, m.
         speed: (environments,) sqrt(g h), m/s.
         rate: (environments,) sqrt(g / h), rad/s.
         units: (environments, 3) of the command; see `fitting.velocity_units`.

@@ -49,7 +49,9 @@ def test_labels_are_positions_where_actions_are(begun):
     one, other = torques.until(80).checkpoint, positions.until(80).checkpoint
     first = other["observations"][0]
     assert_array_equal(first, one["observations"][0])
-    expected = positions.task.positions(one["labels"][0].astype(float), first[:, 5:17], first[:, 17 + 6 : 17 + 18])
+    expected = positions.environment.task.definition.positions(
+        one["labels"][0].astype(float), first[:, 5:17], first[:, 17 + 6 : 17 + 18]
+    )
     assert_allclose(other["labels"][0], expected, atol=1e-4)
     assert abs(other["labels"][0] - one["labels"][0]).max() > 0.1
 
@@ -82,7 +84,7 @@ def test_the_demonstrator_acts_in_half_of_the_environments_and_labels_all(begun,
     assert (abs(actions[:, 4:] - labels[:, 4:]).max(axis=-1) > 1e-3).all()
     demonstrator = Demonstrator("leaper", "refined")
     for observation, label in zip(arrays["observations"], labels, strict=True):
-        assert_array_equal(demonstrator.act(agent.task.split(observation)).astype(np.float32), label)
+        assert_array_equal(demonstrator.act(agent.environment.task.split(observation)).astype(np.float32), label)
 
 
 def test_an_unknown_demonstrator_is_refused(begun):

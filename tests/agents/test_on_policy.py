@@ -14,6 +14,7 @@ import jax
 
 from arc_suite.agents import on_policy, run_folder
 from arc_suite.agents import proximal_policy as ppo
+from arc_suite.agents.architectures import Perceptron
 from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.hyperparameters import ProximalPolicy
 from arc_suite.agents.training import train
@@ -23,6 +24,7 @@ from arc_suite.policies import network
 from arc_suite.robots import generator
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
+SIZES = Perceptron(6, 3)
 SMALL = ProximalPolicy(**CHANGES)
 
 
@@ -40,7 +42,9 @@ def begun(tmp_path):
 def rolled_out(agent):
     """Transitions of a horizon from the latest slice on, and the batch that they make."""
     rollout = agent.collector.roll_out(agent.state.policy, agent.normalise, 0.3, 0, 0)
-    return rollout, on_policy.batch_of(agent.hp, rollout, agent.state.values, agent.normalise, agent.symmetry)
+    return rollout, on_policy.batch_of(
+        agent.hp, agent.collector.architecture, rollout, agent.state.values, agent.normalise, agent.symmetry
+    )
 
 
 def weights(tree):
@@ -83,40 +87,40 @@ def batch(random, count=64, size=6, joints=3):
 
 def test_the_policy_moves_towards_what_earned_more_and_values_towards_returns():
     hp, random = dataclasses.replace(SMALL, policy_rate=1e-3), np.random.default_rng(0)
-    state = ppo.begin(hp, random, 6, 3)
+    state = ppo.begin(hp, SIZES, random)
     given = batch(random)
-    given = given._replace(means=np.asarray(ppo.mean_action(state.policy, given.observations)))
-    before = np.asarray(ppo.value(state.values, given.observations))
+    given = given._replace(means=np.asarray(ppo.mean_action(SIZES, state.policy, given.observations)))
+    before = np.asarray(ppo.value(SIZES, state.values, given.observations))
     orders = np.tile(np.arange(64), (30, 1))
-    after, divergence, _ = ppo.update(hp, state, given, orders, (np.float32(0.5), np.float32(0.01)), True)
-    moved = np.asarray(ppo.mean_action(after.policy, given.observations)) - given.means
+    after, divergence, _ = ppo.update(hp, SIZES, state, given, orders, (np.float32(0.5), np.float32(0.01)), True)
+    moved = np.asarray(ppo.mean_action(SIZES, after.policy, given.observations)) - given.means
     gained = (moved * (given.actions - given.means)).sum(axis=-1) * given.advantages
     assert gained.mean() > 0.0
     acted = moved[: hp.num_envs * hp.horizon]  # what follows are images
     assert divergence == pytest.approx((acted**2).sum(axis=-1).mean() / (2 * 0.5**2), rel=1e-3)
-    values = np.asarray(ppo.value(after.values, given.observations))
+    values = np.asarray(ppo.value(SIZES, after.values, given.observations))
     assert abs(values - 1.0).mean() < 0.8 * abs(before - 1.0).mean()
 
 
 def test_nothing_is_gained_beyond_the_clip():
     """Where all ratios are beyond the clip on the side that pays, the policy has no gradient."""
     hp, random = dataclasses.replace(SMALL, clip=0.2), np.random.default_rng(0)
-    state = ppo.begin(hp, random, 6, 3)
+    state = ppo.begin(hp, SIZES, random)
     given = batch(random)
-    means = np.asarray(ppo.mean_action(state.policy, given.observations))
+    means = np.asarray(ppo.mean_action(SIZES, state.policy, given.observations))
     given = given._replace(means=means + 1.0, actions=means, advantages=np.ones(64, np.float32))
     before = weights(state.policy)
     orders, numbers = np.arange(64)[None], (np.float32(0.5), np.float32(0.01))
-    after, *_ = ppo.update(hp, state, given, orders, numbers, True)
+    after, *_ = ppo.update(hp, SIZES, state, given, orders, numbers, True)
     assert_array_equal(weights(after.policy), before)
 
 
 @pytest.mark.parametrize(("wanted", "factor"), [(1e-9, 1 / 1.5), (1e9, 1.5)])
 def test_the_rate_follows_the_divergence(wanted, factor):
     random = np.random.default_rng(0)
-    state, given = ppo.begin(SMALL, random, 6, 3), batch(random)
+    state, given = ppo.begin(SMALL, SIZES, random), batch(random)
     orders, numbers = np.arange(64)[None], (np.float32(0.5), np.float32(wanted))
-    after, *_ = ppo.update(SMALL, state, given, orders, numbers, True)
+    after, *_ = ppo.update(SMALL, SIZES, state, given, orders, numbers, True)
     assert after.rate == pytest.approx(SMALL.policy_rate * factor)
 
 
@@ -174,7 +178,9 @@ def test_time_limits_fall_on_different_steps_and_bootstrap(begun):
     split = agent.collector.environment.task.split
     assert_allclose(split(rollout["observations"][2, 3])["gait_clock"], (0.0, 1.0))
     assert split(last)["gait_clock"][0] > 0.1
-    value = np.asarray(ppo.value(agent.state.values, network.forward([agent.normalise], last[None])))[0]
+    value = np.asarray(
+        ppo.value(agent.collector.architecture, agent.state.values, network.forward([agent.normalise], last[None]))
+    )[0]
     expected = (1.0 - agent.hp.discount) * rollout["rewards"][1, 3] + agent.hp.discount * value
     assert np.asarray(given.returns)[:32].reshape(8, 4)[1, 3] == pytest.approx(expected, rel=1e-5)
 

@@ -27,12 +27,14 @@ TASKED = (
     "collect",
     "tune_cpg",
     "train",
+    "export",
     "survey",
+    "transfer",
     "design",
     "studio",
     "enter",
 )
-WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export", "design")
+WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export", "transfer", "design")
 SCRIPTS = ("build_model", "check", "render", "evaluate", "style", "collect", "tune_cpg")  # the younger ones have none
 TOOLS = {name: ROOT / "tools" / f"{name}.py" for name in SCRIPTS} | {"survey": ROOT / "tools" / "walk_census.py"}
 

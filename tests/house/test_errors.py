@@ -188,11 +188,11 @@ CASES = [
     (lambda w: w.rows.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
     (
         lambda w: policies.policy("cgp", "queen"),
-        "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)",
+        "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)",
     ),
     (
         lambda w: policies.policy(None, "queen"),
-        "unknown policy None (there are: cpg, zero, random, ppo)",
+        "unknown policy None (there are: cpg, zero, random, ppo, universal)",
     ),
     (lambda w: policies.policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
     (lambda w: policies.policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),

@@ -75,6 +75,7 @@ THIRD_PARTY = {
     "evaluation.statistics": {"numpy"},
     "agents": {"numpy", "gymnasium", "tqdm"},
     "agents.networks": {"numpy", "jax"},
+    "agents.architectures": {"numpy", "jax"},
     "agents.plots": {"numpy", "matplotlib"},
     "agents.off_policy": {"numpy", "jax"},
     "agents.soft_actor_critic": {"numpy", "jax", "optax"},

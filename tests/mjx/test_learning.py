@@ -31,16 +31,16 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
     run = Configuration.of(Setup.of("leaper"), "ppo", SMALL)
     hp, context = run.hyperparameters, RunContext(run.setup, 0, 100, 100, pathlib.Path())
     environments = collecting.Environments(hp, context)
-    task, joints = environments.task, environments.joints
-    state = ppo.begin(hp, np.random.default_rng(0), task.size, joints)
+    task, architecture = environments.task, environments.architecture
+    state = ppo.begin(hp, architecture, np.random.default_rng(0))
     normalise = Moments.none(task.size).after(environments.observation).layer()
     rollout = environments.roll_out(state.policy, normalise, 0.3, 0, 0)
     orders = np.random.default_rng(0).permutation(32)[None, :8]
     found = []
     for transitions in (rollout, {name: jnp.asarray(array) for name, array in rollout.items()}):
-        batch = on_policy.batch_of(hp, transitions, state.values, normalise, inputs.symmetry(task))
-        begun = ppo.begin(hp, np.random.default_rng(0), task.size, joints)
-        updated, *_ = ppo.update(hp, begun, batch, orders, (np.float32(0.3), np.float32(0.01)), True)
+        batch = on_policy.batch_of(hp, architecture, transitions, state.values, normalise, inputs.symmetry(task))
+        begun = ppo.begin(hp, architecture, np.random.default_rng(0))
+        updated, *_ = ppo.update(hp, architecture, begun, batch, orders, (np.float32(0.3), np.float32(0.01)), True)
         moments = Moments.none(task.size).after(transitions["observations"])
         found.append((leaves(updated), leaves(moments)))
     assert_allclose(found[1][0], found[0][0], atol=1e-5)

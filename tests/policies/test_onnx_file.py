@@ -2,14 +2,20 @@
 
 import json
 
+import legs
 import numpy as np
 import pytest
 from test_network import made
 
 import arc_suite
 from arc_suite import policies
+from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import alone, onnx_file
+from arc_suite.policies.network import Layer
+from arc_suite.policies.universal import Universal
+from arc_suite.robots import generator
+from arc_suite.tasks import tokens
 
 pytest.importorskip("onnx", reason="of the extra onnx: make check-agents")
 runtime = pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
@@ -70,3 +76,36 @@ def test_metadata_tell_what_a_game_needs(tmp_path):
         timestep = environment.step(np.zeros(12))
         phase = 2.0 * np.pi * frequency * count * step
         assert np.allclose(timestep.observation["gait_clock"], [np.sin(phase), np.cos(phase)], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("body", "task", "settings"),
+    [
+        ("leaper", "walk", {}),
+        ("tick", "steer", {"actions": "position"}),
+        (generator.random_body(3), "walk", {"actions": "position"}),
+        (generator.generate(5, 2), "steer", {}),
+    ],
+)
+def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
+    """With a normaliser, in an episode that the policy itself plays."""
+    setup = Setup.of(body, task, settings | {"time_limit": 1.0})
+    random = np.random.default_rng(0)
+    mean, factor = 0.1 * random.standard_normal(tokens.LEG_INPUTS), random.uniform(0.5, 2.0, tokens.LEG_INPUTS)
+    of_legs = tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), np.array(5.0, np.float32)
+    network = legs.network()
+    network = network._replace(layers=(Layer("normalise", of_legs), *network.layers))
+    onnx_file.save_universal(tmp_path / "policy.onnx", network, setup)
+    run, environment, greatest = session(tmp_path / "policy.onnx"), setup.load(), 0.0
+    policy = Universal(network, environment.task.definition)
+    timestep = environment.reset(0)
+    while not timestep.last():
+        blocks = {name: block[None] for name, block in timestep.observation.items()}
+        vector = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
+        expected = policy.act(blocks)
+        (actions,) = run.run(None, {onnx_file.INPUT: vector})
+        greatest = max(greatest, abs(actions - expected).max())
+        timestep = environment.step(expected[0])
+    assert greatest < 1e-4
+    texts = run.get_modelmeta().custom_metadata_map
+    assert json.loads(texts["joints"]) == list(setup.body.joint_names)

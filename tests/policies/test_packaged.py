@@ -8,6 +8,7 @@ from tiers import never, tiers
 
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
+from arc_suite.policies import universal
 from arc_suite.policies.named import PACKAGED
 from arc_suite.robots import generator
 
@@ -17,19 +18,42 @@ INDEX = json.loads((PACKAGED / "policies.json").read_text())
 def test_all_are_listed_and_small():
     files = {path.stem: path for path in PACKAGED.glob("*.npz")}
     assert files.keys() == INDEX.keys()
-    assert sum(path.stat().st_size for path in files.values()) < 600_000
+    assert sum(path.stat().st_size for path in files.values()) < 800_000
     for name, path in files.items():
         assert INDEX[name]["sha256"] == policies.digest(str(path))
-        assert INDEX[name]["command"].startswith(f"arc-suite train --robot={name.partition('-')[0]} ")
+        robot = name.partition("-")[0]
+        assert INDEX[name]["command"].startswith(f"arc-suite train --robot={robot.replace('universal', 'varied:')}")
 
 
-@pytest.mark.parametrize("name", tiers(INDEX, never, lambda name: name == "tick-walk"))
+ROBOTS = [name for name in INDEX if not name.startswith("universal")]
+
+
+@pytest.mark.parametrize("name", tiers(ROBOTS, never, lambda name: name == "tick-walk"))
 def test_they_earn_what_is_listed(name):
     robot, _, task = name.partition("-")
     environment = Setup.of(robot, task).make_vec(10, autoreset_mode="Disabled")
     policy = policies.policy("ppo", robot, task=environment.task.definition, num_envs=10)
     returns = [episode.total for episode in evaluation.episodes_in_batch(environment, policy)]
     assert np.mean(returns) == pytest.approx(INDEX[name]["return"], rel=0.01)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_those_of_any_body_earn_what_is_listed(task):
+    packaged = universal.load("universal", task != "walk")
+    environment = packaged.setup.validation(10).make_vec(10, autoreset_mode="Disabled")
+    returns = [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
+    assert np.mean(returns) == pytest.approx(INDEX[f"universal-{task}"]["return"], rel=0.02)
+
+
+@pytest.mark.parametrize("body", ["tick", generator.generate(8, 3)], ids=str)
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_any_body_walks_by_it(body, task):
+    """A robot with its published motors, and a generated body, for five seconds of the robot."""
+    environment = Setup.of(body, task).load()
+    policy = policies.policy("universal", environment.task.body, task=environment.task.definition)
+    assert evaluation.run(environment, policy, 0, 100).length == 100
+    assert environment.task.progress["speed" if task == "walk" else "tracking"] > 0.1
 
 
 def test_of_another_robot_or_task():

@@ -1,0 +1,88 @@
+"""Policies of any body: a network that was trained with many bodies, acting for one of them."""
+
+import functools
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from arc_suite.cpg.law import Clocked, checked, proprioception, torques
+from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.models.sizing import position_gains, sized
+from arc_suite.models.standing import standing
+from arc_suite.policies import network
+from arc_suite.policies.network import Network
+from arc_suite.tasks import Task, tokens
+from arc_suite.tasks.tokens import Tokens
+
+PACKAGED = Path(__file__).with_name("packaged")
+NAME = "universal"  # of the policies that come with the package
+
+
+def load(name: str | os.PathLike, with_command: bool = False) -> Network:
+    """Return a policy of many bodies: `universal`, which comes with the package, a policy file, or that of a run.
+
+    Args:
+        name: of the policy.
+        with_command: whether `universal` follows a command, as in `steer`, or walks ahead, as in `walk`.
+
+    Raises:
+        ValueError: a damaged file, or a policy of one body.
+        OSError: the file cannot be read.
+    """
+    packaged = PACKAGED / f"{NAME}-{'steer' if with_command else 'walk'}{network.EXTENSION}"
+    made = network.load(packaged if name == NAME else name)
+    if not isinstance(made.setup, BodiesSetup):
+        raise ValueError(f"policy {name}: expected one of many bodies, got one of {made.setup.body.name}")
+    return made
+
+
+class Universal:
+    """A policy of many bodies, for one body in a task. It gives positions or torques, as the task takes them.
+
+    Torques are those of motors that hold the positions with the body's own gains, as with `actions="position"`.
+
+    Attributes:
+        network: of many bodies.
+        task: that it acts in.
+        tokens: that the network sees, of one environment.
+        descriptions: of the legs (1, 12, 41) and of the torso (1, 10).
+        reach: (joints,) angles that an action of 1 asks for, rad.
+        gains: stiffness (joints,), action per rad, and damping (joints,), action per rad/s, of position control.
+    """
+
+    def __init__(self, trained: Network, task: Task):
+        """Describe the body of a task to a network of many bodies.
+
+        Raises:
+            ValueError: a body with more than 12 legs or 4 joints a leg, or a task that prescribes no gait or lacks
+                a block that the network needs.
+        """
+        self.network, self.task = trained, task
+        described, body = tokens.described(task), task.scene.body
+        self.descriptions = described.legs[None], described.torso[None]
+        self.reach = described.reach[described.mask]
+        self.tokens = Tokens.of([task])
+        self.gains = position_gains(sized(body), standing(body).inertias)
+        self._batch = functools.lru_cache(maxsize=4)(lambda count: self.tokens.part(np.zeros(count, int)))
+
+    def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
+        """Start episodes: nothing to do, as the policy remembers nothing."""
+
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray | None = None) -> np.ndarray:
+        """Return the actions (num_envs, joints) of a control step; see `Policy.act`.
+
+        Raises:
+            ValueError: an observation of another body, or without a block of the task.
+        """
+        blocks = checked(observation, self.task.blocks, len(self.reach), len(self.task.scene.body.part_names))
+        vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
+        own = self._batch(len(vectors))
+        seen = own.observed(own.gathered(vectors))
+        descriptions = (np.repeat(part, len(vectors), axis=0) for part in self.descriptions)
+        positions = own.actions(self.network.actions(tokens.flat(seen, *descriptions))).astype(float)
+        if self.task.actions == "position":
+            return positions
+        _, angles, speeds = proprioception(checked(observation, Clocked.reads, len(self.reach)))
+        return torques(self.reach * positions, angles, speeds, *self.gains)

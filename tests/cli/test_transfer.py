@@ -1,0 +1,48 @@
+"""arc-suite transfer as users run it."""
+
+import csv
+
+import programs
+import pytest
+from legs import network as drawn
+
+from arc_suite.policies import network
+
+
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory):
+    """The file of a policy of many bodies that learned nothing."""
+    path = tmp_path_factory.mktemp("policy") / "policy.npz"
+    network.save(path, drawn())
+    return path
+
+
+def transfer(*arguments):
+    return programs.run("-m", "arc_suite", "transfer", *arguments)
+
+
+@pytest.mark.long
+def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
+    done = transfer(f"--policy={policy}", "--families=robots", "-o", tmp_path / "table.csv")
+    assert (done.returncode, done.stderr) == (0, "")
+    heads, row = (line.split() for line in done.stdout.splitlines())
+    assert heads[:4] == ["family", "count", "walk", "demonstrated"] and row[:4] == ["robots", "4", "0", "1"]
+    with (tmp_path / "table.csv").open() as file:
+        lines = list(csv.DictReader(file))
+    assert len(lines) == 12 and {line["who"] for line in lines} == {"policy", "demonstrator", "zero"}
+    assert all(line["walked"] == str(line["who"] == "demonstrator") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--families=robts"], "unknown family 'robts'; did you mean 'robots'?"),
+        (["--policy=nowhere.npz"], "cannot read nowhere.npz: no such file"),
+        (["-o", "table.txt"], "unknown extension '.txt' (there are: .csv)"),
+        (["--task=wlak"], "unknown task 'wlak'; did you mean 'walk'?"),
+    ],
+)
+def test_what_does_not_fit_is_one_line(arguments, message):
+    done = transfer(*arguments)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"arc-suite transfer: {message}") and done.stderr.count("\n") == 1
