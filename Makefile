@@ -25,6 +25,7 @@
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
+# make clip-sets  loops, connections and slip of the clips of 110 bodies; half an hour
 # make soak    two million steps: memory, threads and files stay what they are
 # make loopholes  searches for policies that earn reward and fail at a task; some ten minutes
 # make fuzz    damages specs, tracks and datasets at random and reads them; minutes
@@ -37,7 +38,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist docs test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist docs test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean clip-sets
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -240,6 +241,9 @@ survey: $(INSTALLED)
 
 obedience: $(INSTALLED)
 	$(PYTHON) tests/obedience.py
+
+clip-sets: $(INSTALLED)
+	$(PYTHON) tests/clip_sets.py
 
 soak: $(INSTALLED)
 	$(PYTHON) tests/soak.py
