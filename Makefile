@@ -8,6 +8,8 @@
 # make check-sb3  stable-baselines3: its checker, a short SAC run, our rows for it, training scripts; in an environment of their own
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
+# make docs    builds the documentation site in out/docs/html, in an environment of its own; with Node, creatures walk there
+# make check-docs  builds the site, follows its links and looks at its front page in Chromium
 # make web     bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-studio  the studio in Chromium: sliders moved, creature changed, command followed, files saved
@@ -23,6 +25,7 @@
 # make bench   measures speed, writes docs/performance.md and its plot; minutes, on a quiet machine
 # make survey  walks 500 random bodies and tells which do
 # make obedience  how well 100 random bodies follow ten commands; minutes
+# make clip-sets  loops, connections and slip of the clips of 110 bodies; half an hour
 # make soak    two million steps: memory, threads and files stay what they are
 # make loopholes  searches for policies that earn reward and fail at a task; some ten minutes
 # make fuzz    damages specs, tracks and datasets at random and reads them; minutes
@@ -35,7 +38,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean
+.PHONY: demo dist docs test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean clip-sets
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -112,6 +115,20 @@ check-sb3: setup.cfg
 check-clients: $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) tools/check_clients.py
+
+# Warnings are errors. Without Node the site has pictures in place of walking creatures.
+docs: VENV := .venv-docs
+docs: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	$(VENV)/bin/python -m pip install -q -e '.[docs]'
+	$(MAKE) web || true
+	$(VENV)/bin/python tools/make_site.py out/docs
+	$(VENV)/bin/python -m sphinx -q -W --keep-going -j auto -c docs out/docs/sources out/docs/html
+
+check-docs: VENV := .venv-docs
+check-docs: docs
+	$(VENV)/bin/python -m pip install -q pytest playwright==1.65.2
+	$(VENV)/bin/python -m pytest tests/website
 
 ENGINES := out/engines
 
@@ -224,6 +241,9 @@ survey: $(INSTALLED)
 
 obedience: $(INSTALLED)
 	$(PYTHON) tests/obedience.py
+
+clip-sets: $(INSTALLED)
+	$(PYTHON) tests/clip_sets.py
 
 soak: $(INSTALLED)
 	$(PYTHON) tests/soak.py

@@ -1,10 +1,12 @@
 """Legged game creatures that walk in style: a dm_control task suite.
 
-import arc_suite
-environment = arc_suite.load("queen", "walk")
+As a dm_env and as a Gymnasium environment::
 
-import gymnasium
-env = gymnasium.make("arc_suite/queen-walk-v0")
+    import arc_suite
+    environment = arc_suite.load("queen", "walk")
+
+    import gymnasium
+    env = gymnasium.make("arc_suite/queen-walk-v0")
 """
 
 from arc_suite import versions

@@ -8,6 +8,7 @@ const KEYS = {
   KeyQ: [0, 1, 0], KeyE: [0, -1, 0],
 };
 const LEAST = [-0.5, -0.5, -1], MOST = [1, 0.5, 1]; // of a command, as the tasks draw them
+const SHOWN = [0.8, 0, 0.2]; // a wide circle, where the page's address ends in #walk, until somebody plays
 const DEAD = 0.15; // share of a gamepad's stick that counts as nothing
 
 const sum = (vectors) => vectors.reduce((total, vector) => total.map((value, i) => value + vector[i]), [0, 0, 0]);
@@ -31,6 +32,7 @@ export class Inputs {
   constructor(stick) {
     this.held = new Set();
     this.stick = [0, 0, 0];
+    this.shows = window.location.hash === "#walk";
     window.addEventListener("keydown", (event) => {
       if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
       if (event.target.closest("select")) return; // whose keys these are
@@ -60,6 +62,8 @@ export class Inputs {
   }
 
   get command() {
-    return bounded(sum([...[...this.held].map((code) => KEYS[code]), ...gamepads(), this.stick]));
+    const command = bounded(sum([...[...this.held].map((code) => KEYS[code]), ...gamepads(), this.stick]));
+    if (command.some(Boolean)) this.shows = false;
+    return this.shows ? SHOWN : command;
   }
 }

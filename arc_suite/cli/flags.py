@@ -12,7 +12,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.models.families import FAMILIES
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
-from arc_suite.robots import ROBOTS, generator, shaping, spec_files
+from arc_suite.robots import ROBOTS, generator, palettes, shaping, spec_files
 from arc_suite.robots.spec import PALETTES, Body
 from arc_suite.tasks import TASKS
 
@@ -112,8 +112,7 @@ def made_body() -> Body | None:
         body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
     if FLAGS.length:
         body = shaping.shaped(body, links=named_values("length", FLAGS.length))
-    palette = FLAGS.palette
-    return body if palette is None else body.replace(palette=int(palette) if palette.isdecimal() else palette)
+    return body if FLAGS.palette is None else body.replace(palette=palettes.parsed(FLAGS.palette))
 
 
 def bodies(robot: flags.FlagHolder) -> dict[str, Body]:

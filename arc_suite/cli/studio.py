@@ -23,6 +23,7 @@ from arc_suite.cli.flags import (
     define_policy,
     define_preset,
     define_task,
+    named_values,
     only_body,
     policy_name,
     task,
@@ -62,8 +63,9 @@ def _sketch() -> Sketch:
         policy=policy_name(FLAGS.policy),
         preset=FLAGS.preset or OWN,
     )
-    if FLAGS.legs is not None:
-        return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3)
     if FLAGS.spec is not None and FLAGS.spec not in EXAMPLES:
         return cured(doing, body)
-    return dataclasses.replace(doing, source=FLAGS.spec or body.name)
+    shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
+    if FLAGS.legs is not None:
+        return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
+    return dataclasses.replace(doing, source=FLAGS.spec or body.name, **shape)

@@ -1,8 +1,10 @@
 """Datasets in Minari's format, for offline-RL libraries, with bit-exact replays.
 
-dataset = arc_suite.data.open("arc_suite/queen/walk/cpg-medium-v0")
-episode = dataset[0]
-track = style.record(dataset.settings.setup.load(), episode.playback(), episode.seed, max_steps=episode.length)
+A recorded episode, replayed::
+
+    dataset = arc_suite.data.open("arc_suite/queen/walk/cpg-medium-v0")
+    episode = dataset[0]
+    track = style.record(dataset.settings.setup.load(), episode.playback(), episode.seed, max_steps=episode.length)
 """
 
 from arc_suite import versions

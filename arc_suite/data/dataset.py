@@ -48,7 +48,7 @@ def open(dataset_id: str) -> "Dataset":
 
 
 class Dataset:
-    """A dataset of recorded episodes: a sequence of `Episode`s, each read on access.
+    """A dataset of recorded episodes: a sequence of `Episode`, each read on access.
 
     Attributes:
         id: Minari's.

@@ -238,7 +238,7 @@ class Env:
             obs=jnp.where(diverged, 0.0, observation),
             reward=_float(jnp.where(diverged, 0.0, reward)),
             done=_float(terminated | truncated | diverged),
-            metrics={name: _float(metric) for name, metric in metrics.items()},
+            metrics=state.metrics | {name: _float(metric) for name, metric in metrics.items()},  # and those of wrappers
             info={**info, "memory": after, "truncation": _float(truncated & ~(terminated | diverged))},
         )
 

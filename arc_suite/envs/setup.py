@@ -77,7 +77,7 @@ class Setup:
 
     @property
     def robot(self) -> str:
-        """Name of the robot, `module:name` for one of another package, or the JSON text of another body."""
+        """Name of the robot, with the module for one of another package, or the JSON text of another body."""
         return registry.importable("domain", self.body.name) if is_robot(self.body) else body_to_json(self.body)
 
     @property

@@ -210,17 +210,22 @@ def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk
     """
     if walk is None:
         raise ValueError("there is no walk that it connects to")
+    draft = passage(body, spec, transition)
+    cycle, still, going = round(draft.cycle / draft.motion.step), *((0, -1) if spec.starts else (-1, 0))
+    motion = draft.motion.meeting(idle, still, cycle).meeting(walk.start, going, cycle)
+    if motion.seam > _FAR:
+        raise ValueError(f"its pose is {np.degrees(motion.seam):.0f} degrees from that of the walk or of idle")
+    return draft._replace(motion=motion)
+
+
+def passage(body: Body, spec: Passage, transition: Transition) -> Draft:
+    """Return a stop or a start as it was recorded, with soles in stance on the ground."""
     recorded = transition.recorded
     cycle = round(recorded.cycle / recorded.recording.step)
     first = transition.start if spec.starts else transition.stop
     samples = spec.cycles * cycle - transition.late * spec.starts
     motion = root_motion.passage(recorded.recording, first, samples, cycle)
-    draft = Draft(motion, spec.cycles, recorded.cycle, loops=False).grounded(body)
-    still, going = (0, -1) if spec.starts else (-1, 0)
-    motion = draft.motion.meeting(idle, still, cycle).meeting(walk.start, going, cycle)
-    if motion.seam > _FAR:
-        raise ValueError(f"its pose is {np.degrees(motion.seam):.0f} degrees from that of the walk or of idle")
-    return draft._replace(motion=motion)
+    return Draft(motion, spec.cycles, recorded.cycle, loops=False).grounded(body)
 
 
 def _difference(draft: Draft, usual: Draft, pose: Pose) -> Draft:

@@ -14,14 +14,15 @@ _DAMPING = 0.005  # of the standing height
 _ROUNDS = 30  # of the search for joint angles
 _SHARES = (1.0, 0.75, 0.5, 0.25, 0.0)  # of the correction on the ground: the largest is taken that a leg can follow
 _SINKS = 0.005  # of the standing height, and
-_FASTER = 6.0  # times the fastest joint of the leg before: a leg that needs more does not follow
-_LANDS = 0.25  # of a swing, after and before which its height is as it was
+_FASTER = 6.0  # times the fastest joint of the leg unplanted: a leg that needs more does not follow
+_LANDS = 0.05  # of a swing, after and before which its height is as it was: near the ground a foot would still slide
+_PASSES = 3  # in each, a foot stays in the middle of where the pass before could bring it
 
 
 def planted(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
     """Return the motion with feet that neither slide nor sink in stance.
 
-    A foot in stance stays at the mean of its places. Between two stances the correction of one goes over into that of
+    A foot in stance stays in the middle of its places. Between two stances the correction of one goes over into that of
     the next. Feet at the ends of a motion that is no loop stay where they are there. A leg of two joints reaches its
     goals in part, and a foot that stays down throughout a loop keeps its slide.
 
@@ -31,39 +32,71 @@ def planted(body: Body, motion: Motion, cycle: float, loops: bool) -> Motion:
         cycle: of the gait, s.
         loops: whether the last sample is the first one.
     """
-    count = len(motion.joints) - 1
-    legs = Legs.of(body, used=1.0)
-    radii, legs = legs.radii, legs._replace(radii=np.zeros_like(legs.radii))
-    around = _repeated(motion) if loops else motion
-    qpos = around.qpos()
-    turns, angles = rotations.matrix(qpos[:, 3:7]), legs.by_leg(around.joints)
-    feet = (turns[:, None] @ legs.soles(angles)[0][..., None])[..., 0] + qpos[:, None, :3]
-    corrections = np.zeros_like(feet)
-    for leg, radius in enumerate(radii):
-        low = feet[:, leg, 2] - radius < _STANDS * body.torso.standing_height
-        intervals = _stances(low, round(_LIFTS * cycle / motion.step), count if loops else None)
-        corrections[:, leg] = _corrections(feet[:, leg], radius, intervals, not loops)
-    rows = slice(count, 2 * count + 1) if loops else slice(None)
-    feet, corrections, places, turns, angles = (
-        values[rows] for values in (feet, corrections, qpos[:, None, :3], turns, angles)
-    )
+    legs, height = Legs.of(body, used=1.0), body.torso.standing_height
+    low = _feet(legs, _repeated(motion) if loops else motion)[..., 2] - legs.radii < _STANDS * height
+    longest = len(motion.joints) - 1 if loops else None
+    stances = [_stances(each, round(_LIFTS * cycle / motion.step), longest) for each in low.T]
+    angles = legs.by_leg(motion.joints)
     # A joint may be a little beyond its range, as limits are soft.
     legs = legs._replace(low=np.minimum(legs.low, angles.min(axis=0)), high=np.maximum(legs.high, angles.max(axis=0)))
-    height, found, waits = body.torso.standing_height, angles, np.ones(len(radii), bool)
+    fastest = _FASTER * _paces(angles)
+    for _ in range(_PASSES):
+        motion = _nearer(legs, height, motion, stances, fastest, loops)
+    return motion
+
+
+def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndarray, loops: bool) -> Motion:
+    """Return the motion with feet in stance nearer to a place on the ground that is the same throughout the stance.
+
+    Args:
+        legs: of the body.
+        height: at which the body stands, m.
+        motion: to change.
+        stances: of each foot, intervals of samples; in a loop, of three rounds.
+        fastest: (legs,) rad, by which a joint of a leg may turn between two samples.
+        loops: whether the last sample is the first one.
+    """
+    count, around = len(motion.joints) - 1, _repeated(motion) if loops else motion
+    feet = _feet(legs, around)
+    corrections = np.zeros_like(feet)
+    for leg, radius in enumerate(legs.radii):
+        corrections[:, leg] = _corrections(feet[:, leg], radius, stances[leg], not loops)
+    rows = slice(count, 2 * count + 1) if loops else slice(None)
+    feet, corrections, qpos = feet[rows], corrections[rows], around.qpos()[rows]
+    turns, places, angles = rotations.matrix(qpos[:, 3:7]), qpos[:, None, :3], legs.by_leg(qpos[:, 7:])
+    centres, found, waits = _centres(legs), angles, np.ones(len(legs.radii), bool)
     for share in _SHARES:
         goals = feet + corrections * (share, share, 1.0)
-        goals[..., 2] = np.maximum(goals[..., 2], radii)
+        goals[..., 2] = np.maximum(goals[..., 2], legs.radii)
         seen = (turns.swapaxes(-1, -2)[:, None] @ (goals - places)[..., None])[..., 0]
-        reached = legs.reached(angles, seen, _WEIGHTS, _DAMPING * height, _ROUNDS)
-        missed = abs((turns[:, None] @ (legs.soles(reached)[0] - seen)[..., None])[..., 2, 0]).max(axis=0)
-        paces, before = (abs(np.diff(each, axis=0)).max(axis=(0, 2)) for each in (reached, angles))
-        follows = waits & (missed <= _SINKS * height) & (paces <= _FASTER * before)
+        reached = centres.reached(angles, seen, _WEIGHTS, _DAMPING * height, _ROUNDS)
+        missed = abs((turns[:, None] @ (centres.soles(reached)[0] - seen)[..., None])[..., 2, 0]).max(axis=0)
+        follows = waits & (missed <= _SINKS * height) & (_paces(reached) <= fastest)
         found = np.where(follows[:, None], reached, found)
         waits &= ~follows
+        if not waits.any():
+            break
     joints = legs.by_joint(found)
     if loops:
         joints[-1] = joints[0]
     return motion._replace(joints=joints)
+
+
+def _centres(legs: Legs) -> Legs:
+    """Return the legs with the centres of feet for soles."""
+    return legs._replace(radii=np.zeros_like(legs.radii))
+
+
+def _feet(legs: Legs, motion: Motion) -> np.ndarray:
+    """Return the places (samples, legs, 3) of the centres of feet in the world, m."""
+    qpos = motion.qpos()
+    places = _centres(legs).soles(legs.by_leg(motion.joints))[0]
+    return (rotations.matrix(qpos[:, 3:7])[:, None] @ places[..., None])[..., 0] + qpos[:, None, :3]
+
+
+def _paces(angles: np.ndarray) -> np.ndarray:
+    """Return the largest turn (legs,) of a joint of each leg between two of the samples (samples, legs, links), rad."""
+    return abs(np.diff(angles, axis=0)).max(axis=(0, 2))
 
 
 def _repeated(motion: Motion) -> Motion:
@@ -104,7 +137,7 @@ def _corrections(places: np.ndarray, radius: float, intervals, keeps_ends: bool)
         kept = [keeps_ends and start == 0, keeps_ends and end == count]
         anchors = [places[start], places[end - 1]]
         if kept == [False, False]:
-            held = places[start:end].mean(axis=0)
+            held = 0.5 * (places[start:end].min(axis=0) + places[start:end].max(axis=0))
         elif all(kept):  # the foot goes over from one to the other
             held = weights[0] * anchors[0] + weights[1] * anchors[1]
         else:

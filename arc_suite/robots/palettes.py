@@ -28,6 +28,11 @@ def colours(palette: str | int) -> dict[str, Colour]:
     )
 
 
+def parsed(text: str) -> str | int:
+    """Return the palette that a text names: digits are a seed."""
+    return int(text) if text.isdecimal() else text
+
+
 def _drawn(seed: int) -> tuple[Colour, ...]:
     draw = random.Random(seed)
     hue, rich, bright = draw.random(), draw.uniform(0.15, 0.65), draw.uniform(0.4, 0.9)

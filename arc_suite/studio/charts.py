@@ -18,8 +18,7 @@ class Charts:
     def __init__(self, gui: viser.GuiApi):
         """Add empty charts."""
         self._gui = gui
-        self._terms: tuple[str, ...] = ()
-        self._reward = None
+        self._rewards: dict[tuple[str, ...], viser.GuiUplotHandle] = {}
         self._folder = gui.add_folder("Reward by term")
         with gui.add_folder("Foot contacts against the gait"):
             self._contacts = gui.add_image(contacts_image(None, ()), format="png")
@@ -38,17 +37,23 @@ class Charts:
         if not len(history):
             return
         times, terms = history.times, history.terms()
-        if tuple(terms) != self._terms:
-            self._terms = tuple(terms)
-            if self._reward is not None:
-                self._reward.remove()
-            series, empty = ({"label": "s"}, *_series(of_terms(terms))), (np.zeros(1),) * (1 + len(terms))
-            with self._folder:
-                self._reward = self._gui.add_uplot(empty, series, height=_HEIGHT + 60, **_OPTIONS)
-        self._reward.data = (times, *terms.values())
+        self._reward(tuple(terms)).data = (times, *terms.values())
         speeds, desired = history.speeds(), history.desired()
         self._speed.data = (times, speeds, np.where(np.isnan(desired), speeds, desired))  # without a command, one line
         self._contacts.image = contacts_image(history.contacts(), names)
+
+    def _reward(self, terms: tuple[str, ...]) -> viser.GuiUplotHandle:
+        """Return the chart of terms, and hide those of others.
+
+        None is removed: a browser that is late applies updates of a widget after it has removed the widget.
+        """
+        if terms not in self._rewards:
+            series, empty = ({"label": "s"}, *_series(of_terms(terms))), (np.zeros(1),) * (1 + len(terms))
+            with self._folder:
+                self._rewards[terms] = self._gui.add_uplot(empty, series, height=_HEIGHT + 60, **_OPTIONS)
+        for each, chart in self._rewards.items():
+            chart.visible = each == terms
+        return self._rewards[terms]
 
 
 def contacts_image(contacts: tuple[np.ndarray, np.ndarray] | None, names: tuple[str, ...]) -> np.ndarray:

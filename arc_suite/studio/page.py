@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import io
+import itertools
 import math
 import random
 import socket
@@ -16,6 +17,7 @@ from arc_suite.arenas import ARENAS
 from arc_suite.cpg.selection import preset_names, presets_of
 from arc_suite.policies import POLICIES
 from arc_suite.robots import gaits, generator
+from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import MAX_BYTES
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.studio import saving, texts
@@ -90,7 +92,7 @@ class Page:
         self._creature: Creature | None = None
         self._file = session.creature.sketch.file
         self._widgets: dict[str, Any] = {}
-        self._lengths: dict[str, Any] = {}
+        self._links: tuple[str, ...] = ()
         self._cures: list[Any] = []
         self._view = View(server)
         server.gui.configure_theme(show_logo=False, show_share_button=False)
@@ -105,7 +107,7 @@ class Page:
             self._add_command()
         with tabs.add_tab("Files"):
             self._add_files()
-        for widget in self._widgets.values():
+        for widget in (*self._widgets.values(), *self._lengths):
             widget.on_update(self._changed)
         panel = server.gui.add_panel()
         with panel.add_tab("Measured"):
@@ -139,7 +141,10 @@ class Page:
         upload.on_upload(self._uploaded)
         for name, label, low, high, step in _PROPORTIONS:
             widgets[name] = gui.add_slider(label, low, high, step, getattr(first, name))
-        self._link_folder = gui.add_folder("Length of links")
+        palettes = _listed(first.palette, (OWN, *PALETTES))
+        widgets["palette"] = gui.add_dropdown("Palette", palettes, initial_value=first.palette)
+        with gui.add_folder("Length of links"):
+            self._lengths = [gui.add_slider("", 0.5, 2.0, 0.05, 1.0, visible=False) for _ in range(_LINKS)]
 
     def _add_task(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets
@@ -197,17 +202,14 @@ class Page:
         self._lines.content = texts.copied(creature.sketch)
 
     def _fit_links(self, creature: Creature) -> None:
-        """Add a slider for each link's name."""
-        names = creature.links[:_LINKS]
-        if tuple(self._lengths) == names:
+        """Give each name of links a slider; the others are hidden, as a browser that is late updates removed ones."""
+        names, given = creature.links[:_LINKS], dict(creature.sketch.lengths)
+        if names == self._links:
             return
-        for slider in self._lengths.values():
-            slider.remove()
-        given = dict(creature.sketch.lengths)
-        with self._link_folder:
-            self._lengths = {name: self._gui.add_slider(name, 0.5, 2.0, 0.05, given.get(name, 1.0)) for name in names}
-        for slider in self._lengths.values():
-            slider.on_update(self._changed)
+        self._links = names
+        for slider, name in itertools.zip_longest(self._lengths, names):
+            slider.visible = name is not None
+            slider.label, slider.value = name or "", given.get(name, 1.0)
 
     def _show_what_applies(self, sketch: Sketch) -> None:
         for name in ("legs", "links", "layout"):
@@ -216,7 +218,7 @@ class Page:
 
     def _read(self) -> Sketch:
         """Return what the widgets say."""
-        lengths = tuple((name, slider.value) for name, slider in self._lengths.items())
+        lengths = tuple((name, slider.value) for name, slider in zip(self._links, self._lengths, strict=False))
         said = {name: widget.value for name, widget in self._widgets.items()}
         return Sketch(**said, lengths=lengths, file=self._file)
 
@@ -230,7 +232,7 @@ class Page:
         widgets["source"].options = (*sketches.sources(), FILE)
         for name, widget in widgets.items():
             widget.value = getattr(sketch, name)
-        for slider in self._lengths.values():
+        for slider in self._lengths:
             slider.value = 1.0
         self._session.ask(sketch)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from arc_suite import export, models, style, versions
 from arc_suite.envs.dm import Environment
-from arc_suite.export import films, pages
+from arc_suite.export import films, pages, play
 from arc_suite.policies import Individuals, alone
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation.pictures import picture
@@ -82,6 +82,16 @@ def page(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> by
     return pages.page({creature.setup.body.name: track}).encode()
 
 
+def playable(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return a page in which keys walk the creature about; see `export.play`.
+
+    Raises:
+        ValueError: the scripts of pages have not been built, or the policy does not run in a page.
+    """
+    sketch = creature.sketch
+    return play.page([play.creature(creature.setup.body, sketch.policy, sketches.preset(sketch))]).encode()
+
+
 def image(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return a picture of the creature where it stands, as PNG.
 
@@ -134,6 +144,7 @@ FILES = (
     File("MJCF", ".xml", mjcf),
     File("Clips", ".glb", glb),
     File("Page", ".html", page),
+    File("Page to play in", "_play.html", playable),
     File("Picture", ".png", image),
     File("Film", ".mp4", film),
 )

@@ -7,7 +7,7 @@ from typing import Any
 
 from arc_suite import checks, registry
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS, generator, palettes
 from arc_suite.robots.shaping import Shape, link_names, shaped
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, load_body
@@ -30,6 +30,7 @@ class Sketch:
         file: the text of a spec file, of `FILE`.
         scale, length, width, thickness, fan: see `shaping.Shape`.
         lengths: factors of links, pairs of a name and a number; those of links that the body lacks are ignored.
+        palette: of colours, a name of `spec.PALETTES`, a seed in digits, or `OWN`.
         task: name of the task.
         gait: name of the gait, or `OWN`.
         speed: target velocity, as a multiple of the body's own.
@@ -52,6 +53,7 @@ class Sketch:
     thickness: float = 1.0
     fan: float = 0.0
     lengths: tuple[tuple[str, float], ...] = ()
+    palette: str = OWN
     task: str = "steer"
     gait: str = OWN
     speed: float = 1.0
@@ -87,10 +89,11 @@ def body(sketch: Sketch) -> Body:
     """Return the body.
 
     Raises:
-        ValueError: as `source_body`, or proportions out of range.
+        ValueError: as `source_body`, proportions out of range, or an unknown palette.
     """
     made = source_body(sketch)
-    return shaped(made, **_shape(sketch, made))
+    made = shaped(made, **_shape(sketch, made))
+    return made if sketch.palette == OWN else made.replace(palette=palettes.parsed(sketch.palette))
 
 
 def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
@@ -158,6 +161,8 @@ def python_lines(sketch: Sketch) -> str:
     if shape := _shape(sketch, made):
         changes = ", ".join(f"{name}={value!r}" for name, value in shape.items())
         modules, code = [*modules, "shaping"], f"shaping.shaped({code}, {changes})"
+    if sketch.palette != OWN:
+        code = f"{code}.replace(palette={palettes.parsed(sketch.palette)!r})"
     options = settings(sketch, body(sketch))
     return (
         f"import arc_suite\nfrom arc_suite import policies\nfrom arc_suite.robots import {', '.join(modules)}\n\n"

@@ -134,11 +134,15 @@ class CommandTask(Task):
         cls.own_arena, cls.commands = cls.ground.own_arena, cls.command.live
 
     @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of the settings."""
+        return (*cls.ground.settings, *parameters.NAMES, "cost_limit")
+
+    @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
-        names = (*cls.ground.settings, *parameters.NAMES, "cost_limit")
         elsewhere = () if cls.own_arena else ("arena",)
-        given = parameters.values(body, overrides, cls.name, names, elsewhere)
+        given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere)
         weights = {**cls.bonuses, **paper.COSTS, **given["weights"], **RATES, "transport": 0.0}
         return Settings(
             parameters.parameters(body, given),

@@ -8,7 +8,7 @@ array's own namespace, so that the same text runs under NumPy and JAX. NumPy rou
 of arrays differently: write `x * x` where `x` has only leading axes. `arc-suite check --task` finds
 what differs between one environment and a batch.
 
-An episode, as a driver runs it, for one environment or with a leading axis for a batch:
+An episode, as a driver runs it, for one environment or with a leading axis for a batch::
 
     start = task.start(random, stream)            # all randomness of the episode
     ... the driver resets the simulation to start.qpos and start.qvel ...

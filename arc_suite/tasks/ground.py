@@ -184,11 +184,11 @@ class Lanes(Ground):
         copies: lanes of each kind, and of each kind and level of a curriculum; boxes cost time, so there are fewer.
         middle: share of the lane's length at which a body starts.
         thresholds: outcomes below and above which a curriculum's level falls and rises.
-        difficulty: of all lanes, from 0 to 1, without a curriculum.
+        difficulty: difficulty of all lanes, without a curriculum.
         curriculum: whether episodes climb levels of difficulty by their outcomes.
-        level: from 0 to 9, at which a curriculum begins.
-        terrain_seed: of what is random in the ground.
-        rise, slope, width: of obstacles, m, the slope in rad, in place of what a difficulty makes of the body's height.
+        level: level at which a curriculum begins.
+        terrain_seed: seed of the random ground.
+        rise, slope, width: size of obstacles, m, the slope in rad; None for the size that follows from the difficulty.
     """
 
     kinds: tuple[str, ...]

@@ -22,13 +22,13 @@ class Modifiers(NamedTuple):
     Attributes:
         kicks: the greatest change of the torso's velocity by a kick, sqrt(g h): each of a schedule is
             uniform from 0 up to it, in any horizontal direction, 40 to 120 control steps apart.
-        motor_strength: of the torque of all motors, a share, or two of them.
+        motor_strength: share of the torque of all motors, or two of them.
         actuator_failure: True for a leg that is drawn, or the index of one: its motors do nothing from step 40 on.
-        friction: of all contacts, a multiple, or two of them.
-        mass: and inertia of all parts, a multiple, or two of them.
+        friction: multiple of the friction of all contacts, or two of them.
+        mass: multiple of mass and inertia of all parts, or two of them.
         observation_noise: level of uniform noise on what is measured, for all blocks that
             `noise.half_widths` knows, or by the name of a block.
-        delay: of actions, control steps, or two of them.
+        delay: delay of actions, control steps, or two of them.
         actions: "torque", or "position": an action is then the joints' wanted angles, 0 for the standing
             pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains.
         exclude_blocks: names of blocks that the observation leaves out: the vector gets shorter.
@@ -47,6 +47,16 @@ class Modifiers(NamedTuple):
 
 NAMES = Modifiers._fields
 
+# Of a number, or of each of two.
+BOUNDS = {
+    "kicks": (0.0, 100.0),
+    "motor_strength": (0.0, 1.0),
+    "friction": (0.0, 100.0),
+    "mass": (0.01, 100.0),
+    "observation_noise": (0.0, 100.0),
+    "delay": (0, LONGEST_DELAY),
+}
+
 
 def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], noisy) -> Modifiers:
     """Return the modifiers that settings ask for.
@@ -64,11 +74,11 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], 
         checks.name(name, NAMES, "modifier")
     values = Modifiers()._asdict() | dict(settings)
     return Modifiers(
-        kicks=checks.number("kicks", values["kicks"], 0.0, 100.0),
-        motor_strength=checks.span("motor_strength", values["motor_strength"], 0.0, 1.0),
+        kicks=checks.number("kicks", values["kicks"], *BOUNDS["kicks"]),
+        motor_strength=checks.span("motor_strength", values["motor_strength"], *BOUNDS["motor_strength"]),
         actuator_failure=_actuator_failure(values["actuator_failure"], body),
-        friction=checks.span("friction", values["friction"], 0.0, 100.0),
-        mass=checks.span("mass", values["mass"], 0.01, 100.0),
+        friction=checks.span("friction", values["friction"], *BOUNDS["friction"]),
+        mass=checks.span("mass", values["mass"], *BOUNDS["mass"]),
         observation_noise=_noise(values["observation_noise"], list(noisy)),
         delay=_delay(values["delay"]),
         actions=checks.name(values["actions"], ACTIONS, "actions"),
@@ -81,17 +91,18 @@ def _actuator_failure(value, body: Body) -> bool | int:
 
 
 def _noise(value, noisy: list[str]) -> dict[str, float]:
-    levels = value if isinstance(value, Mapping) else dict.fromkeys(noisy, value)
+    levels, bounds = value if isinstance(value, Mapping) else dict.fromkeys(noisy, value), BOUNDS["observation_noise"]
     return {
-        checks.name(name, noisy, "block with noise"): checks.number("observation_noise", level, 0.0, 100.0)
+        checks.name(name, noisy, "block with noise"): checks.number("observation_noise", level, *bounds)
         for name, level in levels.items()
     }
 
 
 def _delay(value) -> tuple[int, int]:
     low, high = value if isinstance(value, tuple | list) and len(value) == 2 else (value, value)
-    low = checks.integer("delay", low, 0, LONGEST_DELAY)
-    return low, checks.integer("delay", high, low, LONGEST_DELAY)
+    least, most = BOUNDS["delay"]
+    low = checks.integer("delay", low, least, most)
+    return low, checks.integer("delay", high, low, most)
 
 
 def _exclude_blocks(value, blocks: Mapping[str, int]) -> tuple[str, ...]:

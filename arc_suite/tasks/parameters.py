@@ -80,12 +80,12 @@ class Parameters(NamedTuple):
     """The gait that a task prescribes, and the speed that belongs to it.
 
     Attributes:
-        target_velocity: m/s.
-        gait_frequency: of the gait's clock, Hz.
+        target_velocity: speed that belongs to the gait, m/s.
+        gait_frequency: frequency of the gait's clock, Hz.
         duty_factor: share of a cycle that a foot spends in stance.
-        phase_offsets: (feet,) rad, added to the clock's phase.
-        stance_threshold: m, a foot below it is in stance.
-        default_angles: (joints,) rad, from which the posture is measured.
+        phase_offsets: (feet,) added to the clock's phase, rad.
+        stance_threshold: height below which a foot is in stance, m.
+        default_angles: (joints,) angles from which the posture is measured, rad.
     """
 
     target_velocity: float
@@ -105,12 +105,12 @@ class Noise(NamedTuple):
     """Noise of the start: half-widths of uniform noise on the pose, standard deviations of velocities.
 
     Attributes:
-        position_noise: of the torso, half-width, m.
-        orientation_noise: of the components of the torso's quaternion, half-width.
-        linear_velocity_noise: of the torso, standard deviation, m/s.
-        angular_velocity_noise: of the torso, standard deviation, rad/s.
-        joint_angle_noise: half-width, rad.
-        joint_velocity_noise: standard deviation, rad/s.
+        position_noise: half-width of the torso's position, m.
+        orientation_noise: half-width of the components of the torso's quaternion.
+        linear_velocity_noise: standard deviation of the torso's velocity, m/s.
+        angular_velocity_noise: standard deviation of the torso's angular velocity, rad/s.
+        joint_angle_noise: half-width of joint angles, rad.
+        joint_velocity_noise: standard deviation of joint velocities, rad/s.
     """
 
     position_noise: float
@@ -124,11 +124,12 @@ class Noise(NamedTuple):
 # Settings that every task with a gait has.
 NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")
 
-_BOUNDS = {
+BOUNDS = {
     "target_velocity": (-LARGEST, LARGEST),
     "gait_frequency": (0.0, LARGEST),
     "duty_factor": (0.0, 1.0),
     "stance_threshold": (-LARGEST, LARGEST),
+    **dict.fromkeys(Noise._fields, (0.0, LARGEST)),
 }
 
 
@@ -176,7 +177,7 @@ def parameters(body: Body, given: Mapping[str, Any]) -> Parameters:
         ValueError: a value that does not fit the body or its bounds.
     """
     return Parameters(
-        **{name: checks.number(name, given[name], *bounds) for name, bounds in _BOUNDS.items()},
+        **{name: checks.number(name, given[name], *BOUNDS[name]) for name in Parameters._fields if name in BOUNDS},
         phase_offsets=checks.array("phase_offsets", given["phase_offsets"], len(body.legs)),
         default_angles=checks.array("default_angles", given["default_angles"], len(body.joint_names)),
     )
@@ -188,7 +189,7 @@ def noise(given: Mapping[str, Any]) -> Noise:
     Raises:
         ValueError: a negative value.
     """
-    return Noise(*(checks.number(name, given[name], 0.0, LARGEST) for name in Noise._fields))
+    return Noise(*(checks.number(name, given[name], *BOUNDS[name]) for name in Noise._fields))
 
 
 def positive(name: str, value: Any) -> float:

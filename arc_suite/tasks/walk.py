@@ -18,8 +18,6 @@ from arc_suite.tasks.readings import Readings, component
 # Signed weights (Section 4).
 WEIGHTS = {"forward": 1.5, "healthy": 1.0, "gait_bonus": 1.5, **paper.COSTS}
 
-NAMES = (*parameters.NAMES, "velocity_band", "healthy_range")  # of the settings
-
 
 class Settings(NamedTuple):
     """Settings of a walk.
@@ -29,7 +27,7 @@ class Settings(NamedTuple):
         velocity_band: half-width of the triangular kernel of the velocity, m/s.
         healthy_range: lowest and highest torso height, m.
         weights: signed weight of every term.
-        noise: of the start.
+        noise: noise of the start.
     """
 
     parameters: Parameters
@@ -73,9 +71,14 @@ class Walk(Task):
     name, from_body = "walk", ("clock", "clearances", "_torques")
 
     @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Return the names of the settings."""
+        return (*parameters.NAMES, "velocity_band", "healthy_range")
+
+    @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
-        given = parameters.values(body, overrides, cls.name, NAMES, elsewhere=("arena",))
+        given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere=("arena",))
         return Settings(
             parameters.parameters(body, given),
             parameters.positive("velocity_band", given["velocity_band"]),

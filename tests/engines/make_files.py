@@ -12,10 +12,12 @@ from tqdm import tqdm
 
 from arc_suite import export
 from arc_suite.envs.setup import Setup
+from arc_suite.export.catalogue import CLIPS
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 
 FEW = ("walk", "turn_left", "stop", "idle")
+WHOLE = "queen"  # has all clips
 
 
 def main(folder: str, few: str = "") -> None:
@@ -29,7 +31,8 @@ def main(folder: str, few: str = "") -> None:
         bodies |= {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
         bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(50)}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
-        clips = export.clips(Setup.of(body, "steer"), export.DEFAULT if name in spec_files.EXAMPLES else FEW)
+        names = tuple(CLIPS) if name == WHOLE else export.DEFAULT if name in spec_files.EXAMPLES else FEW
+        clips = export.clips(Setup.of(body, "steer"), names)
         for rig in export.RIGS if name in ROBOTS else ("skin",):
             (out / f"{name}-{rig}.glb").write_bytes(export.glb(body, clips, rig))
         np.savez(out / f"{name}.npz", **truth(body, clips))

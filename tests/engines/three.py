@@ -12,6 +12,7 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 NEAR = 1e-5  # m
+STILL = "idle", "hit", "limp", "rise", "death"  # clips without foot contact events
 TIMES = (0.0, 0.25, 0.5, 0.75)  # of a clip
 
 
@@ -40,7 +41,7 @@ def check(tab, path: pathlib.Path) -> str:
     assert opened["bones"] == (len(parts) + 1 if rig == "skin" else 0)
     worst = 0.0
     for clip, told in opened["clips"].items():
-        assert (told["contacts"] > 0) == (not clip.startswith("idle"))
+        assert (told["contacts"] > 0) == (not clip.startswith(STILL))
         for time, places in zip(TIMES, told["frames"], strict=True):
             frame = time * (len(truth[clip]) - 1)
             if frame % 1.0:

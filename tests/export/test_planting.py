@@ -12,7 +12,7 @@ from arc_suite.export import planting
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 
-BODY = ROBOTS["tick"]
+BODY = ROBOTS["queen"]  # whose walk strides further than her hips turn: feet meet in the middle of what they reach
 HEIGHT = BODY.torso.standing_height
 
 
@@ -52,7 +52,7 @@ def slip(motion):
 @pytest.mark.slow
 def test_feet_in_stance_neither_slide_nor_sink():
     before, after = (made(plant)["walk"].motion for plant in (False, True))
-    assert slip(after) < 0.5 * slip(before)
+    assert slip(before) > 0.2 and slip(after) < 0.05
     assert soles(after)[..., 2].min() > -0.001 * HEIGHT
     assert (after.joints[0] == after.joints[-1]).all()
     for name in ("root", "positions", "quaternions"):

@@ -1,9 +1,11 @@
 """The README is short; its code, that of the pages, their commands and tables agree with the suite."""
 
+import math
 import pathlib
 import re
 import shlex
 
+import package_page
 import programs
 import pytest
 import test_layers
@@ -14,7 +16,8 @@ from arc_suite import data
 from arc_suite.cli import main
 from arc_suite.envs.setup import Setup
 from arc_suite.export import pages
-from arc_suite.tasks import TASKS, walk
+from arc_suite.robots import gaits
+from arc_suite.tasks import TASKS
 
 ROOT = pathlib.Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
@@ -92,30 +95,22 @@ def test_there_is_code():
 
 
 def test_table_of_robots():
-    table, details = _rows(README, "robot | body"), _rows(_page("walk"), "robot |")
-    assert list(table) == list(details) == list(arc_suite.TASKS_BY_DOMAIN)
+    table = _rows(README, "robot | body")
+    assert list(table) == list(arc_suite.TASKS_BY_DOMAIN)
     for robot, (_, legs, mass, height, speed, gait) in table.items():
         environment = arc_suite.load(robot, "walk")
         task, model = environment.task, environment.physics.model.ptr
-        size = sum(spec.shape[0] for spec in environment.observation_spec().values())
         parameters = task.settings.parameters
         assert legs == f"{len(task.body.legs)} x {len(task.body.legs[0].joints)}"
         assert float(mass.removesuffix(" kg")) == pytest.approx(model.body_mass.sum(), rel=0.01)
         assert height == f"{task.body.torso.standing_height:.2f} m"
         assert speed == f"{parameters.target_velocity:.2f} m/s"
-        assert details[robot] == [
-            *map(str, (model.nu, model.nbody - 1, size)),
-            f"{gait}, {parameters.gait_frequency} Hz",
-        ]
+        offsets = {"tripod": gaits.TRIPOD, "trot": gaits.TROT}[gait]
+        assert parameters.phase_offsets == pytest.approx([2.0 * math.pi * offset for offset in offsets])
 
 
 def test_table_of_tasks():
     assert set(_rows(README, "task |")) == set(TASKS)
-
-
-def test_table_of_terms():
-    table = _rows(_page("walk"), "term |")
-    assert {name: float(row[0].split(";")[0]) for name, row in table.items()} == walk.WEIGHTS
 
 
 def test_table_of_returns():
@@ -123,6 +118,13 @@ def test_table_of_returns():
     for robot, returns in _rows(README, "robot | standing").items():
         standing, _, medium, _, best, _, ppo, paper = (round(float(cell.split()[0])) for cell in results[robot])
         assert returns == [str(value) for value in (standing, medium, best, ppo, paper)]
+
+
+def test_the_text_for_package_indexes_is_made_from_the_readme():
+    """By python tools/package_page.py."""
+    page = package_page.page(README)
+    assert _page("package") == page
+    assert "](docs/" not in page and "make demo" not in page and "pip install 'arc_suite[agents,video]'" in page
 
 
 def test_every_program_has_a_row():

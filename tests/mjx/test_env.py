@@ -130,6 +130,14 @@ def test_a_live_command():
     np.testing.assert_array_equal(observed[::2], env.task.split(step(state, action).obs)["command"][::2, :3])
 
 
+def test_what_wrappers_add_to_a_state_stays():
+    env, *_ = compiled(ROBOT)
+    state = env.start(0)
+    given = state.replace(metrics=state.metrics | {"reward": state.reward}, info=state.info | {"steps": state.done})
+    after = jax.eval_shape(env.step, given, jnp.zeros(12))
+    assert jax.tree.structure(after) == jax.tree.structure(given)
+
+
 def test_randomised_models_differ_by_world():
     env, *_ = compiled(ROBOT)
     keys = jax.random.split(jax.random.key(0), 6)

@@ -21,12 +21,15 @@ def test_terrain(task, apart):
 
 
 def test_overflow_is_told(monkeypatch):
-    """A table of two contacts: Warp drops the others, and says so."""
+    """Tables of two contacts a world: Warp drops the others in the steps that have more, and says so."""
     from arc_suite.simulation import device
 
     monkeypatch.setattr(device, "table_sizes", lambda model: (2, 64))
     compiled.cache_clear()
     _, start, step = compiled("leaper", impl="warp", worlds=2)
-    state = step(start(np.arange(2)), np.zeros((2, 12)))
+    state, overflows = start(np.arange(2)), []
+    for _ in range(6):  # the first ones in the air
+        state = step(state, np.zeros((2, 12)))
+        overflows.append(np.asarray(state.metrics["overflow"]))
     compiled.cache_clear()
-    assert np.asarray(state.metrics["overflow"]).any()
+    assert np.any(overflows) and not np.all(overflows)

@@ -114,6 +114,9 @@ def test_a_slider_changes_the_creature(served, tab):
     press(tab, "lower", "ArrowRight", 4)
     served.until(lambda: served.session.creature.setup.body.name == "walker_6x2_shaped")
     served.until(lambda: dict(served.session.creature.sketch.lengths)["lower"] == pytest.approx(1.2))
+    choose(tab, "Palette", "moss")
+    served.until(lambda: served.session.creature.setup.body.palette == "moss")
+    choose(tab, "Palette", "own")
 
 
 def test_a_bad_combination_stands_in_the_page_and_the_creature_walks_on(served, tab):

@@ -32,7 +32,8 @@ def content(creature, label, desired=None):
 
 def test_names(creature):
     names = {saving.name(creature, file) for file in saving.FILES}
-    assert names == {f"tick_shaped.{end}" for end in ("json", "xml", "glb", "html", "png", "mp4")}
+    ends = (".json", ".xml", ".glb", ".html", "_play.html", ".png", ".mp4")
+    assert names == {f"tick_shaped{end}" for end in ends}
 
 
 def test_spec_and_model(creature):
@@ -62,6 +63,14 @@ def test_a_page_plays_the_walk_under_the_command(creature, monkeypatch):
     forward, start = track.quaternions[-1], track.positions[[0, -1]]
     heading = np.array((1 - 2 * forward[3] ** 2, 2 * forward[0] * forward[3]))
     assert (start[1] - start[0])[:2] @ heading > 0.1
+
+
+def test_a_page_to_play_in_has_the_body_and_its_law(creature, monkeypatch):
+    made = []
+    monkeypatch.setattr(saving.play, "page", lambda given: made.extend(given) or "<html>")
+    assert content(creature, "Page to play in") == b"<html>"
+    (walker,) = made
+    assert walker["name"] == "tick_shaped" and walker["policy"]["kind"] == "law"
 
 
 def test_without_a_viewer_there_is_no_page(creature, monkeypatch):

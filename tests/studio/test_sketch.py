@@ -21,9 +21,9 @@ SKETCHES = {
     "layout": Sketch(legs=6, layout="radial", gait="wave"),
     "shaped": Sketch(scale=2.0, fan=5.0, lengths=(("lower", 1.3), ("upper", 1.0)), speed=0.8),
     "robot": Sketch(source="queen", ground="bumps", kicks=0.5, task="walk", preset="tuned"),
-    "shaped robot": Sketch(source="tick", width=1.2),
+    "shaped robot": Sketch(source="tick", width=1.2, palette="moss"),
     "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
-    "random": Sketch(source=RANDOM, seed=7, policy="zero"),
+    "random": Sketch(source=RANDOM, seed=7, policy="zero", palette="7"),
     "file": Sketch(source=FILE, file=body_to_json(HIGH)),
 }
 
@@ -35,7 +35,7 @@ SKETCHES = {
         ("layout", generator.generate(6, 3, "radial")),
         ("robot", ROBOTS["queen"]),
         ("example", load_body("spider")),
-        ("random", generator.random_body(7)),
+        ("random", generator.random_body(7).replace(palette=7)),
         ("file", HIGH),
     ],
 )
@@ -136,6 +136,7 @@ def test_what_check_says_can_be_applied():
         (Sketch(settings='{"random": 1}'), "setting 'random': expected none, as every episode has a seed, got 1"),
         (Sketch(settings='{"arena": "os:path"}'), None),
         (Sketch(settings='{"arena": "antigravity:x"}'), "arena 'antigravity:x': files import nothing"),
+        (Sketch(palette="mos"), "Body(walker_8x3).palette: expected one of moss, "),
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
         (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
         (Sketch(task="walk", preset="balanced"), "unknown preset 'balanced'"),

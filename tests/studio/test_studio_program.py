@@ -28,6 +28,9 @@ def test_flags(tmp_path):
     arguments = {
         (): Sketch(source="queen", task="walk"),
         ("--legs=6", "--links=2", "--task=steer", "--preset=surefooted"): Sketch(legs=6, links=2, preset="surefooted"),
+        ("--legs=4", "--length=lower=1.5", "--palette=7"): Sketch(
+            legs=4, lengths=(("lower", 1.5),), palette="7", task="walk"
+        ),
         ("--spec=spider", "--set=arena=bumps", "--set=kicks=0.5", "--set=friction=0.7"): Sketch(
             source="spider", task="walk", ground="bumps", kicks=0.5, settings='{"friction": 0.7}'
         ),

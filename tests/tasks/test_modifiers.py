@@ -477,7 +477,7 @@ def test_a_wrong_modifier_is_one_line(settings, message):
 GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()
 
 
-def test_the_guide_runs_and_names_every_modifier():
+def test_the_guide_runs():
     there = {}
     for block in re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL):
         exec(compile(block, "modifiers.md", "exec"), there)
@@ -485,4 +485,3 @@ def test_the_guide_runs_and_names_every_modifier():
     there["environments"].reset(seed=0)
     there["environments"].close()
     assert there["Ice"].modifiers == {"friction": (0.05, 0.2)}
-    assert tuple(re.findall(r"^\| `(\w+)` \|", GUIDE, re.MULTILINE)) == NAMES

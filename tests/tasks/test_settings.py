@@ -5,8 +5,7 @@ import pytest
 from tiers import tiers
 
 import arc_suite
-from arc_suite.tasks import TASKS, parameters, walk
-from arc_suite.tasks.commanded import CommandTask
+from arc_suite.tasks import TASKS, parameters
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.modified import Modified
 
@@ -27,6 +26,7 @@ OTHER = {
     "level": 5,
     "terrain_seed": 3,
     "rise": 0.05,
+    "cost_limit": 0.3,
     **dict.fromkeys((*parameters.SHARED_NOISE, *parameters.Noise._fields), 0.05),
 }
 WITH = {"level": {"curriculum": True}}
@@ -34,8 +34,7 @@ WITH = {"level": {"curriculum": True}}
 
 def names(task):
     """The settings that a task has, without those of every task."""
-    own = TASKS[task]
-    return (*own.ground.settings, *parameters.NAMES) if issubclass(own, CommandTask) else walk.NAMES
+    return TASKS[task].names()
 
 
 PAIRS = [(task, name) for task in ("walk", "steer", "rough", "navigate") for name in names(task)]

@@ -1,0 +1,112 @@
+"""Clips of robots, examples and random bodies: `make clip-sets`, half an hour.
+
+python tests/clip_sets.py [NUMBER OF RANDOM BODIES]
+
+Prints for each body the cycles of its loops and the largest seam, how far its start and stop are from walk and idle
+before they are made to meet, the slip of its walk as it is and planted, and what was left out. Lengths are in standing
+heights. Fails if a body has no file, fewer than 85 % of the random bodies have loops of one cycle, or fewer than 95 %
+of the bodies stop from a pose within 0.08 of the walk's.
+"""
+
+import functools
+import sys
+
+import mujoco
+import numpy as np
+from tqdm import tqdm
+
+from arc_suite.cpg.kinematics import Legs
+from arc_suite.envs.setup import Setup
+from arc_suite.export import planting
+from arc_suite.export.catalogue import CLIPS, DEFAULT, Walk
+from arc_suite.export.drafts import drafts, passage
+from arc_suite.export.recorder import Recorder
+from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.simulation.model import compiled
+
+ONE_CYCLE, CONNECTED, APART = 0.85, 0.95, 0.08
+LOW = 0.01  # of a sole that slips
+
+
+class Kept(Recorder):
+    """A recorder that records each passage once."""
+
+    transition = functools.cache(Recorder.transition)
+
+
+def apart(body, one, other) -> float:
+    """Return the distance of the farthest part of two poses above the same place of the ground, standing heights."""
+    model = compiled(body)
+    data, places = mujoco.MjData(model), []
+    for pose in (one, other):
+        data.qpos[:] = np.concatenate([pose.position, pose.quaternion, pose.joints])
+        mujoco.mj_kinematics(model, data)
+        frame = data.body("torso").xmat.reshape(3, 3)
+        ahead = frame[:2, 0] / np.linalg.norm(frame[:2, 0])
+        level = np.array([[ahead[0], ahead[1], 0.0], [-ahead[1], ahead[0], 0.0], [0.0, 0.0, 1.0]])
+        places.append((data.xpos[1:] - pose.position * (1.0, 1.0, 0.0)) @ level.T)
+    return float(np.linalg.norm(places[0] - places[1], axis=-1).max() / body.torso.standing_height)
+
+
+def slip(body, motion) -> tuple[float, float]:
+    """Return the path of soles near the ground by that of the root, and how far they sink in it, standing heights."""
+    legs, height = Legs.of(body), body.torso.standing_height
+    feet = planting._feet(legs, motion) - (0.0, 0.0, 1.0) * legs.radii[:, None]
+    low = feet[..., 2] < LOW * height
+    paths = np.linalg.norm(np.diff(feet[..., :2], axis=0), axis=-1) * (low[1:] & low[:-1])
+    root = np.linalg.norm(np.diff(motion.root[:, :2], axis=0), axis=-1).sum()
+    return float(paths.sum(axis=0).mean() / root), float(-feet[..., 2].min() / height)
+
+
+def measured(body) -> tuple[dict[str, float], dict[str, str]]:
+    """Return numbers of the default clips of a body by name, and the reasons of those that are left out."""
+    recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
+    made = drafts(recorder, DEFAULT, iter, left_out)
+    loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], Walk)]
+    found = {"clips": len(DEFAULT) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
+    found["seam"] = np.degrees(max((draft.motion.seam for draft in loops), default=np.nan))
+    if "walk" in made:
+        walk, transition = made["walk"], recorder.transition(CLIPS["walk"].command)
+        start, stop = (passage(body, CLIPS[name], transition).motion for name in ("start", "stop"))
+        pairs = {"start": (start.pose(-1), walk.start), "stop": (stop.pose(0), walk.start)}
+        pairs["idle"] = stop.pose(-1), made["idle"].start
+        found |= {name: apart(body, *pair) for name, pair in pairs.items()}
+        found["slip"], found["sinks"] = slip(body, walk.motion)
+        found["slip planted"], found["sinks planted"] = slip(body, walk.planted(body).motion)
+    return found, left_out
+
+
+def main(count: str = "100") -> int:
+    """Measure the bodies, and return the exit status."""
+    bodies = {f"random_{seed}": generator.random_body(seed) for seed in range(int(count))}
+    others = dict(ROBOTS) | {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
+    numbers = {}
+    for name, body in tqdm((others | bodies).items(), disable=None, unit="body"):
+        try:
+            numbers[name], left_out = measured(body)
+        except ValueError as error:
+            numbers[name], left_out = {"clips": 0}, {"all": str(error)}
+        told = ", ".join(f"{key} {value:.3g}" for key, value in numbers[name].items())
+        print(
+            "; ".join([f"{name}: {told}", *(f"no {clip}: {reason}" for clip, reason in left_out.items())]), flush=True
+        )
+
+    def values(key, names):
+        return np.array([numbers[name].get(key, np.nan) for name in names])
+
+    for key in ("seam", "start", "stop", "idle", "slip", "slip planted", "sinks", "sinks planted"):
+        for kind, names in (("robots and examples", others), ("random bodies", bodies)):
+            quantiles = ", ".join(f"{value:.3f}" for value in np.nanquantile(values(key, names), (0.5, 0.9, 0.95, 1.0)))
+            print(f"{key}, {kind}: median, 90 %, 95 % and most: {quantiles}")
+    one_cycle = (values("cycles", bodies) == 1).mean()
+    connected = (values("stop", numbers) <= APART).mean()
+    files = (values("clips", numbers) > 0).sum()
+    print(
+        f"loops of one cycle: {one_cycle:.0%} of random bodies; stop within {APART} of the walk: {connected:.0%} of all"
+    )
+    print(f"a file for {files} of {len(numbers)} bodies")
+    return int(one_cycle < ONE_CYCLE or connected < CONNECTED or files < len(numbers))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -1,0 +1,44 @@
+"""Pages stay short: the words that are written by hand, and the lengths of sentences."""
+
+import count_words
+import pytest
+
+COUNTS = count_words.counts()
+
+
+def test_all_pages_together():
+    assert sum(page.words for page in COUNTS.values()) <= 18_000
+    assert count_words.short([length for page in COUNTS.values() for length in page.sentences]) >= 0.95
+
+
+@pytest.mark.parametrize("page", COUNTS)
+def test_a_page(page):
+    assert COUNTS[page].words <= 900
+
+
+def test_what_counts():
+    text = """# Two words
+
+A sentence, [with a link](to/nowhere.md). Another one:
+
+- an item of five words
+
+| head | of three |
+|---|---|
+| 1 | 2 |
+
+<!-- table -->
+What a program writes.
+<!-- end -->
+
+```sh
+code --flag
+```
+"""
+    words, sentences = count_words.count(text)
+    assert words == 19
+    assert sentences == [2, 5, 2, 5, 1, 2, 1, 1]
+
+
+def test_a_long_sentence_counts():
+    assert count_words.short([5, 25, 26, 5]) == 0.75

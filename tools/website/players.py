@@ -1,0 +1,40 @@
+"""Pages of the site in which creatures walk, where `make web` has built their scripts."""
+
+from pathlib import Path
+
+import arc_suite
+from arc_suite import policies, registry, style
+from arc_suite.export import pages, play
+from arc_suite.robots import ROBOTS
+from website import markdown
+
+GAME, GALLERY = "play.html", "gallery.html"  # pages to play in: the robots, generated creatures
+CREATURES = tuple(f"varied:{seed}" for seed in range(24))
+STEPS = 200  # control steps of a film
+
+
+def films() -> dict[str, str]:
+    """Return names of the films' pages by robot."""
+    return {robot: f"walk_{robot}.html" for robot in ROBOTS}
+
+
+def write(folder: Path) -> None:
+    """Write the pages to play in, and the film of each robot.
+
+    Raises:
+        ValueError: the scripts have not been built.
+    """
+    for name, bodies in {GAME: ROBOTS.values(), GALLERY: map(registry.body_of, CREATURES)}.items():
+        page = play.page([play.creature(body) for body in bodies])
+        (folder / name).write_text(page, encoding="utf-8")
+    for robot, name in films().items():
+        environment = arc_suite.load(robot, "walk", {"random": 0})
+        policy = policies.policy("ppo", robot, task=environment.task.definition)
+        track = style.record(environment, policy, 0, STEPS)
+        (folder / name).write_text(pages.page({robot: track}), encoding="utf-8")
+
+
+def frame(source: str, title: str) -> str:
+    """Return the HTML that shows a page within another."""
+    attributes = {"class": "creature", "src": source, "title": title, "loading": "lazy"}
+    return markdown.as_html(markdown.element("iframe", **attributes))
