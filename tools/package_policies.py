@@ -1,4 +1,4 @@
-"""Puts the policy of a run into the package: float16, with hash, command and return in policies.json.
+"""Puts the policy of a run into the package, of one robot as float16, with hash, command and return in policies.json.
 
 Example:
   python tools/package_policies.py runs/tick-walk-ppo-0
@@ -57,8 +57,9 @@ def main(run: str | None = None) -> None:
     if run is None:
         raise ValueError("expected the folder of a run, got none")
     found, known = network.load(Path(run)), configuration.read(Path(run) / "config.json")
-    layers = [layer._replace(arrays=tuple(a.astype(np.float16) for a in layer.arrays)) for layer in found.layers]
     several = isinstance(known.setup, BodiesSetup)
+    kind = np.float32 if several else np.float16  # inputs of many bodies differ too much in size for 16 bits
+    layers = [layer._replace(arrays=tuple(a.astype(kind) for a in layer.arrays)) for layer in found.layers]
     name = f"{universal.NAME if several else known.setup.body.name}-{known.setup.task}"
     PACKAGED.mkdir(exist_ok=True)
     path = PACKAGED / f"{name}{network.EXTENSION}"

@@ -18,7 +18,7 @@ INDEX = json.loads((PACKAGED / "policies.json").read_text())
 def test_all_are_listed_and_small():
     files = {path.stem: path for path in PACKAGED.glob("*.npz")}
     assert files.keys() == INDEX.keys()
-    assert sum(path.stat().st_size for path in files.values()) < 800_000
+    assert sum(path.stat().st_size for path in files.values()) < 1_000_000
     for name, path in files.items():
         assert INDEX[name]["sha256"] == policies.digest(str(path))
         robot = name.partition("-")[0]
@@ -46,12 +46,12 @@ def test_those_of_any_body_earn_what_is_listed(task):
     assert np.mean(returns) == pytest.approx(INDEX[f"universal-{task}"]["return"], rel=0.02)
 
 
-@pytest.mark.parametrize("body", ["tick", generator.generate(8, 3)], ids=str)
+@pytest.mark.parametrize("body", [generator.generate(8, 3), generator.random_body(200_003)], ids=lambda body: body.name)
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_any_body_walks_by_it(body, task):
-    """A robot with its published motors, and a generated body, for five seconds of the robot."""
+    """Bodies that it was not trained with."""
     environment = Setup.of(body, task).load()
-    policy = policies.policy("universal", environment.task.body, task=environment.task.definition)
+    policy = policies.policy("universal", body, task=environment.task.definition)
     assert evaluation.run(environment, policy, 0, 100).length == 100
     assert environment.task.progress["speed" if task == "walk" else "tracking"] > 0.1
 
