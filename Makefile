@@ -10,6 +10,7 @@
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
 # make docs    builds the documentation site in out/docs/html, in an environment of its own; with Node, creatures walk there
 # make check-docs  builds the site, follows its links and looks at its front page in Chromium
+# make check-notebooks  runs the notebooks of examples, in an environment of its own
 # make web     bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-studio  the studio in Chromium: sliders moved, creature changed, command followed, files saved
@@ -38,7 +39,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist docs test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean clip-sets
+.PHONY: demo dist docs check-notebooks test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean clip-sets
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -129,6 +130,13 @@ check-docs: VENV := .venv-docs
 check-docs: docs
 	$(VENV)/bin/python -m pip install -q pytest playwright==1.65.2
 	$(VENV)/bin/python -m pytest tests/website
+
+check-notebooks: VENV := .venv-notebooks
+check-notebooks: setup.cfg
+	tools/ensure_venv.sh $(VENV)
+	tools/ensure_egl.sh $(VENV)/bin/python
+	$(VENV)/bin/python -m pip install -q -e '.[notebooks]'
+	$(VENV)/bin/python -m pytest --nbmake --nbmake-timeout=600 -p no:cacheprovider -p no:xdist -c /dev/null --rootdir=. examples/notebooks
 
 ENGINES := out/engines
 

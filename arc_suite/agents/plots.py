@@ -25,8 +25,10 @@ STYLES = {
     "droq": ("#332288", "h"),
     "finetune": ("#44AA99", "p"),
     "bc": ("#DDCC77", "d"),
+    "dagger_bodies": ("#AA4499", "*"),
+    "finetune_bodies": ("#117733", "p"),
 }
-_OTHERS = (("#CC6677", "<"), ("#117733", ">"), ("#AA4499", "8"), ("#88CCEE", "H"))  # of other packages, in order
+_OTHERS = (("#CC6677", "<"), ("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages, in order
 _DASHES = ("-", "--", "-.", ":")  # of runs of one algorithm with other hyperparameters or data
 _GREY = "#6E6E6E"
 _GAP = 0.052  # between the labels of two levels, as a share of the axis

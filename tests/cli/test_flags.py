@@ -52,7 +52,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--legs=4", "--palette=mos"], NO_PALETTE),
         (["--legs=2"], "flag --legs=2: 2 is not an integer in the range [4, 12]"),
         (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
-        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
+        (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(preset_names())})"),
     ],
 )

@@ -204,7 +204,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--compare=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
+        (["--compare=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (["--compare=cpg"], "--compare: expected another one than 'cpg'"),
         (["--compare=none.npz"], "cannot read none.npz: no such file or directory"),
         (["--save=tracks.json"], "--save=tracks.json: expected a file that ends in .npz"),

@@ -78,7 +78,10 @@ def test_errors_are_one_line(bundle):
     for arguments, line in (
         ((cart,), "environment: expected one of arc_suite.load, gymnasium.make or gymnasium.make_vec, got TimeLimit"),
         ((environment, 7), "policy: expected a name, a policy or a function of a TimeStep, got int"),
-        ((environment, "cgp"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
+        (
+            (environment, "cgp"),
+            "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)",
+        ),
     ):
         with pytest.raises(ValueError, match=f"^{re.escape(line)}$"):
             arc_suite.show(*arguments)

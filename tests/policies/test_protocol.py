@@ -65,7 +65,7 @@ def acted_in_rows(made, joints):
     return [np.array(action) for action in actions]
 
 
-MADE_UP = [name for name in POLICIES if name != "ppo"]  # it needs the whole observation of its task
+MADE_UP = [name for name in POLICIES if name not in ("ppo", "universal")]  # they need the whole observation of a task
 VARIANTS = [
     *((name, {}) for name in MADE_UP),
     *((name, {"noise": 0.1}) for name in MADE_UP),

@@ -69,7 +69,7 @@ def test_files_have_the_tracks_that_they_have(leaper, saved):
 
 def test_what_is_no_source_is_refused_before_any_work(saved):
     for arguments, message in (
-        (("cgp",), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo)"),
+        (("cgp",), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (("cpg", "fats"), "unknown preset 'fats'; did you mean 'fast'? (there are: "),
         (("none.npz",), "cannot read none.npz: no such file or directory"),
     ):
