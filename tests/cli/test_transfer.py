@@ -30,7 +30,7 @@ def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
     with (tmp_path / "table.csv").open() as file:
         lines = list(csv.DictReader(file))
     assert len(lines) == 12 and {line["who"] for line in lines} == {"policy", "demonstrator", "zero"}
-    assert all(line["walked"] == str(line["who"] == "demonstrator") for line in lines)
+    assert all(line["walked"] == str(int(line["who"] == "demonstrator")) for line in lines)
 
 
 @pytest.mark.parametrize(
