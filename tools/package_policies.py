@@ -18,7 +18,7 @@ from arc_suite.cli import program
 from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal
-from arc_suite.policies.named import PACKAGED
+from arc_suite.policies.network import PACKAGED
 
 INDEX = PACKAGED / "policies.json"
 
@@ -28,18 +28,13 @@ def command(run: configuration.Configuration) -> str:
     defaults = dataclasses.asdict(run.definition.hyperparameters.__class__())
     values = dataclasses.asdict(run.hyperparameters)
     hyperparameters = {name: value for name, value in values.items() if value != defaults[name]}
-    flags = [f"--robot={robot(run.setup)}", f"--task={run.setup.task}", f"--algorithm={run.algorithm}"]
+    flags = [f"--robot={run.setup.robot}", f"--task={run.setup.task}", f"--algorithm={run.algorithm}"]
     flags += [f"--steps={run.steps}", f"--seed={run.seed}", f"--evaluate_every={run.evaluate_every}"]
     flags += [f"--hp={name}={value}" for name, value in hyperparameters.items()]
     flags += [f"--set={name}={json.dumps(value)}" for name, value in run.setup.task_kwargs.items()]
     trained = shlex.join(["arc-suite", "train", *flags])
     start = Path(hyperparameters.get("start", ""), run_folder.CONFIG)
     return f"{command(configuration.read(start))} -o {start.parent} && {trained}" if start.exists() else trained
-
-
-def robot(setup: Setup | BodiesSetup) -> str:
-    """Return what --robot names."""
-    return setup.robot if isinstance(setup, BodiesSetup) else setup.body.name
 
 
 def returns(path: Path) -> list[float]:

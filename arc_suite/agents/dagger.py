@@ -77,7 +77,8 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         # Act for a round, by the demonstrator in the first half of the environments, and store its labels.
         rewards, random = [], generator(context.seed, "round", done)
         for _ in range(min(hp.round, -(-(context.next_evaluation(step) - step) // hp.num_envs))):
-            label = teacher.labels(observation, age).clip(-1.0, 1.0)
+            teacher.reset(np.flatnonzero(age == 0))
+            label = teacher.act(environment.task.split(observation), np.zeros(hp.num_envs)).clip(-1.0, 1.0)
             action, own = label.copy(), slice(hp.num_envs // 2, None)
             action[own] = _act(architecture, state.layers, forward([normalise], observation[own]))
             action += hp.noise * random.standard_normal(action.shape)

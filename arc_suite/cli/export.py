@@ -45,8 +45,9 @@ def main(run: str | None = None) -> None:
     output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
     if _ROBOT.present or made_body() is not None:
         setup = only_setup(_ROBOT)
-        onnx_file.save_universal(output, universal.load(name, setup.task != "walk"), setup)
-        size, joints = setup.definition.size, len(setup.body.joint_names)
+        task = setup.definition
+        onnx_file.save_universal(output, universal.load(name, task), setup)
+        size, joints = task.size, len(setup.body.joint_names)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
     else:

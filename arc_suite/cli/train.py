@@ -28,6 +28,7 @@ from arc_suite.agents.training import train
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_values, only_body, task
 from arc_suite.cli.program import progress, use_one_thread
 from arc_suite.envs import bodies_setup
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.evaluation import anchors
 from arc_suite.policies import network, onnx_file
 
@@ -74,7 +75,7 @@ def main() -> None:
             finished = train(run, folder, **limits, progress=progress, on_metrics=on_metrics)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"interrupted; the same command resumes {folder}") from None
-    if finished and importlib.util.find_spec("onnx") and not bodies_setup.is_several(run.setup.robot):
+    if finished and importlib.util.find_spec("onnx") and not isinstance(run.setup, BodiesSetup):
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
 
@@ -93,7 +94,7 @@ def configured() -> Configuration:
         return configuration.read(Path(FLAGS.config))
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior
-    several = made_body() is None and bodies_setup.is_several(_ROBOT.value)
+    several = bodies_setup.is_several(_ROBOT.value) and made_body() is None
     setup = bodies_setup.of_any(_ROBOT.value if several else only_body(_ROBOT), *task())
     return Configuration.of(setup, FLAGS.algorithm, hyperparameters, *run)
 

@@ -19,6 +19,7 @@ from absl import flags
 from arc_suite import checks
 from arc_suite.cli.flags import define_task, task
 from arc_suite.cli.program import marked_page
+from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import transfer
 from arc_suite.policies import universal
 from arc_suite.studies import bodies
@@ -43,7 +44,7 @@ def main() -> None:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
-    network, every = universal.load(FLAGS.policy, name != "walk"), {}
+    network, every = universal.load(FLAGS.policy, Setup.of("queen", name, settings).definition), {}
     print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.Result._fields))
     for family in FLAGS.families:
         played = transfer.of_family(family, network, name, settings)

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import hashlib
-import json
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 from arc_suite import checks, registry, versions
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.flat_bodies import FlatBodies
-from arc_suite.envs.setup import Setup
+from arc_suite.envs.setup import BaseSetup, Setup
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
@@ -22,7 +21,7 @@ HELD_OUT = 100_000  # first seed of the bodies of a family that validate what ot
 
 
 @dataclasses.dataclass(frozen=True)
-class BodiesSetup:
+class BodiesSetup(BaseSetup):
     """Bodies in a task with settings, with what training needs of a `Setup`; make it by `BodiesSetup.of`.
 
     Joints take positions; see `envs.bodies`.
@@ -61,27 +60,20 @@ class BodiesSetup:
         return self.robot.replace(":", ".").replace(",", "+")
 
     @property
-    def task_kwargs(self) -> dict[str, Any]:
-        """Settings of the task; a new dictionary."""
-        return json.loads(self.settings_json)
-
-    @property
-    def kind(self) -> type[Task]:
-        """Class of the task, with its name and version."""
-        return registry.task_of(self.task)
-
-    @property
     def definition(self) -> Task:
         """The task of the first body, ready to run.
 
         Raises:
             ValueError: a setting that does not fit.
         """
-        return self.members()[0].definition
+        return self._of(self.bodies[0]).definition
 
     def members(self) -> tuple[Setup, ...]:
         """Return the setup of each body, with positions as actions."""
-        return tuple(Setup.of(body, self.task, self.task_kwargs | {"actions": "position"}) for body in self.bodies)
+        return tuple(map(self._of, self.bodies))
+
+    def _of(self, body: Body) -> Setup:
+        return Setup.of(body, self.task, self.task_kwargs | {"actions": "position"})
 
     def validation(self, count: int) -> "BodiesSetup":
         """Return the setup of at most `count` bodies that evaluate a policy while it learns.
@@ -104,8 +96,8 @@ class BodiesSetup:
             seed: of the first environment's stream of episodes; the others count on. None for random ones.
             options: see `arc_suite.envs.bodies.BodiesEnv`.
         """
-        settings = self.task_kwargs | ({} if seed is None else {"random": seed})
-        return FlatBodies(BodiesEnv(self.task, num_envs, list(self.bodies), task_kwargs=settings, **options))
+        bodies, settings = list(self.bodies), self._seeded(seed)
+        return FlatBodies(BodiesEnv(self.task, num_envs, bodies, task_kwargs=settings, **options))
 
     def provenance(self) -> dict[str, Any]:
         """Return, JSON-able, `to_dict` with the task's version, a hash of all bodies, and versions of packages."""
@@ -115,12 +107,8 @@ class BodiesSetup:
         known = {"task_version": self.kind.version, "body_sha256": texts.hexdigest(), "versions": versions.recorded()}
         return self.to_dict() | known
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
-        return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
-
     def __str__(self) -> str:
-        return f"{self.robot}, {self.kind.name}" + (f", {self.settings_json}" if self.settings_json != "{}" else "")
+        return self._named(self.robot)
 
 
 def of_any(robot, task_name: str = "walk", task_kwargs: Mapping[str, Any] | None = None) -> "Setup | BodiesSetup":

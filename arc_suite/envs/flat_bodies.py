@@ -43,8 +43,7 @@ class FlatTask(NamedTuple):
 
     def split(self, observation: np.ndarray) -> dict[str, np.ndarray]:
         """Return an observation vector (..., size) as named blocks, views of it."""
-        ends = np.cumsum(list(self.blocks.values()))[:-1]
-        return dict(zip(self.blocks, np.split(observation, ends, axis=-1), strict=True))
+        return tokens.split(observation)
 
 
 class FlatBodies(gymnasium.vector.VectorWrapper):

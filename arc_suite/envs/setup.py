@@ -23,8 +23,43 @@ from arc_suite.tasks.contract import STEPS, Task
 ATTRIBUTE = "arc_suite"  # of an observation space: the setup that an agent was trained in, as `Setup.to_dict`
 
 
+class BaseSetup:
+    """What the setups of one body and of several have in common: a task with settings.
+
+    Attributes:
+        robot: body, or bodies, as programs take them.
+        task: name of the task, `module:name` for one of another package.
+        settings_json: JSON of the task's settings, keys in order.
+    """
+
+    robot: str
+    task: str
+    settings_json: str
+
+    @property
+    def task_kwargs(self) -> dict[str, Any]:
+        """Settings of the task, as `arc_suite.load` takes them; a new dictionary."""
+        return json.loads(self.settings_json)
+
+    @property
+    def kind(self) -> type[Task]:
+        """Class of the task, with its name and version."""
+        return registry.task_of(self.task)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
+        return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
+
+    def _seeded(self, seed: int | None) -> dict[str, Any]:
+        return self.task_kwargs | ({} if seed is None else {"random": seed})
+
+    def _named(self, moving: str) -> str:
+        """The setup as one line, for the name of what moves."""
+        return f"{moving}, {self.kind.name}" + (f", {self.settings_json}" if self.settings_json != "{}" else "")
+
+
 @dataclasses.dataclass(frozen=True)
-class Setup:
+class Setup(BaseSetup):
     """A body in a task with settings; make it by `Setup.of`, which checks names.
 
     Equal setups have equal content, however their tasks and settings were written.
@@ -64,16 +99,6 @@ class Setup:
         if isinstance(arena := settings.get("arena"), str):
             registry.arena_maker(arena)
         return cls(body, registry.importable("task", task.name), text)
-
-    @property
-    def task_kwargs(self) -> dict[str, Any]:
-        """Settings of the task, as `arc_suite.load` takes them; a new dictionary."""
-        return json.loads(self.settings_json)
-
-    @property
-    def kind(self) -> type[Task]:
-        """Class of the task, with its name and version."""
-        return registry.task_of(self.task)
 
     @property
     def robot(self) -> str:
@@ -161,10 +186,6 @@ class Setup:
             "versions": versions.recorded(),
         }
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
-        return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
-
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> "Setup":
         """Return the setup that a file holds; nothing is imported, and no file opened.
@@ -190,7 +211,4 @@ class Setup:
         return cls.of(body, task, settings)
 
     def __str__(self) -> str:
-        return f"{self.body.name}, {self.kind.name}" + (f", {self.settings_json}" if self.settings_json != "{}" else "")
-
-    def _seeded(self, seed: int | None) -> dict[str, Any]:
-        return self.task_kwargs | ({} if seed is None else {"random": seed})
+        return self._named(self.body.name)

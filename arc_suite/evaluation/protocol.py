@@ -1,7 +1,7 @@
 """The evaluation protocol, in one place: ten seeded episodes and deterministic actions."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -104,7 +104,12 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
     return [run(environment, policy, seed) for seed in seeds]
 
 
-def episodes_in_batch(environment: VectorEnv, policy: Policy, seeds: Sequence[int] = range(EPISODES)) -> list[Episode]:
+def episodes_in_batch(
+    environment: VectorEnv,
+    policy: Policy,
+    seeds: Sequence[int] = range(EPISODES),
+    watch: Callable[[np.ndarray, np.ndarray], None] | None = None,
+) -> list[Episode]:
     """Run one episode for each seed, all at once.
 
     They are bit-equal to those of `episodes` if the policy takes observations as float32, as networks do.
@@ -113,6 +118,8 @@ def episodes_in_batch(environment: VectorEnv, policy: Policy, seeds: Sequence[in
         environment: one environment for each seed, in the mode Disabled.
         policy: made for as many environments.
         seeds: of the episodes; by default the protocol's.
+        watch: called after the reset and after each control step with two masks (num_envs,): of the environments
+            that played the step, none after the reset, and of those whose episodes it terminated.
 
     Raises:
         ValueError: episodes that need not end.
@@ -124,11 +131,15 @@ def episodes_in_batch(environment: VectorEnv, policy: Policy, seeds: Sequence[in
     totals, rewards, lengths = np.zeros(num_envs), np.zeros(num_envs), np.zeros(num_envs, int)
     progress = [{}] * num_envs
     playing = np.ones(num_envs, bool)
+    if watch is not None:
+        watch(~playing, ~playing)
     while playing.any():
         actions = policy.act(environment.task.split(observations), rewards)
         observations, rewards, terminated, truncated, info = environment.step(actions)
         totals[playing] += rewards[playing]
         lengths += playing
+        if watch is not None:
+            watch(playing, playing & terminated)
         ended = playing & (terminated | truncated)
         for index in np.flatnonzero(ended):
             metrics = {name: values for name, values in info.items() if name.startswith(_PROGRESS)}

@@ -16,9 +16,10 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.models.sizing import GRAVITY
+from arc_suite.robots.spec import Body
 
-LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
-MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
+_LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
+_MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
 MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body has fallen
 
 
@@ -105,27 +106,46 @@ def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
 
 
 def assess(trial: Trial, trajectory: Trajectory) -> Outcome:
-    """Return whether a trajectory is a walk, and if not, why: a fall, dragging, slowness or drift."""
-    body = trial.setup.body
-    forward, sideways = trajectory.positions[-1] - trajectory.positions[0]
-    length = 2.0 * body.torso.solids[0].size[0]
-    seconds = trial.setup.task_kwargs["time_limit"]
-    froude = forward / (seconds * math.sqrt(GRAVITY * body.torso.standing_height))
+    """Return whether a trajectory is a walk, and if not, why; see `failures`."""
+    body, seconds = trial.setup.body, trial.setup.task_kwargs["time_limit"]
+    forward, sideways = apart = trajectory.positions[-1] - trajectory.positions[0]
     touching = trajectory.touching.mean()
-    failures = {
-        trajectory.ending: trajectory.ending != "time",
-        "touch": touching >= MOST_TOUCHING,
-        "slow": not (forward > length and froude > LEAST_FROUDE),
-        "drift": not abs(sideways) < abs(forward),
-    }
     return Outcome(
         trial=trial,
-        froude=float(froude),
-        lengths=float(forward / length),
+        froude=float(_froude(body, forward, seconds)),
+        lengths=float(forward / _length(body)),
         drift=float(abs(sideways) / max(abs(forward), 1e-9)),
         touching=float(touching),
-        failures=tuple(name for name, failed in failures.items() if failed),
+        failures=failures(body, apart, seconds, touching, trajectory.ending),
     )
+
+
+def failures(body: Body, apart: np.ndarray, seconds: float, touching: float, ending: str = "time") -> tuple[str, ...]:
+    """Return why a motion is no walk: a fall, dragging, slowness or drift; empty for a walk.
+
+    Args:
+        body: that moved, with its standing height.
+        apart: (2,) displacement of the torso, m.
+        seconds: duration of a whole walk.
+        touching: share of the time that the torso touched the ground.
+        ending: see `Trajectory`.
+    """
+    forward, sideways = apart
+    found = {
+        ending: ending != "time",
+        "touch": touching >= _MOST_TOUCHING,
+        "slow": not (forward > _length(body) and _froude(body, forward, seconds) > _LEAST_FROUDE),
+        "drift": not abs(sideways) < abs(forward),
+    }
+    return tuple(name for name, failed in found.items() if failed)
+
+
+def _froude(body: Body, forward: float, seconds: float) -> float:
+    return forward / (seconds * math.sqrt(GRAVITY * body.torso.standing_height))
+
+
+def _length(body: Body) -> float:
+    return 2.0 * body.torso.solids[0].size[0]
 
 
 def run(trial: Trial) -> Outcome:

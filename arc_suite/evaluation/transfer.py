@@ -15,9 +15,9 @@ from tqdm import tqdm
 
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.flat_bodies import FlatBodies
-from arc_suite.evaluation.survey import LEAST_FROUDE, MOST_TOUCHING
+from arc_suite.evaluation import protocol, survey
 from arc_suite.models.families import varied_body
-from arc_suite.models.sizing import GRAVITY
+from arc_suite.policies import Policy, Script
 from arc_suite.policies.network import Network
 from arc_suite.policies.teachers import Teacher
 from arc_suite.robots import ROBOTS, generator
@@ -145,16 +145,11 @@ def trials(network: Network, bodies: Iterable[Body], task: str, settings: Mappin
         )
     )
     try:
-        teacher = Teacher(environment)
-        by_policy = _episodes(environment, lambda observations, step: network.actions(observations))
-        ages = np.arange(STEPS)[:, None] + np.zeros(len(bodies), int)
-        by_teacher = _episodes(environment, lambda observations, step: teacher.labels(observations, ages[step]))
-        zero = np.zeros(environment.action_space.shape)
-        standing = _episodes(environment, lambda observations, step: zero)
+        zero = Script(lambda seed: (), *environment.action_space.shape)
+        played = [_episodes(environment, policy) for policy in (network, Teacher(environment), zero)]
     finally:
         environment.close()
-    names = [body.name for body in bodies]
-    return [Trial(*each) for each in zip(names, by_policy, by_teacher, standing, strict=True)]
+    return [Trial(*each) for each in zip([body.name for body in bodies], *played, strict=True)]
 
 
 def of_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Trial]:
@@ -190,46 +185,34 @@ def _gain(played: list[Trial]) -> float:
     return float(np.divide(*np.sum(gains, axis=0))) if gains else math.nan
 
 
-def _episodes(environment: FlatBodies, act: Callable[[np.ndarray, int], np.ndarray]) -> list[Episode]:
-    """Play an episode in every environment, from the seed of its index."""
-    bodies = environment.unwrapped
-    count = environment.num_envs
-    observations, _ = environment.reset(seed=list(range(count)))
-    totals, touching, lengths = np.zeros(count), np.zeros(count), np.zeros(count, int)
-    fell, playing = np.zeros(count, bool), np.ones(count, bool)
-    first, last, tracking = bodies.positions()[:, :2], np.zeros((count, 2)), np.full(count, math.nan)
-    for step in range(STEPS):
-        observations, rewards, terminated, truncated, info = environment.step(act(observations, step))
-        totals += rewards * playing
-        touching += playing & _torso_touches(bodies)
-        lengths += playing
-        ended = playing & (terminated | truncated)
-        fell |= ended & terminated
-        if ended.any():
-            last[ended] = bodies.positions()[ended, :2]
-            if "progress_tracking" in info:
-                tracking[ended] = info["progress_tracking"][ended]
-            playing &= ~ended
-            if not playing.any():
-                break
-            environment.rest(~playing)
-    apart, touching = last - first, touching / lengths
-    walked = ~fell & (touching < MOST_TOUCHING) & _far(bodies, apart)
-    return [Episode(*each) for each in zip(totals.tolist(), walked.tolist(), tracking.tolist(), strict=True)]
+def _episodes(environment: FlatBodies, policy: Policy) -> list[Episode]:
+    """Play an episode in every environment, from the seed of its index, and judge the walks."""
+    bodies, count = environment.unwrapped, environment.num_envs
+    touching, fell = np.zeros(count), np.zeros(count, bool)
+    starts, ends = np.zeros((count, 2)), np.zeros((count, 2))
+
+    def watch(playing, terminated):
+        positions = bodies.positions()[:, :2]
+        if not playing.any():
+            starts[:] = positions
+        ends[playing] = positions[playing]
+        touching[playing & _torso_touches(bodies)] += 1.0
+        fell[terminated] = True
+
+    played, found = protocol.episodes_in_batch(environment, policy, range(count), watch), []
+    for index, (episode, task) in enumerate(zip(played, bodies.tasks, strict=True)):
+        failures = survey.failures(
+            task.scene.body,
+            ends[index] - starts[index],
+            STEPS * task.scene.control_timestep,
+            touching[index] / episode.length,
+            "fall" if fell[index] else "time",
+        )
+        found.append(Episode(episode.total, not failures, episode.progress.get("tracking", math.nan)))
+    return found
 
 
 def _torso_touches(environment: BodiesEnv) -> np.ndarray:
     """Whether something pushes the torso (num_envs,)."""
     own = zip(environment.tasks, environment.own_observations(), strict=True)
     return np.array([task.split(vector)["contact_forces"][:6].any() for task, vector in own])
-
-
-def _far(environment: BodiesEnv, apart: np.ndarray) -> np.ndarray:
-    """Whether displacements (num_envs, 2), m, are those of a walk: by more than a length, fast and straight."""
-    forward, sideways = apart.T
-    torsos = [body.torso for body in environment.bodies]
-    lengths = np.array([2.0 * torso.solids[0].size[0] for torso in torsos])
-    heights = np.array([task.scene.body.torso.standing_height for task in environment.tasks])
-    seconds = STEPS * np.array([task.scene.control_timestep for task in environment.tasks])
-    speeds = forward / (seconds * np.sqrt(GRAVITY * heights))
-    return (forward > lengths) & (speeds > LEAST_FROUDE) & (abs(sideways) < abs(forward))

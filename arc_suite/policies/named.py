@@ -15,7 +15,7 @@ from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal, zips
-from arc_suite.policies.network import Network
+from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.policies.universal import Universal
 from arc_suite.robots import ROBOTS, is_robot
@@ -23,7 +23,6 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
 _CHUNK = 256  # control steps that are drawn at once
-PACKAGED = Path(__file__).with_name("packaged")
 
 
 def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
@@ -62,7 +61,7 @@ def _ppo(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
 def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
     """A trained policy of any body that comes with the package, for walk or for tasks with a command."""
     task = task or prepared(body, "walk")[0]
-    return Universal(universal.load(universal.NAME, "command" in task.blocks), task)
+    return Universal(universal.load(universal.NAME, task), task)
 
 
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.

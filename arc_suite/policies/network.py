@@ -23,6 +23,8 @@ from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.tasks import tokens
 
+PACKAGED = Path(__file__).with_name("packaged")  # policy files that come with the package
+
 EXTENSION = ".npz"
 FILE = f"policy{EXTENSION}"  # in the folder of a run
 

@@ -57,18 +57,11 @@ def added(graph: Graph, policy: Universal, observations: str) -> str:
         return positions
     # Torques of motors that hold the positions with the body's own gains.
     stiffness, damping = policy.gains
-    angles, speeds = (graph("Gather", observations, columns, axis=1) for columns in _joints(policy))
+    _, _, *joints = policy.tokens.parts(policy.tokens.places[0])[:4]
+    columns = (each[np.flatnonzero(there)] for each in joints)
+    angles, speeds = (graph("Gather", observations, each, axis=1) for each in columns)
     pulled = graph("Mul", graph("Sub", graph("Mul", positions, policy.reach), angles), stiffness)
     return graph("Clip", graph("Sub", pulled, graph("Mul", speeds, damping)), -1.0, 1.0)
-
-
-def _joints(policy: Universal) -> tuple[np.ndarray, np.ndarray]:
-    """Where the angles and the velocities of the joints lie in an observation."""
-    first, place = {}, 0
-    for name, size in policy.task.blocks.items():
-        first[name], place = place, place + size
-    joints = np.arange(len(policy.reach))
-    return first["posture"] + 5 + joints, first["velocities"] + 6 + joints
 
 
 def _inputs(graph: Graph, policy: Universal, observations: str) -> tuple[str, np.ndarray]:
@@ -79,9 +72,8 @@ def _inputs(graph: Graph, policy: Universal, observations: str) -> tuple[str, np
     """
     own, (descriptions, torso_description) = policy.tokens, policy.descriptions
     legs = int(own.legs[0].sum())
-    mask, places = own.mask[0, :legs], own.places[0]
-    ends = np.cumsum((5, 6, tokens.LEGS * JOINTS, tokens.LEGS * JOINTS, tokens.LEGS, 2))
-    pose, velocities, angles, speeds, forces, clock, command = np.split(places, ends)
+    mask = own.mask[0, :legs]
+    pose, velocities, angles, speeds, forces, clock, command = own.parts(own.places[0])
 
     def columns(indices, shape=()):
         found = graph("Gather", observations, indices, axis=1)

@@ -1,6 +1,6 @@
-"""Teachers: the demonstrators of a batch of environments, which label what its environments observe."""
+"""Teachers: the demonstrators of a batch of environments, one fitted to each body."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,7 +11,10 @@ from arc_suite.policies.named import policy
 
 
 class Teacher:
-    """A demonstrator for each body of some environments, fitted to its task."""
+    """A policy: a demonstrator for each body of some environments, fitted to its task.
+
+    Different bodies have no common observation, so that it reads those of the bodies from their environments.
+    """
 
     def __init__(self, environment: VectorEnv | FlatBodies, preset: str = ""):
         """Fit the demonstrators.
@@ -25,9 +28,7 @@ class Teacher:
         """
         self._bodies = environment.unwrapped if isinstance(environment, FlatBodies) else None
         tasks = [environment.task.definition] * environment.num_envs if self._bodies is None else self._bodies.tasks
-        self._size, self._mask = environment.single_action_space.shape[0], None
-        if self._bodies is not None:
-            self._mask = self._bodies.description.mask.reshape(len(tasks), -1)
+        self._mask = None if self._bodies is None else self._bodies.description.mask.reshape(len(tasks), -1)
         indices: dict[int, list[int]] = {}
         for index, task in enumerate(tasks):
             indices.setdefault(id(task), []).append(index)
@@ -38,26 +39,23 @@ class Teacher:
             demonstrator = policy("cpg", task.scene.body, name, len(places), task=task)
             self._members.append((task, np.array(places), demonstrator))
 
-    def labels(self, observations: np.ndarray, ages: np.ndarray) -> np.ndarray:
-        """Return the demonstrators' actions (num_envs, joints) for the latest observations of the environments.
+    def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
+        """Start episodes in some environments; demonstrators are the same in all episodes."""
+        for _, places, demonstrator in self._members:
+            starts = np.flatnonzero(np.isin(places, indices)).tolist()
+            demonstrator.reset(starts, [0] * len(starts))
 
-        Args:
-            observations: (num_envs, size)
-            ages: (num_envs,) control steps since the start of the episode; an episode of the demonstrator begins
-                at 0.
-        """
-        own = observations if self._bodies is None else self._bodies.own_observations()
-        labels = np.zeros((len(observations), self._size))
+    def act(self, observation: Mapping[str, np.ndarray], rewards: np.ndarray) -> np.ndarray:
+        """Return the demonstrators' actions (num_envs, joints) of a control step; see `Policy.act`."""
+        if self._bodies is None:
+            (_, _, demonstrator), *_ = self._members
+            return demonstrator.act(observation, rewards)
+        own, actions = self._bodies.own_observations(), np.zeros((len(rewards), self._mask.shape[1]))
         for task, places, demonstrator in self._members:
-            starts = np.flatnonzero(ages[places] == 0).tolist()
-            demonstrator.reset(starts, [0] * len(starts))  # demonstrators are the same in all episodes
             blocks = task.split(np.stack([own[place] for place in places]))
-            actions = demonstrator.act(blocks, np.zeros(len(places)))
-            if self._mask is None:
-                labels[places] = actions
-            else:
-                labels[places[:, None], np.flatnonzero(self._mask[places[0]])] = actions
-        return labels
+            joints = np.flatnonzero(self._mask[places[0]])
+            actions[places[:, None], joints] = demonstrator.act(blocks, rewards[places])
+        return actions
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return what the demonstrators remember, arrays by name."""

@@ -1,9 +1,7 @@
 """Policies of any body: a network that was trained with many bodies, acting for one of them."""
 
-import functools
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -12,26 +10,26 @@ from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.policies import network
-from arc_suite.policies.network import Network
+from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import Tokens
 
-PACKAGED = Path(__file__).with_name("packaged")
 NAME = "universal"  # of the policies that come with the package
 
 
-def load(name: str | os.PathLike, with_command: bool = False) -> Network:
+def load(name: str | os.PathLike, task: Task | None = None) -> Network:
     """Return a policy of many bodies: `universal`, which comes with the package, a policy file, or that of a run.
 
     Args:
         name: of the policy.
-        with_command: whether `universal` follows a command, as in `steer`, or walks ahead, as in `walk`.
+        task: in which `universal` acts: it follows a command where the task has one. None for walk.
 
     Raises:
         ValueError: a damaged file, or a policy of one body.
         OSError: the file cannot be read.
     """
-    packaged = PACKAGED / f"{NAME}-{'steer' if with_command else 'walk'}{network.EXTENSION}"
+    trained_in = "steer" if task is not None and "command" in task.blocks else "walk"
+    packaged = PACKAGED / f"{NAME}-{trained_in}{network.EXTENSION}"
     made = network.load(packaged if name == NAME else name)
     if not isinstance(made.setup, BodiesSetup):
         raise ValueError(f"policy {name}: expected one of many bodies, got one of {made.setup.body.name}")
@@ -65,7 +63,6 @@ class Universal:
         self.reach = described.reach[described.mask]
         self.tokens = Tokens.of([task])
         self.gains = position_gains(sized(body), standing(body).inertias)
-        self._batch = functools.lru_cache(maxsize=4)(lambda count: self.tokens.part(np.zeros(count, int)))
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
@@ -78,7 +75,7 @@ class Universal:
         """
         blocks = checked(observation, self.task.blocks, len(self.reach), len(self.task.scene.body.part_names))
         vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
-        own = self._batch(len(vectors))
+        own = self.tokens.part(np.zeros(len(vectors), int))
         seen = own.observed(own.gathered(vectors))
         descriptions = (np.repeat(part, len(vectors), axis=0) for part in self.descriptions)
         positions = own.actions(self.network.actions(tokens.flat(seen, *descriptions))).astype(float)

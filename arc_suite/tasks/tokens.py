@@ -8,7 +8,7 @@ import functools
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -99,6 +99,12 @@ def flat(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) 
     return np.concatenate([part.reshape(len(part), -1) for part in parts], axis=-1)
 
 
+def split(vectors) -> dict[str, Any]:
+    """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT`, by name."""
+    ends = itertools.accumulate(FLAT.values())
+    return {name: vectors[..., end - size : end] for (name, size), end in zip(FLAT.items(), ends, strict=True)}
+
+
 def leg_inputs(vectors):
     """Return the inputs (..., 12, 81) of a network of legs, and which joints there are (..., 12, 4).
 
@@ -106,11 +112,7 @@ def leg_inputs(vectors):
         vectors: (..., 664) of `flat`, of NumPy or JAX; normalised ones keep the number of joints as it is.
     """
     numpy = vectors.__array_namespace__()
-    ends = np.cumsum(list(FLAT.values()))
-    firsts = ends - np.array(list(FLAT.values()))
-    legs, torso, command, leg_descriptions, torso_description = (
-        vectors[..., first:end] for first, end in zip(firsts.tolist(), ends.tolist(), strict=True)
-    )
+    legs, torso, command, leg_descriptions, torso_description = split(vectors).values()
     leading = vectors.shape[:-1]
     descriptions = leg_descriptions.reshape(*leading, LEGS, LEG_DESCRIPTION)
     shared = numpy.concatenate([torso, command, torso_description], axis=-1)[..., None, :]
@@ -252,6 +254,11 @@ class Tokens(NamedTuple):
         """
         return np.take_along_axis(vectors, self.places, axis=-1)
 
+    @staticmethod
+    def parts(gathered: np.ndarray) -> list[np.ndarray]:
+        """Return gathered numbers (..., n), or their places, in the parts that `places` names."""
+        return np.split(gathered, np.cumsum((5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2)), axis=-1)
+
     def observed(self, gathered: np.ndarray) -> dict[str, np.ndarray]:
         """Return the tokens of gathered numbers (environments, n).
 
@@ -262,8 +269,7 @@ class Tokens(NamedTuple):
             command (environments, 6): the desired velocity and the present one, as the torso heads, in units of
             the command.
         """
-        ends = np.cumsum((5, 6, LEGS * JOINTS, LEGS * JOINTS, LEGS, 2))
-        pose, velocities, angles, speeds, forces, clock, command = np.split(gathered.astype(np.float32), ends, axis=-1)
+        pose, velocities, angles, speeds, forces, clock, command = self.parts(gathered.astype(np.float32))
         angles, speeds = (array.reshape(self.mask.shape) * self.mask for array in (angles, speeds))
         sine = clock[:, :1] * self.offset[..., 1] + clock[:, 1:] * self.offset[..., 0]
         cosine = clock[:, 1:] * self.offset[..., 1] - clock[:, :1] * self.offset[..., 0]

@@ -9,7 +9,7 @@ from tiers import never, tiers
 from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import universal
-from arc_suite.policies.named import PACKAGED
+from arc_suite.policies.network import PACKAGED
 from arc_suite.robots import generator
 
 INDEX = json.loads((PACKAGED / "policies.json").read_text())
@@ -40,7 +40,7 @@ def test_they_earn_what_is_listed(name):
 @pytest.mark.long
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_those_of_any_body_earn_what_is_listed(task):
-    packaged = universal.load("universal", task != "walk")
+    packaged = universal.load("universal", Setup.of("queen", task).definition)
     environment = packaged.setup.validation(10).make_vec(10, autoreset_mode="Disabled")
     returns = [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
     assert np.mean(returns) == pytest.approx(INDEX[f"universal-{task}"]["return"], rel=0.02)

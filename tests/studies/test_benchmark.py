@@ -13,7 +13,7 @@ import pytest
 from arc_suite import evaluation
 from arc_suite.agents import configuration, run_folder
 from arc_suite.evaluation import anchors
-from arc_suite.policies.named import PACKAGED
+from arc_suite.policies.network import PACKAGED
 from arc_suite.studies import benchmark, results, tables
 from arc_suite.studies.benchmark import Score
 from arc_suite.studies.results import Result

@@ -10,12 +10,6 @@ import numpy as np
 _FIELD = re.compile(r"^    (?P<names>\w+(?:, \w+)*): (?P<text>.*(?:\n {8,}.*)*)", re.MULTILINE)
 
 
-def table(heads: Sequence[str], lines: Iterable[Sequence[str]]) -> str:
-    """Return a table."""
-    rows = (heads, ["---"] * len(heads), *lines)
-    return "\n".join(f"| {' | '.join(cells)} |" for cells in rows)
-
-
 def page(title: str, *parts: str) -> str:
     """Return a page of paragraphs, headings and tables; empty parts are left out."""
     return "\n\n".join([f"# {title}", *filter(None, parts)]) + "\n"

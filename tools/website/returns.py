@@ -9,10 +9,10 @@ from pathlib import Path
 from arc_suite import paper
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.policies.named import PACKAGED
+from arc_suite.policies.network import PACKAGED
 from arc_suite.robots import ROBOTS
+from arc_suite.studies.leaderboard import table
 from arc_suite.tasks import TASKS
-from website import markdown
 
 ROOT = Path(__file__).parents[2]
 _LEARNER_HEADS = ("robot, task", "algorithm", "seeds", "return", "score", "IQM [95 %]", "metric", "steps", "study")
@@ -23,7 +23,7 @@ def demonstrators(robots=tuple(ROBOTS), tasks=tuple(TASKS)) -> str:
     setups = [Setup.of(robot, task) for task in tasks for robot in robots]
     found = {setup: known for setup in setups if (known := anchors.known(setup))}
     heads = ("robot, task", "standing", "best demonstrator", "preset")
-    return markdown.table(heads, itertools.starmap(_anchors, found.items())) if found else ""
+    return table(heads, itertools.starmap(_anchors, found.items())) if found else ""
 
 
 def _anchors(setup: Setup, known: anchors.Returns) -> tuple[str, str, str, str]:
@@ -37,7 +37,7 @@ def learners(robots=tuple(ROBOTS), tasks=tuple(TASKS)) -> str:
     places = {str(Setup.of(robot, task)) for task in tasks for robot in robots}
     lines = [line for line in _learners() if line["robot, task"] in places]
     lines.sort(key=lambda line: (line["robot, task"], -float(line["return"])))
-    return markdown.table(_LEARNER_HEADS, ([line[head] for head in _LEARNER_HEADS] for line in lines)) if lines else ""
+    return table(_LEARNER_HEADS, ([line[head] for head in _LEARNER_HEADS] for line in lines)) if lines else ""
 
 
 def _learners() -> Iterator[dict[str, str]]:
@@ -57,4 +57,4 @@ def published(robot: str) -> str:
     lines = [("the paper's demonstrator", paper.DEMONSTRATORS[robot])]
     lines += [(f"the paper's {name}, 1,000,000 steps", value) for name, value in paper.FINALS[robot].items()]
     lines += [("`--policy ppo`, which comes with the package", packaged["return"])]
-    return markdown.table(("policy", "return"), ((name, f"{value:.0f}") for name, value in lines))
+    return table(("policy", "return"), ((name, f"{value:.0f}") for name, value in lines))

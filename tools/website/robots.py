@@ -4,6 +4,7 @@ import importlib
 import math
 
 from arc_suite.envs.setup import Setup
+from arc_suite.studies.leaderboard import table
 from website import markdown, observations, players, returns
 
 
@@ -30,7 +31,7 @@ def page(robot: str, film: str = "") -> str:
         observations.listed(task, "Every index"),
         "## Reward",
         "Weights of `walk`. The [page of the task](../tasks/walk.md) defines the terms.",
-        markdown.table(("term", "weight"), ([f"`{k}`", markdown.number(v)] for k, v in task.settings.weights.items())),
+        table(("term", "weight"), ([f"`{k}`", markdown.number(v)] for k, v in task.settings.weights.items())),
         "## Gait",
         "What `walk` prescribes.",
         _gait(task),
@@ -52,7 +53,7 @@ def about(robot: str) -> str:
 def _body(setup: Setup, model) -> str:
     body = setup.body
     legs = ", ".join(leg.name for leg in body.legs)
-    return markdown.table(
+    return table(
         ("quantity", "value"),
         [
             ("legs", f"{len(body.legs)}: {legs}"),
@@ -74,7 +75,7 @@ def _joints(model) -> str:
         numbers = model.actuator_gear[index, 0], joint.damping[0], joint.armature[0]
         lines.append([str(index), f"`{joint.name}`", span, f"{low:.3f} to {high:.3f}", *map(markdown.number, numbers)])
     heads = ("index", "joint", "range, degrees", "range, rad", "torque, N m", "damping, N m s/rad", "armature, kg m^2")
-    return markdown.table(heads, lines)
+    return table(heads, lines)
 
 
 def _gait(task) -> str:
@@ -82,7 +83,7 @@ def _gait(task) -> str:
     offsets = {
         leg.name: phase / math.tau for leg, phase in zip(task.scene.body.legs, values.phase_offsets, strict=True)
     }
-    return markdown.table(
+    return table(
         ("quantity", "value"),
         [
             ("target velocity v*", f"{markdown.number(values.target_velocity)} m/s"),
@@ -108,7 +109,7 @@ def gallery(frame: str) -> str:
         f"and `arc-suite animate --robot {players.CREATURES[0]} -o a.glb` exports clips. "
         "Nothing was trained or tuned for them.",
         frame,
-        markdown.table(
+        table(
             ("body", "legs", "joints", "mass, kg", "standing height, m", "v*, m/s", "frequency, Hz", "duty factor"),
             map(_creature, players.CREATURES),
         ),

@@ -6,6 +6,7 @@ from typing import Any
 from arc_suite.arenas import ARENAS, terrain
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, gaits
+from arc_suite.studies.leaderboard import table
 from arc_suite.tasks import modifiers, parameters, walk
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.ground import LEVELS, Lanes
@@ -49,14 +50,14 @@ _BOUNDS = {
 def of_task(kind: type[Task]) -> str:
     """Return the table of the settings that a task has in addition to those of all tasks."""
     defaults = {robot: _defaults(Setup.of(robot, kind.name).definition) for robot in ROBOTS}
-    return markdown.table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in kind.names()))
+    return table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in kind.names()))
 
 
 def of_all_tasks() -> str:
     """Return the table of the settings that every task has."""
     names = ("random", "time_limit", "arena", "on_divergence", *modifiers.NAMES)
     defaults = {"": {name: default for name, default in Modifiers()._asdict().items()}}
-    return markdown.table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in names))
+    return table(HEADS, ([f"`{name}`", *_cells(name, defaults)] for name in names))
 
 
 def _cells(name: str, defaults: Mapping[str, Mapping[str, Any]]) -> tuple[str, str, str]:

@@ -7,6 +7,7 @@ import arc_suite
 from arc_suite.cpg.selection import suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
+from arc_suite.studies.leaderboard import table
 from arc_suite.tasks import TASKS, ground
 from arc_suite.tasks.commanded import CommandTask
 from arc_suite.tasks.contract import STEPS, Task
@@ -117,7 +118,7 @@ def _asks(kind: type[Task]) -> str:
     lines += [
         (f"`{name}`", f"{markdown.number(value)}: {settings.MEANINGS[name]}") for name, value in kind.modifiers.items()
     ]
-    return markdown.table(("part", "what it is"), lines)
+    return table(("part", "what it is"), lines)
 
 
 def _observation(tasks) -> str:
@@ -127,8 +128,8 @@ def _observation(tasks) -> str:
         lines.append([f"`{block}`", *sizes, observations.BLOCKS[block]])
     lines.append(["in all", *(str(task.size) for task in tasks.values()), ""])
     robot, task = next(iter(tasks.items()))
-    table = markdown.table(("block", *tasks, "content"), lines)
-    return f"{table}\n\n{observations.listed(task, f'Every index, of {robot}')}"
+    listed = table(("block", *tasks, "content"), lines)
+    return f"{listed}\n\n{observations.listed(task, f'Every index, of {robot}')}"
 
 
 def _reward(kind: type[Task], tasks) -> str:
@@ -142,7 +143,7 @@ def _reward(kind: type[Task], tasks) -> str:
         text += (
             " A weighted sum s of the costs, whose weights are negative, becomes s / sqrt(1 + (s / `cost_limit`)^2)."
         )
-    return f"{text}\n\n{markdown.table(('term', 'weight', 'definition'), lines)}"
+    return f"{text}\n\n{table(('term', 'weight', 'definition'), lines)}"
 
 
 def _end(kind: type[Task], tasks) -> str:
@@ -160,13 +161,13 @@ def _end(kind: type[Task], tasks) -> str:
         lines.append(
             ("1", f"the torso is {ground.OFF_LANE:g} h from the lane's middle, or {ground.END:g} h from an end")
         )
-    return markdown.table(("discount", "where"), [*lines, ("1", "the time limit is reached")])
+    return table(("discount", "where"), [*lines, ("1", "the time limit is reached")])
 
 
 def _metrics(name: str) -> str:
     environment = arc_suite.load(next(iter(ROBOTS)), name)
     environment.reset()
-    return markdown.table(("metric", "meaning"), ([f"`{key}`", METRICS[key]] for key in environment.task.progress))
+    return table(("metric", "meaning"), ([f"`{key}`", METRICS[key]] for key in environment.task.progress))
 
 
 def _measured(name: str) -> str:
