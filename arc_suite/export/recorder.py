@@ -14,7 +14,7 @@ from arc_suite.tasks.fitting import velocity_units
 
 _SETTLE = 200  # control steps, after which starts and changes of command are forgotten
 _LONG = 700  # control steps without a command: a speed that varies is that of most of an episode
-_CYCLES = 10  # of the gait in a recording under a command, to choose loops from
+_CYCLES = 20  # of the gait in a recording under a command, to choose loops from
 _BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
 
 

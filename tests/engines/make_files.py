@@ -29,7 +29,7 @@ def main(folder: str, few: str = "") -> None:
     bodies = dict(ROBOTS)
     if not few:
         bodies |= {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
-        bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(50)}
+        bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(100)}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
         names = tuple(CLIPS) if name == WHOLE else export.DEFAULT if name in spec_files.EXAMPLES else FEW
         clips = export.clips(Setup.of(body, "steer"), names)
