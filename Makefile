@@ -15,7 +15,7 @@
 # make check-web  plays pages in Chromium and opens clips there with three.js, in an environment of its own
 # make check-studio  the studio in Chromium: sliders moved, creature changed, command followed, files saved
 # make check-play  walks bodies of pages in Node against Python, and plays pages in Chromium by keys and pointers
-# make check-glb  Khronos' validator on the clips of the robots, the examples and 50 random bodies; needs Node
+# make check-glb  Khronos' validator on the clips of the robots, the examples and 100 random bodies; needs Node
 # make check-blender, check-godot  open clips of the robots in Blender, in an environment of its own, and in Debian's Godot 3; the sample project is linted
 # make check-jax  tasks under jax.jit and jax.vmap, in an environment of their own
 # make check-agents  learners, ONNX and statistics against reference implementations, in the environment of check-jax

@@ -1,6 +1,6 @@
 // A body on some ground in MuJoCo's simulation, driven by a policy in a task.
 import { Law } from "./law.js";
-import { Network } from "./network.js";
+import { Graph } from "./graph.js";
 import { Task } from "./task.js";
 
 const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
@@ -9,7 +9,7 @@ const GRAVITY = 9.81; // m/s^2
 const dot = (first, second) => first.reduce((sum, value, index) => sum + value * second[index], 0);
 const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
 
-const POLICIES = { law: Law, network: Network };
+const POLICIES = { law: Law, graph: Graph };
 
 // A height field, in whose cells two triangles meet from the corner of lowest to that of highest x and y.
 export class Field {

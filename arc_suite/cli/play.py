@@ -4,6 +4,7 @@
   arc-suite play --robot all -o robots.html
   arc-suite play --spec spider -o spider.html
   arc-suite play --robot queen --policy runs/queen-steer-ppo-0 -o trained.html
+  arc-suite play --spec spider --policy universal -o universal.html
 
 The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
 E step to a side; dragging the body pulls it, space kicks it, R restarts. Bodies are chosen among those that the

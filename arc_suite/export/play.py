@@ -1,7 +1,8 @@
 """Pages to play in: MuJoCo steps a body in the browser, and a policy follows keys, sticks and touch.
 
 A page is one HTML file with nothing to fetch. `make web` builds its scripts, with three.js and MuJoCo's own
-WebAssembly; the law `steered` and networks are ports to JavaScript of what Python computes, with its constants.
+WebAssembly; the law `steered` is a port to JavaScript of what Python computes, with its constants, and trained
+policies are the graphs of their ONNX files.
 """
 
 import base64
@@ -21,8 +22,9 @@ from arc_suite.export import pages
 from arc_suite.export.parts import parts as described
 from arc_suite.models.outline import outline
 from arc_suite.models.sizing import SUBSTEPS
-from arc_suite.policies import zips
+from arc_suite.policies import graphs, universal, zips
 from arc_suite.policies.network import Network
+from arc_suite.policies.universal import Universal
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 from arc_suite.tasks.modified import Modified
@@ -60,7 +62,8 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
 
     Args:
         body: any.
-        policy: cpg, for a demonstrator that follows the command; or the name of a network, as for `policies.policy`.
+        policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
+            `policies.policy`.
         preset: of the demonstrator, such as steered, which None stands for, or surefooted.
 
     Raises:
@@ -71,7 +74,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
     if policy == "cpg":
         task, driver = steer, _law(steer, preset or "steered")
     else:
-        task, driver = _network(body, policy)
+        task, driver = _graph(body, policy, steer)
     parts, materials = described(body)
     return {
         "name": body.name,
@@ -137,20 +140,27 @@ def _law(task: Task, preset: str) -> dict[str, Any]:
     return {"kind": "law", "constants": law.constants()}
 
 
-def _network(body: Body, name: str) -> tuple[Task, dict[str, Any]]:
-    made = policies.policy(name, body)
+def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
+    made = policies.policy(name, body, task=steer if name == universal.NAME else None)
     if zips.parts(name):
         made = policies.trained(name)
-    if not isinstance(made, Network):
-        raise ValueError(f"policy {name}: a page runs cpg, ppo, or one trained network")
-    task = made.setup.definition
-    if unknown := [block for block in made.blocks if block not in _BLOCKS]:
+    if isinstance(made, Universal):  # acts in the task that it was trained in
+        task = Setup.of(body, made.network.setup.task).definition
+        made, blocks = Universal(made.network, task), task.blocks
+    elif isinstance(made, Network):
+        blocks, task = made.blocks, made.setup.definition
+    else:
+        raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
+    if unknown := [block for block in blocks if block not in _BLOCKS]:
         raise ValueError(f"policy {name}: observes {unknown[0]}, and a page has {', '.join(_BLOCKS)} alone")
     if task.actions != "torque":
         raise ValueError(f"policy {name}: its actions are a {task.actions} a joint, and a page takes torques")
-    layers = [{"kind": layer.kind, "arrays": [_base64(array) for array in layer.arrays]} for layer in made.layers]
-    return task, {"kind": "network", "constants": {"blocks": list(made.blocks), "layers": layers}}
+    graph = graphs.of(made)
+    nodes = [node._asdict() for node in graph.nodes]
+    constants = {constant: _constant(array) for constant, array in graph.constants.items()}
+    return task, {"kind": "graph", "constants": {"blocks": list(blocks), "nodes": nodes, "constants": constants}}
 
 
-def _base64(array: np.ndarray) -> str:
-    return base64.b64encode(array.astype("<f4").tobytes()).decode()
+def _constant(array: np.ndarray) -> dict[str, Any]:
+    kind, number = ("integer", "<i4") if array.dtype.kind == "i" else ("float", "<f4")
+    return {"kind": kind, "shape": array.shape, "data": base64.b64encode(array.astype(number).tobytes()).decode()}

@@ -6,20 +6,17 @@ The input `observations` is (num_envs, size) float32, flat: the task's blocks on
 
 import json
 import os
-from collections.abc import Callable, Mapping
-
-import numpy as np
+from collections.abc import Mapping
 
 from arc_suite import files, versions
 from arc_suite.envs.setup import Setup
-from arc_suite.policies.network import EPSILON, Layer, Network
-from arc_suite.policies.onnx_universal import Graph, added
+from arc_suite.policies import graphs
+from arc_suite.policies.graphs import INPUT, OUTPUT, Graph
+from arc_suite.policies.network import Network
 from arc_suite.policies.universal import Universal
 
 OPSET = 17  # the first with LayerNormalization
 IR_VERSION = 8  # of the same time, so that older runtimes read it
-
-INPUT, OUTPUT = "observations", "actions"
 
 
 def metadata(network: Network) -> dict:
@@ -62,11 +59,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
         ValueError: the package onnx is not installed.
         OSError: the file cannot be written.
     """
-    graph, present = Graph(), INPUT
-    for layer in network.layers:
-        for operator, arrays, attributes in _operators(layer):
-            present = graph(operator, present, *arrays, **attributes)
-    _write(path, graph, present, network.size, network.joints, metadata(network))
+    _write(path, graphs.of(network), network.size, network.joints, metadata(network))
 
 
 def save_universal(path: str | os.PathLike, network: Network, setup: Setup) -> None:
@@ -76,27 +69,22 @@ def save_universal(path: str | os.PathLike, network: Network, setup: Setup) -> N
         ValueError: the package onnx is not installed, or a body or task that does not fit.
         OSError: the file cannot be written.
     """
-    graph, policy = Graph(), Universal(network, setup.definition)
-    result = added(graph, policy, INPUT)
-    task = policy.task
-    _write(path, graph, result, task.size, len(policy.reach), _metadata(setup, task.blocks))
+    policy = Universal(network, setup.definition)
+    _write(path, graphs.of(policy), policy.task.size, len(policy.reach), _metadata(setup, policy.task.blocks))
 
 
-def _write(path: str | os.PathLike, graph: Graph, result: str, size: int, joints: int, known: Mapping) -> None:
+def _write(path: str | os.PathLike, graph: Graph, size: int, joints: int, known: Mapping) -> None:
     try:
         import onnx
         from onnx import TensorProto, helper, numpy_helper
     except ImportError as error:
         raise versions.MissingExtra("ONNX needs the package onnx", "onnx", error) from None
     made = helper.make_graph(
-        [
-            helper.make_node(operator, names, [OUTPUT if found == result else found], **attributes)
-            for operator, names, found, attributes in graph.nodes
-        ],
+        [helper.make_node(node.operator, node.inputs, [node.result], **node.attributes) for node in graph.nodes],
         "policy",
         [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["num_envs", size])],
         [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["num_envs", joints])],
-        [numpy_helper.from_array(np.ascontiguousarray(array), name) for name, array in graph.constants.items()],
+        [numpy_helper.from_array(array, name) for name, array in graph.constants.items()],
     )
     model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "arc_suite"
@@ -105,23 +93,3 @@ def _write(path: str | os.PathLike, graph: Graph, result: str, size: int, joints
     onnx.checker.check_model(model)
     with files.writing(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
-
-
-def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
-    """The operators of a layer: names, constants after the input, attributes."""
-    arrays = [np.ascontiguousarray(array, np.float32) for array in layer.arrays]
-    one = np.float32(1.0)
-    operators: dict[str, Callable[[], list]] = {
-        "linear": lambda: [("Gemm", arrays, {})],
-        "layer_norm": lambda: [("LayerNormalization", arrays, {"axis": -1, "epsilon": EPSILON})],
-        "normalise": lambda: [
-            ("Sub", arrays[:1], {}),
-            ("Mul", arrays[1:2], {}),
-            ("Clip", [-arrays[2].reshape(()), arrays[2].reshape(())], {}),
-        ],
-        "relu": lambda: [("Relu", [], {})],
-        "elu": lambda: [("Elu", [], {"alpha": 1.0})],
-        "tanh": lambda: [("Tanh", [], {})],
-        "clip": lambda: [("Clip", [np.array(-one), np.array(one)], {})],
-    }
-    return operators[layer.kind]()

@@ -15,7 +15,7 @@ import pytest
 
 from arc_suite.envs.setup import Setup
 from arc_suite.export import pages, play
-from arc_suite.policies import alone, network, policy
+from arc_suite.policies import alone, network, policy, universal
 from arc_suite.robots import ROBOTS, generator
 
 BODIES = {body.name: body for body in (*ROBOTS.values(), *map(generator.random_body, range(10)))}
@@ -88,7 +88,7 @@ def assert_networks_agree(script, setup, driver, name):
     episode = {"creature": creature, "ground": "level", "commands": given, "replayed": actions.tolist(), **start}
     (found,) = nodes.run(script, [episode])
     np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=1e-9)
-    for block in driver.blocks:
+    for block in creature["policy"]["constants"]["blocks"]:
         ported = [observation[block] for observation in found["observations"]]
         np.testing.assert_allclose(ported, [observation[block] for observation in observations], rtol=0.0, atol=1e-8)
     np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=2e-6)  # float32
@@ -109,6 +109,17 @@ def test_layers_of_all_kinds_and_all_blocks_are_those_of_python(script, tmp_path
     assert set(made.blocks) == {"posture", "velocities", "contact_forces", "gait_clock", "command"}
     network.save(tmp_path / "policy.npz", made)
     assert_networks_agree(script, made.setup, made, str(tmp_path))
+
+
+@pytest.mark.slow
+@nodes.needs_node
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_a_policy_of_any_body_is_that_of_python(script, tmp_path, task):
+    body = BODIES["random_4"]
+    made, setup = universal.load("universal", Setup.of(body, task).definition), Setup.of(body, task)
+    network.save(tmp_path / "policy.npz", made)
+    name = "universal" if task == "steer" else str(tmp_path)
+    assert_networks_agree(script, setup, policy(name, body, task=setup.definition), name)
 
 
 @pytest.mark.slow
@@ -188,7 +199,7 @@ def test_the_program_writes_a_page(tmp_path):
     [
         ((), "no file to write; say --output=FILE.html"),
         (("-o", "a.htm"), "unknown extension '.htm'; did you mean '.html'? (there are: .html)"),
-        (("-o", "a.html", "--policy=zero"), "policy zero: a page runs cpg, ppo, or one trained network"),
+        (("-o", "a.html", "--policy=zero"), "policy zero: a page runs cpg, ppo, universal, or one trained network"),
         (
             ("-o", "a.html", "--preset=sighted"),
             "preset 'sighted': a page runs steered or surefooted, which follow a command by joint angles",

@@ -1,44 +1,105 @@
-"""A policy of many bodies as the ONNX graph of one body, whose description is constants in it."""
+"""Policies as graphs of ONNX operators: layers one after the other, or a policy of many bodies for one of them.
+
+`onnx_file` writes a graph as a file, and pages to play in compute it in JavaScript; see web/graph.js.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.policies.network import EPSILON, Layer, Network
 from arc_suite.policies.universal import Universal
 from arc_suite.tasks import tokens
 from arc_suite.tasks.tokens import JOINTS
 
+INPUT, OUTPUT = "observations", "actions"
+
+
+class Node(NamedTuple):
+    """An operator.
+
+    Attributes:
+        operator: its name in ONNX.
+        inputs: names of results of other nodes, of constants, or `INPUT`.
+        result: name of what it gives.
+        attributes: of the operator.
+    """
+
+    operator: str
+    inputs: list[str]
+    result: str
+    attributes: dict
+
 
 class Graph:
-    """Nodes and constants of a graph, in order."""
+    """What computes actions (num_envs, joints) from flat observations (num_envs, size).
+
+    Attributes:
+        nodes: in order; the last gives `OUTPUT`.
+        constants: float32, or int64 for indices and shapes, by name.
+    """
 
     def __init__(self):
-        """Begin without any."""
-        self.nodes: list[tuple[str, list[str], str, dict]] = []
+        """Begin without any node."""
+        self.nodes: list[Node] = []
         self.constants: dict[str, np.ndarray] = {}
 
     def __call__(self, operator: str, *inputs: str | np.ndarray | float, **attributes) -> str:
         """Add a node, and return the name of its result; arrays and numbers become constants."""
         names = [each if isinstance(each, str) else self._constant(each) for each in inputs]
         result = f"{operator.lower()}_{len(self.nodes)}"
-        self.nodes.append((operator, names, result, attributes))
+        self.nodes.append(Node(operator, names, result, attributes))
         return result
+
+    def finished(self) -> "Graph":
+        """Return this graph, whose last node gives the actions."""
+        self.nodes[-1] = self.nodes[-1]._replace(result=OUTPUT)
+        return self
 
     def _constant(self, value) -> str:
         array = np.asarray(value)
-        array = array.astype(np.int64 if array.dtype.kind == "i" else np.float32)
+        array = np.ascontiguousarray(array, np.int64 if array.dtype.kind == "i" else np.float32).reshape(array.shape)
         name = f"constant_{len(self.constants)}"
         self.constants[name] = array
         return name
 
 
-def added(graph: Graph, policy: Universal, observations: str) -> str:
-    """Add the nodes of a policy for one body, and return the name of its actions (num_envs, joints).
+def of(policy: Network | Universal) -> Graph:
+    """Return the graph of a network, or of a policy of many bodies for its one body."""
+    graph = Graph()
+    if isinstance(policy, Universal):
+        _add_universal(graph, policy)
+        return graph.finished()
+    present = INPUT
+    for layer in policy.layers:
+        for operator, arrays, attributes in _operators(layer):
+            present = graph(operator, present, *arrays, **attributes)
+    return graph.finished()
 
-    Args:
-        graph: to add to.
-        policy: of the body.
-        observations: name of the observations (num_envs, size) of its task.
-    """
-    seen, there = _inputs(graph, policy, observations)
+
+def _operators(layer: Layer) -> list[tuple[str, list[np.ndarray], dict]]:
+    """The operators of a layer: names, constants after the input, attributes."""
+    arrays = list(layer.arrays)
+    operators: dict[str, Callable[[], list]] = {
+        "linear": lambda: [("Gemm", arrays, {})],
+        "layer_norm": lambda: [("LayerNormalization", arrays, {"axis": -1, "epsilon": EPSILON})],
+        "normalise": lambda: [
+            ("Sub", arrays[:1], {}),
+            ("Mul", arrays[1:2], {}),
+            ("Clip", [-arrays[2].reshape(()), arrays[2].reshape(())], {}),
+        ],
+        "relu": lambda: [("Relu", [], {})],
+        "elu": lambda: [("Elu", [], {"alpha": 1.0})],
+        "tanh": lambda: [("Tanh", [], {})],
+        "clip": lambda: [("Clip", [np.array(-1.0), np.array(1.0)], {})],
+    }
+    return operators[layer.kind]()
+
+
+def _add_universal(graph: Graph, policy: Universal) -> None:
+    """Add the nodes of a policy of many bodies for one, whose description is constants."""
+    seen, there = _inputs(graph, policy)
     kinds = {layer.kind: layer.arrays for layer in policy.network.layers}
     if "normalise" in kinds:
         mean, factor, limit = kinds["normalise"]
@@ -54,17 +115,17 @@ def added(graph: Graph, policy: Universal, observations: str) -> str:
     flat = graph("Reshape", found, np.array((0, JOINTS * len(there))))
     positions = graph("Clip", graph("Gather", flat, np.flatnonzero(there), axis=1), -1.0, 1.0)
     if policy.task.actions == "position":
-        return positions
+        return
     # Torques of motors that hold the positions with the body's own gains.
     stiffness, damping = policy.gains
     _, _, *joints = policy.tokens.parts(policy.tokens.places[0])[:4]
     columns = (each[np.flatnonzero(there)] for each in joints)
-    angles, speeds = (graph("Gather", observations, each, axis=1) for each in columns)
+    angles, speeds = (graph("Gather", INPUT, each, axis=1) for each in columns)
     pulled = graph("Mul", graph("Sub", graph("Mul", positions, policy.reach), angles), stiffness)
-    return graph("Clip", graph("Sub", pulled, graph("Mul", speeds, damping)), -1.0, 1.0)
+    graph("Clip", graph("Sub", pulled, graph("Mul", speeds, damping)), -1.0, 1.0)
 
 
-def _inputs(graph: Graph, policy: Universal, observations: str) -> tuple[str, np.ndarray]:
+def _inputs(graph: Graph, policy: Universal) -> tuple[str, np.ndarray]:
     """Add what the network of legs sees, (num_envs, legs, 81); see `Tokens.observed`.
 
     Returns:
@@ -76,7 +137,7 @@ def _inputs(graph: Graph, policy: Universal, observations: str) -> tuple[str, np
     pose, velocities, angles, speeds, forces, clock, command = own.parts(own.places[0])
 
     def columns(indices, shape=()):
-        found = graph("Gather", observations, indices, axis=1)
+        found = graph("Gather", INPUT, indices, axis=1)
         return graph("Reshape", found, np.array((0, *shape))) if shape else found
 
     angles = graph("Mul", columns(angles[: JOINTS * legs], (legs, JOINTS)), mask)
