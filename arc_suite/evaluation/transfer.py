@@ -56,6 +56,8 @@ FAMILIES = {
     "varied": Family(lambda index: varied_body(TEST + index), 50),
     "robots": Family(_robot, 4),
     "mutants": Family(_mutant, 20),
+    "many_legs": Family(lambda index: generator.random_body(TEST + index, legs=9 + index % 4), 20),
+    "four_links": Family(lambda index: generator.random_body(TEST + index, links=4), 20),
     "small": Family(lambda index: generator.scaled(generator.random_body(TEST + index), 0.25), 10),
     "large": Family(lambda index: generator.scaled(generator.random_body(TEST + index), 10.0), 10),
 }

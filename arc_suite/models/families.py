@@ -53,5 +53,20 @@ def sound(draw: Callable[[np.random.Generator], Body], family: str, seed: int) -
     raise ValueError(f"{family}:{seed}: none of {TRIES} draws stands and can take steps; see arc-suite check")
 
 
+def few_legs(seed: int) -> Body:
+    """Return a random body of 4 to 8 legs, for policies that are tested with more; see `random_body`."""
+    return random_body(seed, legs=4 + checks.seed(seed) % 5).replace(name=f"few_legs_{seed}")
+
+
+def few_links(seed: int) -> Body:
+    """Return a random body of 2 or 3 links a leg, for policies that are tested with 4; see `random_body`."""
+    return random_body(seed, links=2 + checks.seed(seed) % 2).replace(name=f"few_links_{seed}")
+
+
 # Functions from a seed to a body, by name. `registration.register` adds those of other packages.
-FAMILIES: dict[str, Callable[[int], Body]] = {"random": random_body, "varied": varied_body}
+FAMILIES: dict[str, Callable[[int], Body]] = {
+    "random": random_body,
+    "varied": varied_body,
+    "few_legs": few_legs,
+    "few_links": few_links,
+}

@@ -50,7 +50,10 @@ def test_a_reversed_sweep_walks_backwards():
         ("--picture=missing/a.png", "cannot write missing/a.png: no such file or directory"),
         ("--picture=a.txt", "unknown extension '.txt' (there are: .png)"),
         ("--set=time_limit=Infinity", "time_limit: expected a finite number, as every episode must end, got inf"),
-        ("--family=vared", "unknown family 'vared'; did you mean 'varied'? (there are: random, varied)"),
+        (
+            "--family=vared",
+            "unknown family 'vared'; did you mean 'varied'? (there are: random, varied, few_legs, few_links)",
+        ),
         ("--froude=2", "froude: expected a number from -1 to 1, got 2.0"),
     ],
 )

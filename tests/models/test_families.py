@@ -12,6 +12,7 @@ import pytest
 
 from arc_suite import registry
 from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import transfer
 from arc_suite.models import families
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
@@ -87,6 +88,15 @@ def test_seeds_stand_for_the_same_bodies_for_good():
     assert hashlib.sha256(text.encode()).hexdigest()[:16] == "5a7493aca9b1ddd6"
 
 
+def test_restricted_families_leave_out_what_tests_have():
+    assert {len(families.few_legs(seed).legs) for seed in range(20)} == set(range(4, 9))
+    assert {len(leg.joints) for seed in range(20) for leg in families.few_links(seed).legs} == {2, 3}
+    assert families.few_legs(7).name == "few_legs_7" and families.few_links(7).name == "few_links_7"
+    for name, count in (("many_legs", {9, 10, 11, 12}), ("four_links", {4})):
+        bodies = [transfer.FAMILIES[name].made(index) for index in range(8)]
+        assert {len(body.legs) if name == "many_legs" else len(body.legs[0].joints) for body in bodies} == count
+
+
 def test_names_of_families():
     assert registry.body_of("random:7") == generator.random_body(7)
     assert registry.body_of("varied:7") == families.varied_body(7)
@@ -107,7 +117,10 @@ def test_names_of_families():
         ("varied:0-99999999", "domain 'varied:0-99999999': expected seeds in ascending order, at most 65536"),
         ("varied:4294967296", "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         ("json:varied:3", "family 'json:varied': varied is the suite's own, expected without a module"),
-        ("json:vared:3", "unknown family 'vared'; did you mean 'varied'? (there are: random, varied)"),
+        (
+            "json:vared:3",
+            "unknown family 'vared'; did you mean 'varied'? (there are: random, varied, few_legs, few_links)",
+        ),
     ],
 )
 def test_wrong_names_are_one_line(name, message):
