@@ -26,7 +26,8 @@ def test_episodes_are_read_as_they_were_written(tmp_path):
     table = bodies.text(tmp_path).splitlines()
     assert table[0].split(" | ")[1:3] == ["task", "random"]
     assert table[2] == (
-        "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | 0.00, tracking 0.25 | not run |"
+        "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | not run | not run | 0.00, tracking 0.25 |"
+        " not run |"
     )
     (tmp_path / "one-steer.csv").write_text("family,body\n")
     with pytest.raises(ValueError, match=r"one-steer\.csv: expected the columns family, body, who, return, walked, "):
