@@ -12,7 +12,16 @@ def _commanded(sighted: SightedParameters, **build) -> dict:
     """Presets of a body that follow a command, given the parameters of steering that depend on its build."""
     steered = SteeringParameters(**build)
     surefooted = steered._replace(lift=0.45, gain=(2.0, 2.0, 1.0), integral=0.6, attitude=0.3)
-    return {"steered": steered, "surefooted": surefooted, "sighted": sighted, "planned": PlanningParameters(steered)}
+    # Without an integral, actions follow from what is observed: networks without memory learn them.
+    reactive = steered._replace(gain=(3.0, 3.0, 1.5), integral=0.0)
+    planned = PlanningParameters(steered)
+    return {
+        "steered": steered,
+        "surefooted": surefooted,
+        "reactive": reactive,
+        "sighted": sighted,
+        "planned": planned,
+    }
 
 
 # Of bodies and robots without presets of their own of these names; a number is a speed as a share of sqrt(g h).

@@ -22,7 +22,7 @@ NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = f"(there are: {', '.join(TASKS)})"
 DOMAINS = f"(there are: {', '.join(ROBOTS)})"
-PRESETS = "slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned"
+PRESETS = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, planned"
 CAMERAS = "['tracking', 'portrait', 'profile']"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"

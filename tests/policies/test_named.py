@@ -10,7 +10,7 @@ from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
-ALL = "slow, medium, fast, tuned, refined, steered, surefooted, sighted, planned, balanced"
+ALL = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, planned, balanced"
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -74,7 +74,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         ),
         (
             ("cpg", generate(4, 2), "tuned"),
-            "unknown preset 'tuned' (there are: slow, medium, fast, steered, surefooted, sighted, planned)",
+            "unknown preset 'tuned' (there are: slow, medium, fast, steered, surefooted, reactive, sighted, planned)",
         ),
         (
             ("cpg", "queen", ()),
