@@ -34,9 +34,9 @@ LANES = (*terrain.KINDS, "course")
 
 # Task -> presets to compare; zero stands still.
 PRESETS = {
-    "steer": ("zero", "tuned", "steered", "surefooted"),
-    "shoved": ("zero", "tuned", "steered", "surefooted"),
-    "limp": ("zero", "tuned", "steered", "surefooted"),
+    "steer": ("zero", "tuned", "steered", "surefooted", "reactive"),
+    "shoved": ("zero", "tuned", "steered", "surefooted", "reactive"),
+    "limp": ("zero", "tuned", "steered", "surefooted", "reactive"),
     "roam": ("zero", "steered", "surefooted", "balanced"),
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),

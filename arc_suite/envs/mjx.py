@@ -114,8 +114,9 @@ class Env:
         self.task, self.mj_model = prepared(domain_name, task_name, settings)
         if self.task.adapts:
             raise ValueError(f"task {self.task.name}: expected no curriculum, as its starts hang on the episode before")
-        self._mjx_model = device.put(self.mj_model, self.impl)
-        self._data = device.made(self.mj_model, self.impl, self.num_envs)
+        model = device.adapted(self.mj_model, self.impl)
+        self._mjx_model = device.put(model, self.impl)
+        self._data = device.made(model, self.impl, self.num_envs)
         self.episode_length = self.task.step_limit
         self.observation_size, self.action_size = self.task.size, self.mj_model.nu
         self.dt, self.sim_dt, self.n_substeps = self.task.scene.control_timestep, self.mj_model.opt.timestep, SUBSTEPS
