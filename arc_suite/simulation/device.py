@@ -8,6 +8,7 @@ import contextlib
 import copy
 import importlib.util
 import io
+import math
 import types
 from collections.abc import Iterable
 
@@ -42,6 +43,14 @@ _POINTS = {
     int(mujoco.mjtGeom.mjGEOM_BOX): 4,
     int(mujoco.mjtGeom.mjGEOM_CYLINDER): 4,
 }
+# Sizes of a geom that grow with it in all directions: of a capsule the radius alone.
+_LENGTHS = {
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): 1,
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): 1,
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): 3,
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): 2,
+    int(mujoco.mjtGeom.mjGEOM_BOX): 3,
+}
 
 
 def implementation(name: str | None) -> str:
@@ -70,13 +79,16 @@ def adapted(model: mujoco.MjModel, impl: str) -> mujoco.MjModel:
         model.opt.iterations, model.opt.ls_iterations = ITERATIONS, LS_ITERATIONS
         model.opt.disableflags |= _SENSOR  # `advanced` computes contact forces
         return model
-    # Warp 3.17 takes one and a half margins off the distance to a height field. A field that is higher by the margin
-    # gives the same contacts without one.
+    # Warp 3.17 forgets the margin in the distance to a height field, and turns the normal where geoms do not overlap.
+    # Geoms that are larger by the margin overlap where contacts begin, and push as they do in C.
     field = model.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD
     pairs = field[model.pair_geom1] | field[model.pair_geom2]
-    if pairs.any():
-        model.geom_pos[field, 2] += model.pair_margin[pairs].max()
-        model.pair_margin[pairs] = 0.0
+    geoms = np.where(field[model.pair_geom1], model.pair_geom2, model.pair_geom1)
+    for geom, margin in dict(zip(geoms[pairs], model.pair_margin[pairs], strict=True)).items():
+        model.geom_size[geom, : _LENGTHS[int(model.geom_type[geom])]] += margin
+        model.geom_aabb[geom, 3:] += margin
+        model.geom_rbound[geom] += math.sqrt(3.0) * margin
+    model.pair_margin[pairs] = 0.0
     return model
 
 
