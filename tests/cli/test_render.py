@@ -162,9 +162,12 @@ def test_a_take_stays_at_its_end():
             "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
         ),
         (["--camera=", "--output=a.png"], "unknown camera '' (there are: tracking, portrait, profile)"),
-        (["--output=a.jpg"], "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .html)"),
+        (
+            ["--output=a.jpg"],
+            "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .webp, .html)",
+        ),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
-        ([], "no file to write; say --output=FILE.png, .mp4, .gif or .html"),
+        ([], "no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):
