@@ -9,6 +9,7 @@
 # make check-clients  runs docs/clients.md, each client in an environment of its own; gigabytes
 # make dist    builds wheel and source distribution in dist/, with the viewer of pages; needs Node
 # make docs    builds the documentation site in out/docs/html, in an environment of its own; with Node, creatures walk there
+# make media   draws the pictures and films of creatures in README and docs; minutes
 # make check-docs  builds the site, follows its links and looks at its front page in Chromium
 # make check-notebooks  runs the notebooks of examples, in an environment of its own
 # make web     bundles the scripts that pages are made of, three.js and MuJoCo's WebAssembly; needs Node
@@ -39,7 +40,7 @@ VENV ?= .venv
 PYTHON := $(VENV)/bin/python
 INSTALLED := $(VENV)/installed
 
-.PHONY: demo dist docs check-notebooks test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean clip-sets
+.PHONY: demo dist docs media check-notebooks test check check-long check-release lint check-types check-lowest check-sb3 check-clients web check-web check-docs check-play check-studio check-glb check-blender check-godot check-jax check-mjx check-mjx-release check-agents check-agents-release check-bodies bench bench-gpu survey obedience soak loopholes fuzz mutants golden clean clip-sets
 
 demo: $(VENV)/demo
 	tools/ensure_egl.sh $(PYTHON)
@@ -125,6 +126,10 @@ docs: setup.cfg
 	$(MAKE) web || true
 	$(VENV)/bin/python tools/make_site.py out/docs
 	$(VENV)/bin/python -m sphinx -q -W --keep-going -j auto -c docs out/docs/sources out/docs/html
+
+media: $(INSTALLED)
+	tools/ensure_egl.sh $(PYTHON)
+	$(PYTHON) tools/make_media.py
 
 check-docs: VENV := .venv-docs
 check-docs: docs

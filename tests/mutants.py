@@ -90,7 +90,7 @@ MUTANTS = (
     ),
     Mutant("fork unnoticed", "    global count\n    count += 1\n", "    global count\n    count += 0\n"),
     Mutant("batch destroyed in a forked child", "        forks.keep(self._simulations)\n", ""),
-    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos, markers)\n", ""),
+    Mutant("picture of another moment", "        decorated.pose(qpos, share, mocap_pos, markers, failed_legs)\n", ""),
     Mutant("user's choice of OpenGL overwritten", '"MUJOCO_GL" not in os.environ and ', ""),
     # Tasks.
     Mutant(

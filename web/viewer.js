@@ -6,9 +6,13 @@ import { grounds, triangles } from "./ground.js";
 import { geometry, materials, partOf, quaternion } from "./parts.js";
 import { View } from "./view.js";
 
+const DARK = new THREE.MeshStandardMaterial({ color: 0x121214 }); // of a leg whose motors have failed
+
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2];
 
 const byId = (id) => document.getElementById(id);
+
+const meshesOf = (part) => part.children.filter((child) => child.isMesh);
 
 // A body whose parts turn as a walk tells; the frame is MuJoCo's: x ahead, y left, z up.
 class Creature {
@@ -24,6 +28,7 @@ class Creature {
     this.torso = this.parts[0];
     this.axes = walk.parts.map((part) => part.axis && new THREE.Vector3(...part.axis));
     this.rests = walk.parts.map((part) => quaternion(part.quaternion));
+    this.looks = new Map(this.parts.flatMap(meshesOf).map((mesh) => [mesh, mesh.material]));
   }
 
   // Rows of a track stand at the ends of control steps: the first one at `step`.
@@ -46,7 +51,16 @@ class Creature {
       turn.setFromAxisAngle(this.axes[index], mix(joints, part.joint));
       this.parts[index].quaternion.copy(this.rests[index]).multiply(turn);
     });
+    const failed = this.walk.scenery.failed[before] ?? [];
+    for (const part of this.parts) {
+      for (const mesh of meshesOf(part)) mesh.material = failed.includes(part.name) ? DARK : this.looks.get(mesh);
+    }
     this.torso.updateMatrixWorld(true);
+  }
+
+  // Names of the parts that are dark.
+  dark() {
+    return this.parts.filter((part) => meshesOf(part).some((mesh) => mesh.material === DARK)).map((part) => part.name);
   }
 
   // Places of all parts in the world by name.
@@ -258,7 +272,8 @@ async function main() {
   requestAnimationFrame(frame);
   // For tests, and for whoever steers the page from outside.
   const told = (what) => () => columns.map(({ stage }) => stage[what].places());
-  window.viewer = { state, seek, pause, places: told("creature"), marks: told("marks") };
+  const dark = () => columns.map(({ stage }) => stage.creature.dark());
+  window.viewer = { state, seek, pause, places: told("creature"), marks: told("marks"), dark };
 }
 
 main();

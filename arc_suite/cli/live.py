@@ -51,6 +51,7 @@ class Live(Episodes):
         model, data, simulated = self.shown.model.ptr, self.shown.data.ptr, self.environment.physics.data
         data.qpos[:], data.qvel[:], data.mocap_pos[:] = self.qpos(share), simulated.qvel, simulated.mocap_pos
         mujoco.mj_forward(model, data)
+        self.shown.darken(self.environment.task.failed_legs())
 
     def text(self) -> str:
         """Return a line about the episode."""

@@ -1,4 +1,4 @@
-"""Render a robot that walks: a picture (.png), film (.mp4, .gif) or page (.html).
+"""Render a robot that walks: a picture (.png), film (.mp4, .gif, .webp) or page (.html).
 
   arc-suite render --robot queen --policy cpg --output queen.png
   arc-suite render --robot all --output robots.mp4
@@ -37,8 +37,8 @@ from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.policies import Policy, alone, policy
 
-_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".html": 400}
-_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180)}
+_STEPS = {".png": 60, ".mp4": 200, ".gif": 80, ".webp": 80, ".html": 400}
+_SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (480, 360)}
 _CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
 
 FLAGS = flags.FLAGS
@@ -49,16 +49,18 @@ define_policy()
 define_preset()
 flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)
 flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
-flags.DEFINE_integer("width", None, "Of a view, in pixels. [default: 640, in a GIF 240]", 16, MAX_WIDTH)
-flags.DEFINE_integer("height", None, "Of a view, in pixels. [default: 480, in a GIF 180]", 16, MAX_HEIGHT)
+flags.DEFINE_integer("width", None, "Of a view, in pixels. [default: 640, in a GIF 240, in a WebP 480]", 16, MAX_WIDTH)
+flags.DEFINE_integer(
+    "height", None, "Of a view, in pixels. [default: 480, in a GIF 180, in a WebP 360]", 16, MAX_HEIGHT
+)
 flags.DEFINE_integer(
     "steps",
     None,
     "Control steps, of 0.05 s for the four robots: the length of a film, or how long to walk before a picture. "
-    "[default: 200, in a GIF 80, on a page 400, before a picture 60]",
+    "[default: 200, in a GIF or WebP 80, on a page 400, before a picture 60]",
     lower_bound=0,
 )
-flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif or .html. Required.", short_name="o")
+flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .html. Required.", short_name="o")
 
 
 def main() -> None:
@@ -75,7 +77,7 @@ def main() -> None:
         for name, body in walkers.items()
     }
     if not FLAGS.output:
-        raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif or .html")
+        raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html")
     extension = checks.extension(FLAGS.output, _STEPS)
     steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
 

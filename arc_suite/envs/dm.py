@@ -228,7 +228,7 @@ class TaskRun(TaskView, control.Task):
         data.qpos[:], data.qvel[:] = start.qpos, start.qvel
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
-        physics.shown_reward, physics.marker = None, self.markers
+        physics.shown_reward, physics.marker, physics.failed_legs = None, self.markers, self.failed_legs
         self._memory, self._starting = start.memory, True
 
     def before_step(self, action, physics):
@@ -239,7 +239,8 @@ class TaskRun(TaskView, control.Task):
         """
         action = checked_action(action, self._motors)
         self._memory, inputs = self.definition.before(self._commands.taken(self._memory), action)
-        data, physics.marker = physics.data.ptr, self.markers  # which a copy of the simulation has not
+        data = physics.data.ptr
+        physics.marker, physics.failed_legs = self.markers, self.failed_legs  # which a copy of the simulation has not
         data.ctrl[:] = inputs.ctrl
         if inputs.kick is not None:
             data.qvel[:] += inputs.kick
@@ -283,6 +284,10 @@ class TaskRun(TaskView, control.Task):
     def markers(self, physics):
         """Return what pictures show of what the task asks for now."""
         return self.definition.markers(self.memory, self._latest(physics))
+
+    def failed_legs(self) -> tuple[str, ...]:
+        """Return the names of the legs whose motors have failed."""
+        return self.definition.failed_legs(self._memory)
 
     def _latest(self, physics):
         """The readings of the latest step."""

@@ -200,7 +200,7 @@ class Env:
         memory = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], state.info["memory"])
         markers = self.task.markers(memory, self.task.read(types.SimpleNamespace(**alone)))
         pose = {"qpos": alone["qpos"], "mocap_pos": alone["mocap_pos"], "markers": markers}
-        return pictures.picture(scene.body, scene.arena, **pose, **options)
+        return pictures.picture(scene.body, scene.arena, **pose, failed_legs=self.task.failed_legs(memory), **options)
 
     def _step(self, state: State, action) -> State:
         task, info, before = self.task, state.info, state.data

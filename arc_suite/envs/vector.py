@@ -380,11 +380,13 @@ class VectorEnv(Together):
         self._memory = self._commands.taken(self._memory)
 
     def _picture_of(self, index: int) -> np.ndarray:
-        task, scene, marks = self._tasks[index], self._tasks[index].scene, ()
+        task, scene, shown = self._tasks[index], self._tasks[index].scene, {}
         if self._memory is not None:
-            marks = task.markers(trees.at(self._memory, index), task.read(self.batch.part(index)))
+            memory = trees.at(self._memory, index)
+            shown["markers"] = task.markers(memory, task.read(self.batch.part(index)))
+            shown["failed_legs"] = task.failed_legs(memory)
         qpos, mocap_pos = self.batch.data.qpos[index], self.batch.mocap_pos[index]
-        return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, markers=marks, **self._picture)
+        return pictures.picture(scene.body, scene.arena, qpos, mocap_pos=mocap_pos, **shown, **self._picture)
 
     def _begin(self, mask: np.ndarray, observation: np.ndarray) -> None:
         """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""

@@ -1,5 +1,6 @@
 """Episodes in pictures: single views, one gait cycle at a glance, films."""
 
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -166,11 +167,26 @@ def write_gif(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: flo
     # Of Pillow's methods the octree is the one that keeps small bright spots: eyes and glows.
     palette = sample.quantize(_GIF_COLOURS, Image.Quantize.FASTOCTREE)
     first, *others = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    ends = [round(100.0 * seconds * count) for count in range(len(frames) + 1)]
-    durations = [10 * (end - start) for start, end in zip(ends, ends[1:], strict=False)]  # ms
+    durations = _durations(len(frames), seconds, 10)
     first.save(path, "GIF", save_all=True, append_images=others, duration=durations, loop=0)
+
+
+def write_webp(path: Path | IO[bytes], frames: Iterable[np.ndarray], seconds: float) -> None:
+    """Write a film that plays forever, in full colours; arguments as of `write_gif`."""
+    first, *others = map(Image.fromarray, frames)
+    durations = _durations(1 + len(others), seconds, 1)
+    first.save(
+        path, "WEBP", save_all=True, append_images=others, duration=durations, loop=0, quality=_WEBP_QUALITY, method=6
+    )
+
+
+def _durations(count: int, seconds: float, unit: int) -> list[int]:
+    """How long each frame lasts, ms, in a format that counts in a unit, ms; their sum is off by less than one."""
+    ends = [round(1000.0 * seconds * frame / unit) for frame in range(count + 1)]
+    return [unit * (end - start) for start, end in itertools.pairwise(ends)]
 
 
 _GIF_COLOURS = 128
 _GIF_SAMPLES = 4  # frames that the palette is made from
-WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif}
+_WEBP_QUALITY = 50
+WRITERS = {".png": write_png, ".mp4": write_mp4, ".gif": write_gif, ".webp": write_webp}

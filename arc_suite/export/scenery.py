@@ -18,8 +18,8 @@ _SAME = 1e-3  # of the standing height, by which an episode that is repeated may
 def scenery(track: Track) -> dict[str, Any]:
     """Return the scenery of an episode; lengths are in m and the world's axes.
 
-    The episode is started again by its seed, which places the obstacles, and replayed by its actions if its task has
-    debug markers. Markers end where the replay differs from the recording, for example with weak motors, as the
+    The episode is started again by its seed, which places the obstacles, and replayed by its actions for the debug
+    markers. Markers end where the replay differs from the recording, for example with weak motors, as the
     recorded actions are the applied ones.
 
     Returns:
@@ -29,16 +29,18 @@ def scenery(track: Track) -> dict[str, Any]:
             `fields`: height fields, each `low` (2,), `cell` (2,) and `heights` (rows, columns);
             `solids`: shapes, each `kind`, `size`, `place` and `colour`, None for that of the ground times `shade`;
             `styles`: of marks, `shape`, `radius` and `colour`;
-            `marks`: for every row of the track, of each mark the index of its style, start and end.
+            `marks`: for every row of the track, of each mark the index of its style, start and end;
+            `failed`: for every row the names of the parts of legs whose motors have failed.
+            The last two are empty where all rows are.
     """
     environment = track.setup.load()
     environment.reset(track.seed)
     margin = _MARGIN * track.body.torso.standing_height
     low, high = track.positions[:, :2].min(axis=0) - margin, track.positions[:, :2].max(axis=0) + margin
     found = ground(environment, low, high)
-    styles, marks = _marks(environment, track)
+    styles, marks, failed = _marks(environment, track)
     environment.close()
-    return found | {"styles": styles, "marks": marks}
+    return found | {"styles": styles, "marks": marks, "failed": failed}
 
 
 def ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
@@ -92,18 +94,19 @@ def _solid(model: mujoco.MjModel, geom: int, kind: str, place) -> dict[str, Any]
     return {"kind": kind, "size": model.geom_size[geom], "place": place.copy(), "colour": colour, "shade": shade}
 
 
-def _marks(environment, track: Track) -> tuple[list, list]:
-    """The styles of marks, and the marks of every row, of an environment that stands at the start of a track."""
-    physics, styles, rows = environment.physics, {}, []
-    if not environment.task.markers(physics):
-        return [], []
+def _marks(environment, track: Track) -> tuple[list, list, list]:
+    """The styles of marks, and of every row marks and parts of failed legs, of an environment at a track's start."""
+    physics, task, styles, rows, failed = environment.physics, environment.task, {}, [], []
+    parts = {leg.name: [leg.full_name(part) for part in (*leg.links, leg.foot)] for leg in track.body.legs}
     near = _SAME * track.body.torso.standing_height
     for action, position in zip(track.actions, track.positions, strict=True):
         environment.step(action)
         if abs(physics.data.qpos[:3] - position).max() > near:
             break
-        rows.append(_styled(environment.task.markers(physics), styles))
-    return [dict(zip(("shape", "radius", "colour"), style[:3], strict=True)) for style in styles], rows
+        rows.append(_styled(task.markers(physics), styles))
+        failed.append([name for leg in task.failed_legs() for name in parts[leg]])
+    looks = [dict(zip(("shape", "radius", "colour"), style[:3], strict=True)) for style in styles]
+    return looks, rows if any(rows) else [], failed if any(failed) else []
 
 
 def _styled(marks: Sequence[Marker], styles: dict[tuple, int]) -> list[list]:

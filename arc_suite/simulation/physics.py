@@ -35,6 +35,7 @@ class Physics(dm_mujoco.Physics):
         shown_reward: share of the greatest reward, 0 to 1, that pictures show as the colour of
             the material `glow`; None keeps its own colour.
         marker: returns the debug markers of pictures, given this simulation; None for none.
+        failed_legs: returns the names of the legs that pictures show dark; None for none.
         divergence: how the physics diverged in the latest step, or None.
     """
 
@@ -52,7 +53,7 @@ class Physics(dm_mujoco.Physics):
         super()._reload_from_data(data)
         self._decorated = None
         self._unchanged, self._scratch = {}, None
-        self.shown_reward = self.marker = None
+        self.shown_reward = self.marker = self.failed_legs = None
         self._forks = forks.count
         self._option = self.model.ptr.opt
 
@@ -116,7 +117,7 @@ class Physics(dm_mujoco.Physics):
         """Draw the decorated body in its present pose; other arguments as in dm_control.
 
         With `quality="film"` edges of shadows are finer; with "still" the picture is also drawn at twice the size and
-        averaged. The default is "fast".
+        averaged; "close" has the finest shadows, of views of the body alone. The default is "fast".
 
         Returns:
             (height, width, 3) uint8; with `depth=True`, (height, width) float32, m.
@@ -140,8 +141,9 @@ class Physics(dm_mujoco.Physics):
 
     def _pose(self) -> dict:
         data = self.data.ptr
-        markers = self.marker(self) if self.marker else ()
-        return {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos, "markers": markers}
+        pose = {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos}
+        shown = {"markers": self.marker(self)} if self.marker else {}
+        return pose | shown | ({"failed_legs": self.failed_legs()} if self.failed_legs else {})
 
     def free(self) -> None:
         """Free the simulation and the decorated body."""

@@ -25,14 +25,23 @@ class Quality(NamedTuple):
     Attributes:
         shadows: pixels of the shadow map's sides.
         scale: a picture is drawn so many times as large and averaged.
+        clip: half of the shadow map's width in extents of the scene; ground beyond it is speckled.
     """
 
     shadows: int
     scale: int
+    clip: float = 5.0
 
 
-# For training; for films, whose shadows have finer edges; and for pictures that are kept.
-QUALITIES = {"fast": Quality(2048, 1), "film": Quality(4096, 1), "still": Quality(4096, 2)}
+# For training; for films, whose shadows have finer edges; for pictures that are kept; and for those of the body alone.
+QUALITIES = {
+    "fast": Quality(2048, 1),
+    "film": Quality(4096, 1),
+    "still": Quality(4096, 2),
+    "close": Quality(4096, 2, 1.2),
+}
+
+_LIMP = (0.07, 0.07, 0.08, 1.0)  # colour of a leg whose motors have failed
 
 
 class Decorated(dm_mujoco.Physics):
@@ -45,10 +54,13 @@ class Decorated(dm_mujoco.Physics):
     markers: Iterable[Marker] = ()
 
     @classmethod
-    def from_body(cls, body: Body, arena: Arena = FLAT, shadows: int = QUALITIES["fast"].shadows) -> "Decorated":
-        """Compile the decorated body in an arena; `shadows` are pixels of the shadow map's sides."""
+    def from_body(cls, body: Body, arena: Arena = FLAT, quality: Quality = QUALITIES["fast"]) -> "Decorated":
+        """Compile the decorated body in an arena, for pictures of a quality."""
         decorated = cls.from_xml_string(models.assemble(body, arena, decorated=True).to_xml_string())
-        decorated.model.vis.quality.shadowsize = shadows
+        decorated.model.vis.quality.shadowsize = quality.shadows
+        decorated.model.vis.map.shadowclip = quality.clip
+        decorated._legs = _legs(body, decorated.model.ptr)
+        decorated._colours = decorated.model.geom_rgba.copy()
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
         buffer = decorated.model.vis.global_
         buffer.offwidth = buffer.offheight = 1  # grows with the size of pictures
@@ -60,6 +72,7 @@ class Decorated(dm_mujoco.Physics):
         share: float | None = None,
         mocap_pos: np.ndarray | None = None,
         markers: Iterable[Marker] = (),
+        failed_legs: Iterable[str] = (),
     ) -> None:
         """Take a pose and show a reward.
 
@@ -69,6 +82,7 @@ class Decorated(dm_mujoco.Physics):
                 keeps its own colour.
             mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
             markers: debug markers to show.
+            failed_legs: names of legs to show dark.
         """
         model, data, self.markers = self.model.ptr, self.data.ptr, markers
         data.qpos[:] = qpos
@@ -77,6 +91,14 @@ class Decorated(dm_mujoco.Physics):
         for update in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_camlight):
             update(model, data)
         model.material("glow").rgba = self._glow if share is None else visuals.reward_colour(share)
+        self.darken(failed_legs)
+
+    def darken(self, failed_legs: Iterable[str]) -> None:
+        """Show legs dark, given their names, and all others as they are."""
+        colours = self.model.geom_rgba
+        colours[:] = self._colours
+        for name in failed_legs:
+            colours[self._legs[name]] = _LIMP  # goes before that of the material
 
     def render(self, height, width, camera_id, **kwargs):
         """Draw the pose; arguments as in dm_control."""
@@ -105,7 +127,16 @@ def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeo
     geom, kind = geom or mujoco.MjvGeom(), _SHAPES[marker.shape]
     mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), np.array(marker.colour, np.float32))
     mujoco.mjv_connector(geom, kind, marker.radius, marker.start, marker.end)
+    if marker.shape == "arrow":
+        geom.size[2] *= 2.0  # MuJoCo draws an arrow half as long as a connector is
     return geom
+
+
+def _legs(body: Body, model: mujoco.MjModel) -> dict[str, np.ndarray]:
+    """The geoms of a decorated model (geoms,), booleans, that belong to each leg."""
+    owners = [model.body(index).name for index in model.geom_bodyid]
+    parts = {leg.name: [leg.full_name(part) for part in (*leg.links, leg.foot)] for leg in body.legs}
+    return {name: np.isin(owners, own) for name, own in parts.items()}
 
 
 # Shared by all pictures of the same body; used in OpenGL's thread alone.
@@ -122,6 +153,7 @@ def picture(
     share: float | None = None,
     mocap_pos: np.ndarray | None = None,
     markers: Iterable[Marker] = (),
+    failed_legs: Iterable[str] = (),
     quality: str = "fast",
     **kwargs,
 ) -> np.ndarray:
@@ -137,6 +169,7 @@ def picture(
         share: of the greatest reward, 0 to 1, shown as the colour of the material `glow`; None keeps its own.
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
+        failed_legs: names of legs to show dark.
         quality: of `QUALITIES`; pictures of depth or segments, and the largest ones, are not averaged.
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
@@ -153,9 +186,9 @@ def picture(
     scale = 1 if large or kwargs.get("depth") or kwargs.get("segmentation") else drawing.scale
 
     def draw():
-        decorated = _shared(body, arena, drawing.shadows)
+        decorated = _shared(body, arena, drawing)
         check_camera(decorated.model.ptr, camera_id)
-        decorated.pose(qpos, share, mocap_pos, markers)
+        decorated.pose(qpos, share, mocap_pos, markers, failed_legs)
         return decorated.render(scale * height, scale * width, camera_id, **kwargs)
 
     drawn = opengl.call(draw)

@@ -36,7 +36,9 @@ COST_LIMIT = 0.6  # a third of it is what standing costs, twice as much uniform 
 # Walk's weights of rates in SI units, as Queen has them in units of her own.
 RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
 
-_OVER = 0.5  # height of the command's arrows over the torso, h
+_AHEAD = 0.8  # distance from the torso to where the command's arrows begin, R
+_SHAFT = 0.06  # radius of the arrows, R
+_SAMPLES = np.linspace(0.0, 1.0, 9)  # of an arrow, which the ground must not cover
 _GOING, _TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colours
 
 
@@ -362,19 +364,30 @@ class CommandTask(Task):
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
     def markers(self, memory: Memory, readings: Sensed) -> list[Marker]:
-        """Return arrows over the torso: the desired velocity, and the sideways velocity of a point R ahead.
+        """Return arrows on the ground ahead of the torso: the desired velocity, and from its tip the turning.
 
-        The latter shows turning. At the target velocity an arrow is R long.
+        The latter is the sideways velocity of a point R ahead. At the target velocity an arrow is R long.
         """
         unit, (x, y, heading) = self.context.reach, memory.core.place
         forward, left, turn = (unit * share for share in memory.core.desired)
-        middle = np.array((x, y, readings.torso_position[2] + _OVER * self.context.height))
-        ahead = np.array((math.cos(heading), math.sin(heading), 0.0))
-        aside = np.array((-ahead[1], ahead[0], 0.0))
-        arrows = (middle, forward * ahead + left * aside, _GOING), (middle + unit * ahead, turn * aside, _TURNING)
-        arrows = [Marker("arrow", foot, foot + way, 0.06 * unit, colour) for foot, way, colour in arrows if way.any()]
-        base = Marker("cylinder", middle, middle + (0.0, 0.0, 0.06 * unit), 0.1 * unit, _GOING)
-        return [base, *arrows, *self.command.markers(self.context, memory.command)]
+        ahead = np.array((math.cos(heading), math.sin(heading)))
+        aside = np.array((-ahead[1], ahead[0]))
+        hub = np.array((x, y)) + _AHEAD * unit * ahead
+        tip = hub + forward * ahead + left * aside
+        ways = (hub, tip, _GOING), (tip, tip + turn * aside, _TURNING)
+        arrows = [self._arrow(foot, end, colour) for foot, end, colour in ways if (foot != end).any()]
+        base = np.array((*hub, self.scene.arena.height(*hub)))
+        disc = Marker("cylinder", base, base + (0.0, 0.0, _SHAFT * unit), 2.0 * _SHAFT * unit, _GOING)
+        return [disc, *arrows, *self.command.markers(self.context, memory.command)]
+
+    def _arrow(self, foot: np.ndarray, end: np.ndarray, colour) -> Marker:
+        """An arrow on the ground between two points (2,); its axis clears what is higher than both ends."""
+        points = foot + _SAMPLES[:, None] * (end - foot)
+        heights = self.scene.arena.height(*points.T)
+        straight = heights[0] + _SAMPLES * (heights[-1] - heights[0])
+        lifted = straight + (heights - straight).max() + _SHAFT * self.context.reach
+        start, tip = (np.array((*points[i], lifted[i])) for i in (0, -1))
+        return Marker("arrow", start, tip, _SHAFT * self.context.reach, colour)
 
 
 def _place(readings: Sensed):

@@ -280,8 +280,12 @@ class Task(ABC):
         return {}
 
     def markers(self, memory, readings: Readings) -> list[Marker]:
-        """Return the markers of the command in pictures of one environment; no leading axes."""
+        """Return the markers of command and kicks in pictures of one environment; no leading axes."""
         return []
+
+    def failed_legs(self, memory) -> tuple[str, ...]:
+        """Return the names of the legs whose motors have failed, which pictures show dark, of one environment."""
+        return ()
 
     def stream_state(self, memory) -> Any:
         """Return what the next episode of the stream starts from, given the memory at an episode's end."""

@@ -7,7 +7,7 @@ adds kicks, and changes fields of the model. Its memory holds that of the other.
 import dataclasses
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,10 @@ from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
 from arc_suite.tasks.readings import Readings
 
 KICKS, SHORTEST, LONGEST = 25, 40, 121  # of a schedule, and control steps from one to the next
+
+# How pictures show a kick: for how many control steps, in which colour; length by sqrt(g h), radius of the shaft, and
+# distance from the torso's solids, which shells exceed, h.
+SHOWN, _KICKED, _LENGTH, _SHAFT, _APART = 10, (0.95, 0.1, 0.08, 1.0), 1.0, 0.07, 0.3
 
 # What friction and mass multiply.
 _FRICTIONS, _MASSES = ("pair_friction", "geom_friction"), ("body_mass", "body_inertia")
@@ -313,8 +317,35 @@ class Modified(Task):
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
     def markers(self, memory: Memory, readings: Readings) -> list[Marker]:
-        """Return the other task's."""
-        return self.task.markers(memory.task, readings)
+        """Return the other task's, and for `SHOWN` steps a red arrow against the torso for a kick."""
+        return [*self.task.markers(memory.task, readings), *self._kicked(memory.changes, readings)]
+
+    def _kicked(self, changes: Changes, readings: Readings) -> Iterator[Marker]:
+        if not self.changes.kicks:
+            return
+        height, since = self.scene.body.torso.standing_height, int(changes.elapsed[0]) - changes.kick_steps
+        shown = (since >= 0) & (since % changes.kick_steps[-1] < SHOWN)
+        for kick in changes.kicks[shown]:
+            speed = math.hypot(*kick)
+            if speed > 0.0:
+                way = np.array((*kick / speed, 0.0))
+                tip = readings.torso_position - self._rim * way
+                length = _LENGTH * height * speed / math.sqrt(GRAVITY * height)
+                yield Marker("arrow", tip - length * way, tip, _SHAFT * height, _KICKED)
+
+    @functools.cached_property
+    def _rim(self) -> float:
+        """The distance from the torso's middle at which arrows of kicks end, m."""
+        torso = self.scene.body.torso
+        reach = max(math.hypot(*solid.position[:2]) + max(solid.size) for solid in torso.solids)
+        return reach + _APART * torso.standing_height
+
+    def failed_legs(self, memory: Memory) -> tuple[str, ...]:
+        """Return the leg whose motors have failed, once they have."""
+        own, legs = memory.changes, self.scene.body.legs
+        if own.elapsed[0] <= FAILS_FROM:
+            return ()
+        return tuple(leg.name for leg, joints in zip(legs, self.members, strict=True) if own.failing[joints].any())
 
     def phase(self, memory: Memory):
         """Return the other task's phase (...) of the gait, rad."""

@@ -111,17 +111,19 @@ def test_films_keep_the_pace_of_any_body(tmp_path, scale, frames, milliseconds):
     assert milliseconds / 1000 == pytest.approx(6 * control_timestep(body), abs=0.005)
 
 
-def test_a_film_of_frames_between_hundredths_keeps_their_sum(tmp_path):
-    path = tmp_path / "a.gif"
+@pytest.mark.parametrize(("extension", "milliseconds"), [(".gif", 670), (".webp", 666)])
+def test_a_film_keeps_the_sum_of_frames_between_the_units_of_its_format(tmp_path, extension, milliseconds):
+    path = tmp_path / f"a{extension}"
     frames = np.zeros((20, 8, 20, 3), np.uint8)
     frames[range(20), 4, range(20)] = 255
-    films.write_gif(path, frames, 0.0333)
+    films.WRITERS[extension](path, frames, 0.0333)
     with Image.open(path) as film:
         total = 0
         for i in range(film.n_frames):
             film.seek(i)
+            film.load()
             total += film.info["duration"]
-    assert (film.n_frames, total) == (20, 670)
+    assert (film.n_frames, total, film.info["loop"]) == (20, milliseconds, 0)
 
 
 @pytest.mark.slow
@@ -162,9 +164,12 @@ def test_a_take_stays_at_its_end():
             "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
         ),
         (["--camera=", "--output=a.png"], "unknown camera '' (there are: tracking, portrait, profile)"),
-        (["--output=a.jpg"], "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .html)"),
+        (
+            ["--output=a.jpg"],
+            "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .webp, .html)",
+        ),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
-        ([], "no file to write; say --output=FILE.png, .mp4, .gif or .html"),
+        ([], "no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_no_file(tmp_path, arguments, message):

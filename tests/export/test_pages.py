@@ -21,6 +21,7 @@ from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.style import record
+from arc_suite.tasks.modifiers import FAILS_FROM
 
 STEPS = 60
 
@@ -61,14 +62,22 @@ def test_a_page_holds_the_tracks(bundle, tracks):
     np.testing.assert_allclose(np.sum(list(first["terms"].values()), axis=0), track.rewards, atol=1e-5)
     assert first["totals"][-1] == pytest.approx(track.rewards.sum(), abs=1e-5)
     assert first["terms"].keys() == first["colours"].keys() and len(set(first["colours"].values())) == 10
-    assert first["scenery"] == {"level": True, "planes": [0.0], "fields": [], "solids": [], "styles": [], "marks": []}
+    assert first["scenery"] == {
+        "level": True,
+        "planes": [0.0],
+        "fields": [],
+        "solids": [],
+        "styles": [],
+        "marks": [],
+        "failed": [],
+    }
     assert pages.page(tracks) == page
 
 
-def scenery_of(task, settings, steps):
+def scenery_of(task, settings, steps, preset="steered"):
     """The scenery of an episode, and the environment where it ended."""
     environment = arc_suite.load("tick", task, {"random": 0, **settings})
-    track = record(environment, policy("cpg", "tick", "steered"), 3, steps)
+    track = record(environment, policy("cpg", "tick", preset), 3, steps)
     return scenery.scenery(track), environment
 
 
@@ -112,6 +121,17 @@ def test_obstacles_and_goals_come_along():
     for (style, *ends), mark in zip(found["marks"][-1], wanted, strict=True):
         assert found["styles"][style] == {"shape": mark.shape, "radius": mark.radius, "colour": tuple(mark.colour)}
         np.testing.assert_allclose(ends, [*mark.start, *mark.end])
+
+
+def test_kicks_and_failed_legs_come_along():
+    """Of any task: `walk` has no markers of its own."""
+    found, environment = scenery_of("walk", {"kicks": 1.5, "actuator_failure": 2}, 130, "tuned")
+    first = environment.task.memory.changes.kick_steps[0]
+    kicked = [row for row, marks in enumerate(found["marks"], 1) if marks]
+    assert kicked[0] == first and {style["shape"] for style in found["styles"]} == {"arrow"}
+    leg = environment.task.body.legs[2]
+    assert found["failed"][:FAILS_FROM] == [[]] * FAILS_FROM
+    assert found["failed"][FAILS_FROM] == [leg.full_name(part) for part in (*leg.links, leg.foot)]
 
 
 def test_marks_end_where_actions_do_not_repeat_the_episode():
@@ -242,6 +262,20 @@ def test_goals_are_drawn(browser, tmp_path):
         wanted = [ends[:3] for _, *ends in scenery.scenery(track)["marks"][row]]
         np.testing.assert_allclose(sorted(marks), sorted(wanted), atol=1e-5)
     assert said == []
+
+
+@pytest.mark.slow
+@nodes.needs_viewer
+def test_a_limp_leg_is_dark(browser, tmp_path):
+    environment = arc_suite.load("tick", "limp", {"random": 0})
+    track = record(environment, policy("cpg", "tick", "steered"), 0, FAILS_FROM + 5)
+    (tmp_path / "limp.html").write_text(pages.page({"tick": track}), encoding="utf-8")
+    with tabs.opened(browser, tmp_path / "limp.html", "window.viewer", 800, 600) as (tab, _):
+        tab.evaluate("viewer.pause(false)")
+        wanted = scenery.scenery(track)["failed"]
+        for row in (FAILS_FROM - 2, FAILS_FROM + 1, 0):
+            (dark,) = tab.evaluate(f"viewer.seek({track.times[row]}), viewer.dark()")
+            assert dark == wanted[row]
 
 
 @pytest.mark.slow

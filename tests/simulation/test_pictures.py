@@ -11,7 +11,7 @@ from arc_suite.markers import Marker
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.model import compiled
 from arc_suite.simulation.physics import Physics
-from arc_suite.simulation.pictures import QUALITIES, check_camera, picture
+from arc_suite.simulation.pictures import QUALITIES, Decorated, check_camera, picture
 
 BODY = ROBOTS["queen"]
 
@@ -68,6 +68,36 @@ def test_marks_are_seen_and_have_no_depth():
     assert_array_equal(picture(BODY, FLAT, qpos, 60, 80, "tracking"), views[None])
 
 
+def test_an_arrow_ends_at_its_tip():
+    """MuJoCo draws one half as long as a cylinder between the same ends; here they are as long."""
+    qpos, foot, way = compiled(BODY).qpos0, np.array([-1.0, 0.0, 1.2]), np.array([2.0, 0.0, 0.0])
+    plain, widths = picture(BODY, FLAT, qpos, 120, 160, "tracking"), {}
+    for shape in ("arrow", "cylinder"):
+        marker = Marker(shape, foot, foot + way, 0.05, (1.0, 0.0, 0.0, 1.0))
+        drawn = picture(BODY, FLAT, qpos, 120, 160, "tracking", markers=[marker]).astype(int)
+        widths[shape] = np.ptp(np.flatnonzero(((drawn - plain)[..., 0] > 50).any(axis=0)))
+    assert widths["cylinder"] > 15
+    assert abs(widths["arrow"] - widths["cylinder"]) <= 3
+
+
+def test_a_limp_leg_is_dark():
+    qpos = compiled(BODY).qpos0
+    plain, dark = (
+        picture(BODY, FLAT, qpos, 120, 160, "profile", failed_legs=failed_legs).astype(int)
+        for failed_legs in ((), ("r2",))
+    )
+    changed = (plain != dark).any(axis=-1)
+    assert 0.01 < changed.mean() < 0.2
+    assert dark[changed].mean() < 0.5 * plain[changed].mean()
+    assert_array_equal(picture(BODY, FLAT, qpos, 120, 160, "profile"), plain)
+    decorated = Decorated.from_body(BODY)
+    decorated.pose(qpos, failed_legs=("r2",))
+    colours = {name: decorated.named.model.geom_rgba[name] for name in ("r2_foot", "l2_foot")}
+    assert colours["r2_foot"][:3].max() < 0.1 < colours["l2_foot"][:3].min()
+    decorated.pose(qpos)
+    assert decorated.named.model.geom_rgba["r2_foot"][:3].min() > 0.1
+
+
 def test_what_a_caller_adds_to_the_scene_is_drawn_too():
     physics, called = Physics.from_body(BODY), []
     physics.render(60, 80, scene_callback=lambda physics, scene: called.append(scene.ngeom))
@@ -90,12 +120,13 @@ def test_qualities_show_the_same_in_finer_pixels():
     """A still is the mean of a picture of twice its size; pictures of depth are not averaged."""
     physics = Physics.from_body(ROBOTS["tick"])
     physics.forward()
-    fast, film, still = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
+    fast, film, still, close = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
     assert_array_equal(physics.render(90, 120, "portrait"), fast)
     assert (fast != film).any() and abs(fast.astype(int) - film).mean() < 2.0  # edges of shadows alone
     double = physics.render(180, 240, "portrait", quality="film").astype(float)
     mean = (double[::2, ::2] + double[1::2, ::2] + double[::2, 1::2] + double[1::2, 1::2]) / 4.0
     np.testing.assert_allclose(still, mean, atol=0.5)
+    assert (close != still).any() and abs(close.astype(int) - still).mean() < 2.0  # edges of shadows alone
     depths = [physics.render(90, 120, "portrait", depth=True, quality=name) for name in ("film", "still")]
     assert_array_equal(*depths)
     with pytest.raises(ValueError, match="^unknown quality 'fine'"):

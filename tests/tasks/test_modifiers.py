@@ -9,6 +9,7 @@ import re
 
 import gaitless
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 import twins
@@ -485,3 +486,62 @@ def test_the_guide_runs():
     there["environments"].reset(seed=0)
     there["environments"].close()
     assert there["Ice"].modifiers == {"friction": (0.05, 0.2)}
+
+
+def kick_arrows(environment):
+    return [mark for mark in environment.task.markers(environment.physics) if mark.colour[1] < 0.2]
+
+
+def drawn(environment):
+    """The geoms of a picture's scene."""
+    found = []
+    environment.physics.render(24, 32, scene_callback=lambda _, scene: found.extend(scene.geoms[: scene.ngeom]))
+    return found
+
+
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
+    environment = load("tick", task, kicks=1.5)
+    environment.reset()
+    changes = environment.task.memory.changes
+    first, kick = changes.kick_steps[0], changes.kicks[0]
+    shown = []
+    for _ in range(first + modified.SHOWN + 5):
+        environment.step(np.zeros(18))
+        shown.append(kick_arrows(environment))
+        if len(shown) == first:
+            (arrow,), torso = shown[-1], environment.physics.data.qpos[:3].copy()
+            assert arrow.shape == "arrow" and arrow.colour[0] > 0.8
+            way, off = arrow.end - arrow.start, torso - arrow.end
+            assert_allclose(way[:2] / np.hypot(*way[:2]), kick / np.hypot(*kick))
+            assert_allclose(off[:2] / np.hypot(*off[:2]), kick / np.hypot(*kick))  # it points at the torso
+            height = environment.task.body.torso.standing_height
+            assert np.linalg.norm(way) == pytest.approx(height * np.hypot(*kick) / math.sqrt(GRAVITY * height))
+            red = [geom for geom in drawn(environment) if tuple(geom.rgba) == pytest.approx(arrow.colour)]
+            assert [geom.type for geom in red] == [mujoco.mjtGeom.mjGEOM_ARROW]
+    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * modified.SHOWN + [0] * 6
+
+
+def test_a_leg_whose_motors_have_failed_is_dark_in_all_pictures():
+    environment, rows = load("tick", "limp"), VectorEnv("tick", "limp", 2, render_mode="rgb_array", height=60, width=80)
+    environment.reset(seed=4), rows.reset(seed=3)
+    before = environment.physics.render(60, 80, "profile")
+    assert environment.task.failed_legs() == ()
+    for _ in range(modified.FAILS_FROM + 1):
+        environment.step(np.zeros(18)), rows.step(np.zeros((2, 18)))
+    (leg,) = environment.task.failed_legs()
+    failing = environment.task.memory.changes.failing
+    names = [name for name, fails in zip(environment.task.body.joint_names, failing, strict=True) if fails]
+    assert names and all(name.startswith(leg) for name in names)
+    assert not np.array_equal(environment.physics.render(60, 80, "profile"), before)
+    environment.physics.failed_legs, lit = None, environment.physics.render(60, 80)
+    assert not np.array_equal(environment.physics.render(60, 80), lit)
+    assert_array_equal(rows.render([1])[0], lit)
+    rows.close()
+
+
+def test_pictures_of_walk_have_no_markers_and_no_dark_leg():
+    environment = load("tick", "walk")
+    environment.reset()
+    environment.step(np.zeros(18))
+    assert environment.task.markers(environment.physics) == [] and environment.task.failed_legs() == ()

@@ -267,9 +267,13 @@ def test_pictures_show_the_command_as_arrows():
     readings, heading, reach = task.read(environment.physics.data.ptr), memory.core.place[2], task.context.reach
     hub, going, turning = task.markers(memory, readings)
     assert (hub.shape, going.shape, turning.shape) == ("cylinder", "arrow", "arrow")
-    assert_array_equal(hub.start, going.start)
+    assert_array_equal(hub.start[:2], going.start[:2])
+    assert_array_equal(going.end, turning.start)
+    ahead = rotations.headed(hub.start[:2] - readings.torso_position[:2], heading)
+    assert ahead[0] > 0.5 * reach and abs(ahead[1]) < 1e-12  # in front of the torso
+    assert hub.start[2] == 0.0
+    assert_allclose([going.start[2], going.end[2], turning.end[2]], going.radius)  # they lie on the ground
     assert_allclose(rotations.headed((going.end - going.start)[:2], heading), (0.5 * reach, -0.25 * reach))
-    assert_allclose(rotations.headed((turning.start - hub.start)[:2], heading), (reach, 0.0), atol=1e-12)
     assert_allclose(rotations.headed((turning.end - turning.start)[:2], heading), (0.0, 0.5 * reach), atol=1e-12)
     shown = environment.physics.render(60, 80)
     environment.command("command", (0.0, 0.0, 0.0))

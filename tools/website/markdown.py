@@ -40,6 +40,11 @@ def as_html(made: Element) -> str:
     return tostring(made, encoding="unicode", method="html")
 
 
+def film(name: str) -> str:
+    """Return the film of a robot or task on its page, which tools/make_media.py draws."""
+    return f"![{name}](../films/{name}.webp)"
+
+
 def cards(texts: Mapping[str, str]) -> str:
     """Return a grid of cards by their links, whose texts are those of the pages."""
     each = [f":::{{grid-item-card}}\n:link: {link}\n:link-type: doc\n\n{text}\n:::" for link, text in texts.items()]

@@ -8,19 +8,20 @@ from arc_suite.studies.leaderboard import table
 from website import markdown, observations, players, returns
 
 
-def page(robot: str, film: str = "") -> str:
+def page(robot: str, player: str = "") -> str:
     """Return the page of a robot.
 
     Args:
         robot: its name.
-        film: Markdown of a moving picture; empty without one.
+        player: Markdown of a page in which it walks; empty without one.
     """
     setup = Setup.of(robot)
     task, model = setup.prepared()
     return markdown.page(
         f"`{robot}`",
         f"{about(robot)} Ids of Gymnasium, `steer` and so on in place of `walk`: `{setup.env_id}`.",
-        film,
+        markdown.film(robot),
+        player,
         "## Body",
         _body(setup, model),
         "## Joints and actions",

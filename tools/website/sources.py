@@ -35,6 +35,7 @@ def write(folder: Path, walks: bool) -> None:
         _copy(path, folder)
     for name, text in generated(walks):
         _write(folder / "docs" / f"{name}.md", text)
+        _copy_files(text, (ROOT / "docs" / name).parent, folder)
     _write(folder / "index.md", front_page(walks))
     _copy_files(FRONT[0].read_text(encoding="utf-8"), ROOT, folder)
 

@@ -65,6 +65,7 @@ def page(name: str) -> str:
     kind, tasks = TASKS[name], {robot: Setup.of(robot, name).definition for robot in ROBOTS}
     return markdown.page(
         f"`{name}`",
+        markdown.film(name),
         "## What it asks",
         f"{markdown.summary(kind)} [{_title(name)}](../{_EXPLAINED.get(name, name)}.md) explains it.",
         _asks(kind),
