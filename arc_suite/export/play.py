@@ -64,7 +64,7 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         body: any.
         policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
             `policies.policy`.
-        preset: of the demonstrator, such as steered, which None stands for, or surefooted.
+        preset: of the demonstrator: steered, which None stands for, surefooted or reactive.
 
     Raises:
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
@@ -135,7 +135,7 @@ def _law(task: Task, preset: str) -> dict[str, Any]:
     law = Demonstrator(task, preset).law
     if not isinstance(law, Steered):
         raise ValueError(
-            f"preset {preset!r}: a page runs steered or surefooted, which follow a command by joint angles"
+            f"preset {preset!r}: a page runs steered, surefooted or reactive, which follow a command by joint angles"
         )
     return {"kind": "law", "constants": law.constants()}
 
