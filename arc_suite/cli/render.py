@@ -1,4 +1,4 @@
-"""Render a robot that walks: a picture (.png), film (.mp4, .gif, .webp) or page (.html).
+"""Render a walk as a picture (.png), film (.mp4, .gif, .webp) or page (.html).
 
   arc-suite render --robot queen --policy cpg --output queen.png
   arc-suite render --robot all --output robots.mp4
