@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ STYLES = {
     "finetune_bodies": ("#117733", "p"),
 }
 _OTHERS = (("#CC6677", "<"), ("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages, in order
-_DASHES = ("-", "--", "-.", ":")  # of runs of one algorithm with other hyperparameters or data
+_DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 4)))  # of runs of one algorithm that differ otherwise
 _GREY = "#6E6E6E"
 _GAP = 0.052  # between the labels of two levels, as a share of the axis
 
@@ -112,7 +112,9 @@ def study(
     for axis in axes[:, 0]:
         axis.set_ylabel("return of an evaluation")
     handles = {label: line for axis in axes.flat for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend(handles.values(), handles, loc="outside upper left", ncols=min(len(handles), 6), frameon=False)
+    figure.legend(
+        handles.values(), handles, loc="outside upper left", ncols=min(len(handles), 3 * columns), frameon=False
+    )
     return figure
 
 
@@ -122,7 +124,7 @@ def _styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     return {name: STYLES[name] if name in STYLES else next(others) for name in dict.fromkeys(names)}
 
 
-def _dashes(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, str]:
+def _dashes(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, Any]:
     """Return the pattern of the lines of each kind: kinds of one algorithm differ."""
     kinds = {kind: each.algorithm for every in groups.values() for kind, each in every.items()}
     counts = {name: itertools.cycle(_DASHES) for name in kinds.values()}
