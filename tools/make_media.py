@@ -18,6 +18,7 @@ import arc_suite
 from arc_suite import checks, evaluation, files, policies, rotations
 from arc_suite.cli import program
 from arc_suite.cpg import suited_preset
+from arc_suite.envs.setup import Setup
 from arc_suite.export import films
 from arc_suite.models.outline import outline
 
@@ -168,10 +169,10 @@ def draw(media: Media) -> None:
         if not media.steps:  # where a row is not full, it is transparent
             views[-1] = [np.dstack([picture, np.full(picture.shape[:2], 255, np.uint8)]) for picture in views[-1]]
     frames = [films.grid(list(row), media.columns) for row in zip(*views, strict=True)]
-    path = ROOT / media.path
+    path, view = ROOT / media.path, next(iter(media.views.values()))
     path.parent.mkdir(exist_ok=True)
     with files.writing(path) as temporary:
-        films.WRITERS[path.suffix](temporary, frames, opened(next(iter(media.views.values()))).control_timestep())
+        films.WRITERS[path.suffix](temporary, frames, Setup.of(view.robot, view.task).definition.scene.control_timestep)
     size = path.stat().st_size
     if size > media.limit:
         raise ValueError(f"{media.path}: {size} bytes, at most {media.limit}")

@@ -10,6 +10,7 @@ from arc_suite import models
 from arc_suite.export.parts import KINDS
 from arc_suite.markers import Marker
 from arc_suite.style.tracks import Track
+from arc_suite.tasks import Task
 
 _MARGIN = 12.0  # standing heights of ground around the path
 _SAME = 1e-3  # of the standing height, by which an episode that is repeated may differ from the recorded one
@@ -97,7 +98,10 @@ def _solid(model: mujoco.MjModel, geom: int, kind: str, place) -> dict[str, Any]
 def _marks(environment, track: Track) -> tuple[list, list, list]:
     """The styles of marks, and of every row marks and parts of failed legs, of an environment at a track's start."""
     physics, task, styles, rows, failed = environment.physics, environment.task, {}, [], []
-    parts = {leg.name: [leg.full_name(part) for part in (*leg.links, leg.foot)] for leg in track.body.legs}
+    shown = type(task.definition)
+    if shown.markers is Task.markers and shown.failed_legs is Task.failed_legs:
+        return [], [], []  # nothing is shown: nothing to replay for
+    parts = {leg.name: leg.part_names for leg in track.body.legs}
     near = _SAME * track.body.torso.standing_height
     for action, position in zip(track.actions, track.positions, strict=True):
         environment.step(action)

@@ -3,6 +3,7 @@
 `onnx_file` writes a graph as a file, and pages to play in compute it in JavaScript; see web/graph.js.
 """
 
+import itertools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -58,10 +59,9 @@ class Graph:
         return self
 
     def _constant(self, value) -> str:
-        array = np.asarray(value)
-        array = np.ascontiguousarray(array, np.int64 if array.dtype.kind == "i" else np.float32).reshape(array.shape)
         name = f"constant_{len(self.constants)}"
-        self.constants[name] = array
+        kind = np.int64 if np.asarray(value).dtype.kind == "i" else np.float32
+        self.constants[name] = np.array(value, kind, order="C")
         return name
 
 
@@ -70,10 +70,9 @@ def of(policy: Network | Universal) -> Graph:
     graph = Graph()
     if isinstance(policy, Universal):
         _add_universal(graph, policy)
-        return graph.finished()
-    present = INPUT
-    for layer in policy.layers:
-        for operator, arrays, attributes in _operators(layer):
+    else:
+        present = INPUT
+        for operator, arrays, attributes in itertools.chain(*map(_operators, policy.layers)):
             present = graph(operator, present, *arrays, **attributes)
     return graph.finished()
 
@@ -118,9 +117,9 @@ def _add_universal(graph: Graph, policy: Universal) -> None:
         return
     # Torques of motors that hold the positions with the body's own gains.
     stiffness, damping = policy.gains
-    _, _, *joints = policy.tokens.parts(policy.tokens.places[0])[:4]
-    columns = (each[np.flatnonzero(there)] for each in joints)
-    angles, speeds = (graph("Gather", INPUT, each, axis=1) for each in columns)
+    _, _, angles, speeds, *_ = policy.tokens.parts(policy.tokens.places[0])
+    own = np.flatnonzero(there)
+    angles, speeds = (graph("Gather", INPUT, columns[own], axis=1) for columns in (angles, speeds))
     pulled = graph("Mul", graph("Sub", graph("Mul", positions, policy.reach), angles), stiffness)
     graph("Clip", graph("Sub", pulled, graph("Mul", speeds, damping)), -1.0, 1.0)
 

@@ -295,6 +295,11 @@ class Leg(_Spec):
         """Return the rigid parts, from the torso outwards."""
         return (*self.links, self.foot)
 
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Return the names of the parts' bodies in the model, from the torso outwards."""
+        return tuple(map(self.full_name, self.parts))
+
     def full_name(self, part: Link | Foot | Joint) -> str:
         """Return the name of a link's or foot's body, or of a joint and its motor, in the model."""
         return f"{self.name}_{part.name}"
@@ -469,7 +474,7 @@ class Body(_Spec):
     @property
     def part_names(self) -> tuple[str, ...]:
         """Return the names of the rigid bodies in the order of the contact forces, the torso first."""
-        return ("torso", *(leg.full_name(part) for leg in self.legs for part in leg.parts))
+        return ("torso", *(name for leg in self.legs for name in leg.part_names))
 
     @property
     def foot_names(self) -> tuple[str, ...]:

@@ -141,9 +141,13 @@ class Physics(dm_mujoco.Physics):
 
     def _pose(self) -> dict:
         data = self.data.ptr
-        pose = {"qpos": data.qpos, "share": self.shown_reward, "mocap_pos": data.mocap_pos}
-        shown = {"markers": self.marker(self)} if self.marker else {}
-        return pose | shown | ({"failed_legs": self.failed_legs()} if self.failed_legs else {})
+        return {
+            "qpos": data.qpos,
+            "share": self.shown_reward,
+            "mocap_pos": data.mocap_pos,
+            "markers": self.marker(self) if self.marker else (),
+            "failed_legs": self.failed_legs() if self.failed_legs else (),
+        }
 
     def free(self) -> None:
         """Free the simulation and the decorated body."""

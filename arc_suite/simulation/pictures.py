@@ -135,8 +135,7 @@ def geom_of(marker: Marker, geom: mujoco.MjvGeom | None = None) -> mujoco.MjvGeo
 def _legs(body: Body, model: mujoco.MjModel) -> dict[str, np.ndarray]:
     """The geoms of a decorated model (geoms,), booleans, that belong to each leg."""
     owners = [model.body(index).name for index in model.geom_bodyid]
-    parts = {leg.name: [leg.full_name(part) for part in (*leg.links, leg.foot)] for leg in body.legs}
-    return {name: np.isin(owners, own) for name, own in parts.items()}
+    return {leg.name: np.isin(owners, leg.part_names) for leg in body.legs}
 
 
 # Shared by all pictures of the same body; used in OpenGL's thread alone.
