@@ -94,8 +94,8 @@ class Command(ABC):
         return memory._replace(live=value)
 
     def terms(self, memory, upright) -> dict:
-        """Return the terms that it adds to the reward, given the cosine (...) of the torso's tilt."""
-        return {}
+        """Return the bonus for progress, given the cosine (...) of the torso's tilt, and others of its own."""
+        return {"progress": _bounded(memory.gained) * upright}
 
     def observe(self, context: Context, memory) -> dict:
         """Return the blocks that it adds to the observation."""
@@ -135,17 +135,20 @@ class Scheduled(NamedTuple):
         ends: (..., COMMANDS) steps at which the commands of the schedule end.
         schedule: (..., COMMANDS, 3) commands.
         live: (..., 3) set from outside, in place of the schedule where it is not NaN.
+        gained: (...) share of the command that the mean motion reaches in its direction; 0 at a stop.
     """
 
     ends: np.ndarray
     schedule: np.ndarray
     live: np.ndarray
+    gained: np.ndarray
 
 
 def draw_schedule(random: np.random.RandomState) -> Scheduled:
     """Draw how long each command is held, then the commands."""
     ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
-    return Scheduled(ends, np.array([draw_command(random) for _ in range(COMMANDS)]), np.full(3, np.nan))
+    schedule = np.array([draw_command(random) for _ in range(COMMANDS)])
+    return Scheduled(ends, schedule, np.full(3, np.nan), np.float64(0.0))
 
 
 def draw_command(random: np.random.RandomState) -> np.ndarray:
@@ -165,6 +168,21 @@ def tracking(desired, motion):
     return course * terms.triangle(error[..., 2], BAND * numpy.maximum(abs(desired[..., 2]), 0.5))
 
 
+def along(desired, motion):
+    """Return the projection of a motion (..., 3) onto a velocity (..., 3), as a share (...) of it; 0 where it is 0.
+
+    Unlike `tracking` it rises from standing still, so a learner finds its first steps by it.
+    """
+    size, reached = _product(desired, desired), _product(desired, motion)
+    return reached / size.__array_namespace__().where(size > 0.0, size, 1.0)
+
+
+def _product(one, other):
+    """The scalar product (...) of vectors (..., 3), summed in one order for any leading axes."""
+    products = one * other
+    return products[..., 0] + products[..., 1] + products[..., 2]
+
+
 @dataclasses.dataclass(frozen=True)
 class Schedule(Command):
     """Commands that are drawn for the episode, each held for some seconds; stops are among them."""
@@ -181,8 +199,9 @@ class Schedule(Command):
         return numpy.where(numpy.isnan(memory.live), scheduled, memory.live)
 
     def follow(self, context: Context, memory: Scheduled, steps, before, place, motion) -> Followed:
-        """Return the command after a control step."""
+        """Return the command after a control step, and how far the motion reaches in its direction."""
         desired = self.desired(context, memory, steps, place)
+        memory = memory._replace(gained=along(desired, motion))
         return Followed(memory, desired, tracking(desired, motion))
 
 
@@ -208,10 +227,6 @@ class AlongLane(Command):
         gained = _gained(context, memory.gained, displacement)
         memory = Live(memory.live, memory.distance + displacement, gained)
         return Followed(memory, desired, tracking(desired, motion))
-
-    def terms(self, memory: Live, upright) -> dict:
-        """Return the bonus for progress along the lane."""
-        return {"progress": _bounded(memory.gained) * upright}
 
     def progress(self, context: Context, memory: Live, judged) -> dict:
         """Return the distance along the lane as a share of that at the target velocity."""
@@ -315,7 +330,7 @@ class ToGoal(Command):
 
     def terms(self, memory: Chain, upright) -> dict:
         """Return the bonuses for progress to the goal and for reaching it."""
-        return {"progress": _bounded(memory.gained) * upright, "goal": memory.arrived * 1.0}
+        return {**super().terms(memory, upright), "goal": memory.arrived * 1.0}
 
     def observe(self, context: Context, memory: Chain) -> dict:
         """Return cosine and sine of the goal's bearing, and its distance."""

@@ -128,7 +128,7 @@ class CommandTask(Task):
     command: ClassVar[Command]
     ground: ClassVar[Ground] = Level()
     health: ClassVar[Upright] = Upright()
-    bonuses: ClassVar[Mapping[str, float]] = {"tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
+    bonuses: ClassVar[Mapping[str, float]] = {"progress": 0.5, "tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
     yaw: ClassVar[float] = math.pi
 
     def __init_subclass__(cls, **kwargs):

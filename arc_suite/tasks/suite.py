@@ -7,9 +7,6 @@ from arc_suite.tasks.ground import Lanes, PillarField
 
 _LEVEL = ("clock", "clearances", "context", "_torques")  # what follows from the body on level ground
 
-# Progress pays for a lane that is walked in part.
-_LANE = {"progress": 0.5, **CommandTask.bonuses}
-
 
 class Steer(CommandTask):
     """Following a velocity forward, sideways and in turning, stops included."""
@@ -32,7 +29,7 @@ class Limp(CommandTask):
 class Rough(CommandTask):
     """Walking over rough ground."""
 
-    name, yaw, bonuses = "rough", 0.3, _LANE
+    name, yaw = "rough", 0.3
     command, ground = AlongLane(), Lanes(("rough",))
     demonstrators = ("balanced", "surefooted")
 
@@ -40,7 +37,7 @@ class Rough(CommandTask):
 class Slopes(CommandTask):
     """Walking up and down slopes."""
 
-    name, yaw, bonuses = "slopes", 0.3, _LANE
+    name, yaw = "slopes", 0.3
     command, ground = AlongLane(), Lanes(("slopes",))
     demonstrators = ("balanced", "surefooted")
 
@@ -48,7 +45,7 @@ class Slopes(CommandTask):
 class Stairs(CommandTask):
     """Walking up and down flights of stairs."""
 
-    name, yaw, bonuses = "stairs", 0.3, _LANE
+    name, yaw = "stairs", 0.3
     command, ground = AlongLane(), Lanes(("stairs",), copies=(4, 1))
     demonstrators = ("balanced", "surefooted")
 
@@ -56,7 +53,7 @@ class Stairs(CommandTask):
 class Gaps(CommandTask):
     """Walking over trenches."""
 
-    name, yaw, bonuses = "gaps", 0.3, _LANE
+    name, yaw = "gaps", 0.3
     command, ground = AlongLane(), Lanes(("gaps",), copies=(4, 1))
     demonstrators = ("sighted",)
 
@@ -64,7 +61,7 @@ class Gaps(CommandTask):
 class Course(CommandTask):
     """Walking over one of the four kinds of ground, drawn for every episode."""
 
-    name, yaw, bonuses = "course", 0.3, _LANE
+    name, yaw = "course", 0.3
     command, ground = AlongLane(), Lanes(terrain.KINDS, copies=(2, 1))
     demonstrators = ("balanced", "surefooted")
 
