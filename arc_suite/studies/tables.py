@@ -232,6 +232,21 @@ STUDIES = {
             for seed, robot, (part, changes) in itertools.product(range(2), ("tick", "leaper"), _PARTS.items())
         ),
     ),
+    # The paper's two ideas on a learner that learns without them; the runs without are those of `parallel`.
+    "parallel-prior": Study(
+        "SAC in parallel environments with prior data of 100 episodes, or short phases, 60,000 steps",
+        tuple(
+            run(robot, "sac_parallel", 60_000, hyperparameters=changes, prior=prior, label=f"sac_parallel-{part}")
+            for robot, (part, changes, prior) in itertools.product(
+                ("tick", "leaper"),
+                (
+                    ("medium", {"prior": "symmetric_sampling"}, Prior("medium", 100)),
+                    ("refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
+                    ("phases", _SHORT, None),
+                ),
+            )
+        ),
+    ),
     "beyond": Study(
         "beyond the paper: imitation of the demonstrators by DAgger, and PPO from nothing",
         (

@@ -95,6 +95,37 @@ def test_tracking_is_the_product_of_course_and_turning(wanted, motion, tracking)
     assert_allclose(command.tracking(np.array(wanted), np.array(motion)), tracking, atol=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "motion", "along"),
+    [
+        ((1.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.1),  # where tracking is still 0
+        ((1.0, 0.0, 0.0), (-0.1, 0.5, 0.5), -0.1),
+        ((0.2, 0.0, 0.0), (0.2, 0.0, 0.0), 1.0),
+        ((0.6, 0.0, 0.4), (0.3, 0.0, 0.2), 0.5),
+        ((0.6, 0.0, 0.4), (-0.4, 0.3, 0.6), 0.0),
+        ((0.0, 0.0, 0.0), (0.3, 0.2, 0.1), 0.0),
+    ],
+)
+def test_progress_is_the_projection_of_the_motion_onto_the_command(wanted, motion, along):
+    assert_allclose(command.along(np.array(wanted), np.array(motion)), along, atol=1e-12)
+
+
+def test_progress_is_paid_from_the_first_step_and_at_most_in_full():
+    environment = arc_suite.load("tick", "steer", {"random": 0})
+    environment.reset()
+    environment.command("command", (0.6, 0.0, 0.4))
+    task, memory = environment.task.definition, environment.task.memory
+    readings = task.read(environment.physics.data.ptr)
+
+    def paid(share):
+        """What a step without displacement earns whose mean motion is a share of the command."""
+        motion = share * memory.core.desired / (1.0 - task.context.leak)
+        after = task.after(memory._replace(core=memory.core._replace(motion=motion)), readings)
+        return task.terms(after, readings)["progress"] / after.health.upright
+
+    assert_allclose([paid(share) for share in (-0.5, 0.0, 0.1, 2.0)], [-0.5, 0.0, 0.1, 1.0], atol=1e-12)
+
+
 def test_a_live_command_takes_the_place_of_the_schedule_until_the_next_episode():
     environment = arc_suite.load("leaper", "steer", {"random": 1, "time_limit": 1.0})
     environment.reset()
