@@ -16,6 +16,7 @@ from arc_suite.export.root_motion import Motion
 from arc_suite.robots.spec import Body
 
 FPS = 60
+_PRESET = "steered"  # its integral brings the speeds of clips to those of their commands
 _RATE = 30.0  # Hz: a clip lasts a whole number of frames at this rate, and so at 60 Hz
 
 
@@ -76,7 +77,8 @@ def clips(
         setup: body and task.
         names: of `CLIPS`.
         policy: see `policies.policy`.
-        preset: of the policy; None for the one that suits the task and the body.
+        preset: of the policy; None for `steered` on level ground with a command, elsewhere for the one that suits the
+            task and the body.
         fps: frames a second.
         progress: wraps the recordings, such as `tqdm`.
         straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
@@ -95,6 +97,8 @@ def clips(
         checks.name(name, CLIPS, "clip")
     if len(set(names)) < len(names):
         raise ValueError(f"clips: expected each once, got {', '.join(names)}")
+    if policy == "cpg" and preset is None and "command" in setup.definition.blocks and not setup.kind.own_arena:
+        preset = _PRESET
     recorder, left_out = Recorder(setup, policy, preset), {}
     made = drafts(recorder, names, progress, left_out, straight, plant)
     told = {name: f"{setup.body.name}, clip {name}" for name in names if name in left_out}

@@ -57,7 +57,9 @@ LEFT = ("l1", "l2", "l3", "fl", "rl")
     ("body", "task", "settings", "preset"),
     [
         (ROBOTS["queen"], "walk", {}, "refined"),
-        (ROBOTS["queen"], "shoved", {}, "steered"),
+        (ROBOTS["queen"], "shoved", {}, "reactive"),
+        (ROBOTS["queen"], "roam", {}, "surefooted"),
+        (generator.generate(4, 2), "steer", {}, "reactive"),
         (ROBOTS["tick"], "rough", {}, "surefooted"),
         (ROBOTS["tick"], "rough", {"exclude_blocks": "command"}, "refined"),
         (ROBOTS["leaper"], "rough", {}, "balanced"),
