@@ -143,28 +143,43 @@ def text(studies: Path) -> str:
         order = tuple(TRACKS).index(checks.name(track, TRACKS, "track"))
         if scores := read(path):
             whole = len({(each.robot, each.task) for each in scores}) == len(PLACES)
-            middle = evaluation.interquartile_mean([each.score for each in scores])
-            lines.append((order, not whole, -middle, track, learner, *_cells(scores)))
+            lines.append((order, not whole, -_middle(scores), track, learner, *_cells(scores)))
     places = [" ".join(each) for each in PLACES]
     heads = ["track", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
     return table(heads, [line[3:] for line in sorted(lines)])
 
 
+def _by_place(scores: Sequence[Score]) -> list[list[Score]]:
+    """Scores of each of `PLACES`, by seed; empty where there are none."""
+    groups = [[each for each in scores if (each.robot, each.task) == where] for where in PLACES]
+    return [sorted(group, key=lambda each: each.seed) for group in groups]
+
+
+def _even(scores: Sequence[Score]) -> list[list[Score]]:
+    """Scores of the places that have any: of as many seeds, the first ones, so that all places weigh the same."""
+    groups = list(filter(None, _by_place(scores)))
+    return [group[: min(map(len, groups))] for group in groups]
+
+
+def _middle(scores: Sequence[Score]) -> float:
+    """The interquartile mean of the scores."""
+    return evaluation.interquartile_mean([each.score for group in _even(scores) for each in group])
+
+
 def _cells(scores: Sequence[Score]) -> list[str]:
     """Cells of a learner; the total is that of all places alone, its interval that over two seeds or more."""
-    groups = [[each for each in scores if (each.robot, each.task) == where] for where in PLACES]
-    seeds = [len(group) for group in groups if group]
-    few, many = min(seeds), max(seeds)
-    strata = [[each.score for each in group] for group in groups]
-    total = f"{sum(map(bool, groups))} of {len(PLACES)} places"
+    groups, even = _by_place(scores), _even(scores)
+    few, many = len(even[0]), max(map(len, groups))
+    total = f"{len(even)} of {len(PLACES)} places"
     if all(groups):
-        middle, (low, high) = evaluation.iqm_and_interval(strata)
+        middle, (low, high) = evaluation.iqm_and_interval([[each.score for each in group] for group in even])
         total = f"{middle:.3f}" + (f" [{low:.3f}, {high:.3f}]" if few > 1 else "")
-    minutes = float(np.median([each.minutes for each in scores]))
+    counted = [each for group in even for each in group]
+    minutes = float(np.median([each.minutes for each in counted]))
     shown = [
         f"{few}" if few == many else f"{few} to {many}",
         total,
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
-        *(f"{results.size(np.array([getattr(each, name) for each in scores])):.3f}" for name in STYLE),
+        *(f"{results.size(np.array([getattr(each, name) for each in counted])):.3f}" for name in STYLE),
     ]
-    return shown + [f"{np.mean(stratum):z.2f}" if stratum else NOT_RUN for stratum in strata]
+    return shown + [f"{np.mean([each.score for each in group]):z.2f}" if group else NOT_RUN for group in groups]

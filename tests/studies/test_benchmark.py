@@ -132,6 +132,18 @@ def test_the_table_says_what_was_not_run(tmp_path):
     assert row(page, "part")[7:] == ["not run", "not run", "0.20", *["not run"] * 7]
 
 
+def test_places_with_more_seeds_weigh_no_more(tmp_path):
+    whole = [score(place, 0, 0.1 * index) for index, place in enumerate(PLACES)]
+    more = [score(PLACES[-1], seed, 0.0, np.inf) for seed in (2, 1)]
+    for name, scores in (("top-once", whole), ("top-more", [*more, *whole])):
+        (tmp_path / name).mkdir()
+        benchmark.write(tmp_path / name, scores)
+    once, uneven = (row(benchmark.text(tmp_path), name) for name in ("once", "more"))
+    assert uneven[3:-1] == once[3:-1]
+    assert (once[2], uneven[2]) == ("1", "1 to 3")
+    assert (once[-1], uneven[-1]) == ("0.90", "0.30"), "a place holds the mean over all its seeds"
+
+
 def test_damaged_scores_are_one_line(tmp_path):
     (tmp_path / "top-mine").mkdir()
     (tmp_path / "top-mine" / benchmark.SCORES).write_text("robot,task\n")
