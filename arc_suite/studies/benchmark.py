@@ -156,7 +156,7 @@ def _by_place(scores: Sequence[Score]) -> list[list[Score]]:
 
 
 def _even(scores: Sequence[Score]) -> list[list[Score]]:
-    """Scores of the places that have any: of as many seeds, the first ones, so that all places weigh the same."""
+    """Scores of each place that has any, of the same number of seeds, so that all places weigh the same."""
     groups = list(filter(None, _by_place(scores)))
     return [group[: min(map(len, groups))] for group in groups]
 

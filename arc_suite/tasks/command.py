@@ -169,7 +169,7 @@ def tracking(desired, motion):
 
 
 def along(desired, motion):
-    """Return the projection of a motion (..., 3) onto a velocity (..., 3), as a share (...) of it; 0 where it is 0.
+    """Return the projection of a motion (..., 3) onto a velocity (..., 3), as a share (...) of it; 0 at a stop.
 
     Unlike `tracking` it rises from standing still, so a learner finds its first steps by it.
     """
