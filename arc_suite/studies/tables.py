@@ -216,6 +216,13 @@ STUDIES = {
             run("queen", "ppo", 2_000_000, task="steer"),
         ),
     ),
+    "from-nothing": Study(
+        "PPO from nothing in the other tasks, Tick; rough ground, slopes, stairs and pillars three million steps",
+        tuple(
+            run("tick", "ppo", 3_000_000 if task in ("rough", "slopes", "stairs", "navigate") else 1_000_000, task=task)
+            for task in ("steer", "shoved", "limp", "roam", "gaps", "course", "navigate", "rough", "stairs", "slopes")
+        ),
+    ),
     # Four to six minutes of a core a run.
     "parallel": Study(
         "SAC from nothing in parallel environments, 100,000 steps",
