@@ -130,6 +130,7 @@ class CommandTask(Task):
     health: ClassVar[Upright] = Upright()
     bonuses: ClassVar[Mapping[str, float]] = {"progress": 0.5, "tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
     yaw: ClassVar[float] = math.pi
+    demonstrators: ClassVar[tuple[str, ...]] = ("reactive",)
 
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)

@@ -12,21 +12,18 @@ class Steer(CommandTask):
     """Following a velocity forward, sideways and in turning, stops included."""
 
     name, command, from_body = "steer", Schedule(), _LEVEL
-    demonstrators = ("reactive",)
 
 
 class Shoved(CommandTask):
     """Following a velocity command under kicks."""
 
     name, command, modifiers, from_body = "shoved", Schedule(), {"kicks": 1.5}, _LEVEL
-    demonstrators = ("reactive",)
 
 
 class Limp(CommandTask):
     """Following a velocity command with a leg, drawn for each episode, whose motors fail."""
 
     name, command, modifiers, from_body = "limp", Schedule(), {"actuator_failure": True}, _LEVEL
-    demonstrators = ("reactive",)
 
 
 class Rough(CommandTask):
