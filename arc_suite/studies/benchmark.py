@@ -142,8 +142,9 @@ def text(studies: Path) -> str:
         track, _, learner = path.parent.name.partition("-")
         order = tuple(TRACKS).index(checks.name(track, TRACKS, "track"))
         if scores := read(path):
-            whole = len({(each.robot, each.task) for each in scores}) == len(PLACES)
-            lines.append((order, not whole, -_middle(scores), track, learner, *_cells(scores)))
+            groups = _by_place(scores)
+            middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
+            lines.append((order, not all(groups), -middle, track, learner, *_cells(groups)))
     places = [" ".join(each) for each in PLACES]
     heads = ["track", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
     return table(heads, [line[3:] for line in sorted(lines)])
@@ -155,31 +156,25 @@ def _by_place(scores: Sequence[Score]) -> list[list[Score]]:
     return [sorted(group, key=lambda each: each.seed) for group in groups]
 
 
-def _even(scores: Sequence[Score]) -> list[list[Score]]:
+def _even(groups: Sequence[Sequence[Score]]) -> list[Score]:
     """Scores of each place that has any, of the same number of seeds, so that all places weigh the same."""
-    groups = list(filter(None, _by_place(scores)))
-    return [group[: min(map(len, groups))] for group in groups]
+    few = min(len(group) for group in groups if group)
+    return [each for group in groups for each in group[:few]]
 
 
-def _middle(scores: Sequence[Score]) -> float:
-    """The interquartile mean of the scores."""
-    return evaluation.interquartile_mean([each.score for group in _even(scores) for each in group])
-
-
-def _cells(scores: Sequence[Score]) -> list[str]:
+def _cells(groups: Sequence[Sequence[Score]]) -> list[str]:
     """Cells of a learner; the total is that of all places alone, its interval that over two seeds or more."""
-    groups, even = _by_place(scores), _even(scores)
-    few, many = len(even[0]), max(map(len, groups))
-    total = f"{len(even)} of {len(PLACES)} places"
+    even, seeds = _even(groups), [len(group) for group in groups if group]
+    few, many = min(seeds), max(seeds)
+    total = f"{len(seeds)} of {len(PLACES)} places"
     if all(groups):
-        middle, (low, high) = evaluation.iqm_and_interval([[each.score for each in group] for group in even])
+        middle, (low, high) = evaluation.iqm_and_interval([[each.score for each in group[:few]] for group in groups])
         total = f"{middle:.3f}" + (f" [{low:.3f}, {high:.3f}]" if few > 1 else "")
-    counted = [each for group in even for each in group]
-    minutes = float(np.median([each.minutes for each in counted]))
+    minutes = float(np.median([each.minutes for each in even]))
     shown = [
         f"{few}" if few == many else f"{few} to {many}",
         total,
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
-        *(f"{results.size(np.array([getattr(each, name) for each in counted])):.3f}" for name in STYLE),
+        *(f"{results.size(np.array([getattr(each, name) for each in even])):.3f}" for name in STYLE),
     ]
     return shown + [f"{np.mean([each.score for each in group]):z.2f}" if group else NOT_RUN for group in groups]

@@ -216,10 +216,11 @@ STUDIES = {
             run("queen", "ppo", 2_000_000, task="steer"),
         ),
     ),
+    # Steps as on the track `top`; slopes are as uneven as its other ground.
     "from-nothing": Study(
         "PPO from nothing in the other tasks, Tick; rough ground, slopes, stairs and pillars three million steps",
         tuple(
-            run("tick", "ppo", 3_000_000 if task in ("rough", "slopes", "stairs", "navigate") else 1_000_000, task=task)
+            run("tick", "ppo", TRACKS["top"].far_steps if task in (*FAR, "slopes") else TRACKS["top"].steps, task=task)
             for task in ("steer", "shoved", "limp", "roam", "gaps", "course", "navigate", "rough", "stairs", "slopes")
         ),
     ),
