@@ -1,4 +1,4 @@
-"""The demonstrators `steered` and `surefooted`: one law for any body that follows a command of velocities.
+"""The demonstrators `steered`, `surefooted` and `reactive`: one law for any body that follows a command of velocities.
 
 Each foot on the ground is to move, relative to the torso, against the velocity that is requested
 where it stands; in swing it returns and is lifted. Both are directions in a leg's joint space,
