@@ -21,6 +21,8 @@ from arc_suite.studies.tracks import FAR, PLACES, SEEDS
 
 ROOT = pathlib.Path(__file__).parents[2]
 COMMITTED = ROOT / "studies"
+# The presets that collect on the track of demonstrations.
+PRESETS = {"walk": "medium", "steer": "reactive", "rough": "surefooted", "stairs": "surefooted", "navigate": "planned"}
 
 
 def test_there_are_ten_places():
@@ -32,7 +34,7 @@ def test_there_are_ten_places():
     [
         ("top-ppo", 1_000_000, 3_000_000, None),
         ("samples-sac_parallel", 100_000, 100_000, None),
-        ("demonstrations-sope", 100_000, 100_000, {"walk": "medium", "steer": "steered"}),
+        ("demonstrations-sope", 100_000, 100_000, PRESETS),
     ],
 )
 def test_a_track_is_a_study(name, steps, far, prior):
@@ -46,7 +48,7 @@ def test_a_track_is_a_study(name, steps, far, prior):
         if prior is None:
             assert each.prior is None
         else:
-            assert each.prior == (prior.get(task, "steered"), 100)
+            assert each.prior == (prior[task], 100)
 
 
 @pytest.mark.parametrize(
