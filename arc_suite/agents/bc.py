@@ -36,7 +36,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
     for first in range(0, len(data), _CHUNK):
         moments = moments.after(data.at(np.arange(first, min(first + _CHUNK, len(data)))).observations)
     normalise = moments.layer()
-    architecture = Perceptron(task.size, len(context.setup.body.joint_names))
+    architecture = Perceptron.of(task)
     state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
     step = 0
 

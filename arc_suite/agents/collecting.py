@@ -41,7 +41,8 @@ class Collector(Protocol):
             step: environment steps before it.
 
         Returns:
-            Arrays (horizon, num_envs, ...) of NumPy or JAX by the names of `TRANSITIONS`.
+            Arrays (horizon, num_envs, ...) of NumPy or JAX by the names of `TRANSITIONS`. A step that draws a new
+            command counts as `ended`, with the observation before it as the next one; see `VectorEnv.resampled`.
 
         Raises:
             Diverged: an action is not finite.
@@ -81,10 +82,12 @@ class Environments:
                 raise Diverged("an action is not finite", step)
             action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)
             after, rewards, terminated, truncated, info = self.environment.step(action)
-            ended = terminated | truncated
+            ended, resampled = terminated | truncated, self.environment.resampled()
             next_observation = after.copy()
+            next_observation[resampled] = self.observation[resampled]
             for index in np.flatnonzero(ended):
                 next_observation[index] = info["final_obs"][index]
+            ended = ended | resampled
             values = self.observation, action, mean, rewards, terminated, ended, next_observation
             for array, value in zip(rollout.values(), values, strict=True):
                 array.append(value)

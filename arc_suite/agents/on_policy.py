@@ -148,15 +148,15 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
     first, *layers, last = getattr(found, "layers", ()) or (Layer("none"), Layer("none"))
     if (first.kind, last.kind) != ("normalise", "clip"):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
-    try:
-        policy = architecture.imported(tuple(layers))
-    except ValueError as error:
-        raise ValueError(f"{hp.start}: expected {error}") from None
     for name in {**found.blocks, **task.blocks}:
         there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.blocks))
         if there != here:
             other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
+    try:
+        policy = architecture.imported(tuple(layers))
+    except ValueError as error:
+        raise ValueError(f"{hp.start}: expected {error}") from None
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias

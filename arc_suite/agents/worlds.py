@@ -32,7 +32,7 @@ class Worlds:
         impl = _IMPLEMENTATIONS[hp.simulation]
         first = context.first_seed
         self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, first_seed=first, num_envs=hp.num_envs)
-        self.task, self.architecture = self.env.task, Perceptron(self.env.task.size, self.env.action_size)
+        self.task, self.architecture = self.env.task, Perceptron.of(self.env.task)
         self._key = jax.random.key(context.seed)
         self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
@@ -61,7 +61,9 @@ class Worlds:
         time_is_up = steps >= self.task.step_limit
         terminated = (after.done > 0.0) & (after.info["truncation"] == 0.0) & ~time_is_up
         ended = (after.done > 0.0) | time_is_up
-        values = state.obs, action, mean, after.reward, terminated, ended, after.obs
+        resampled = self.task.resampled(after.info["memory"]) & ~ended
+        next_obs = jnp.where(resampled[:, None], state.obs, after.obs)
+        values = state.obs, action, mean, after.reward, terminated, ended | resampled, next_obs
         fresh = jax.vmap(self.env.reset)(jax.random.split(restart, self._hp.num_envs))
         carry = jax.vmap(mjx.restarted)(after, fresh, ended), jnp.where(ended, 0, steps)
         return carry, dict(zip(TRANSITIONS, values, strict=True))

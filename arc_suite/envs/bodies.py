@@ -176,6 +176,10 @@ class BodiesEnv(Together):
         """Return the positions (num_envs, 3) of the torsos in the world, m."""
         return np.array(self._of_each(lambda group: group.batch.data.qpos[:, :3]))
 
+    def resampled(self) -> np.ndarray:
+        """Return in which environments (num_envs,) the latest step drew a new command; see `VectorEnv.resampled`."""
+        return np.array(self._of_each(lambda group: group.resampled()))
+
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments; see `VectorEnv.command`."""
         self._check_open("command")

@@ -89,6 +89,10 @@ class FlatBodies(gymnasium.vector.VectorWrapper):
         """Let environments stand still; see `BodiesEnv.rest`."""
         self.unwrapped.rest(mask)
 
+    def resampled(self) -> np.ndarray:
+        """Return in which environments the latest step drew a new command; see `BodiesEnv.resampled`."""
+        return self.unwrapped.resampled()
+
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return the state of all environments; see `BodiesEnv.snapshot`.
 

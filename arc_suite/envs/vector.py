@@ -254,6 +254,20 @@ class VectorEnv(Together):
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
+    def resampled(self) -> np.ndarray:
+        """Return in which environments (num_envs,) the latest step drew a new command, whatever the body did.
+
+        Their returns from now on say nothing about the step. A learner that bootstraps there from the value of the
+        observation before the step learns from much less noise (Mao et al., "Variance reduction for reinforcement
+        learning in input-driven environments", 2019).
+
+        Raises:
+            ResetNeeded: before the first reset.
+        """
+        if self._memory is None:
+            raise ResetNeeded("no episode has begun; call reset first")
+        return np.broadcast_to(self._task.resampled(self._memory), (self.num_envs,))
+
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments from the next step on, until their next episodes.
 

@@ -89,6 +89,10 @@ class Command(ABC):
             motion: (..., 3) mean velocity of the torso.
         """
 
+    def resampled(self, memory, steps) -> Any:
+        """Return whether (...) a command that was drawn before holds since the latest of the control steps (...)."""
+        return False
+
     def commanded(self, memory, name: str, value):
         """Return the memory with a live command (..., 3) in place of the task's own where it is not NaN."""
         return memory._replace(live=value)
@@ -203,6 +207,12 @@ class Schedule(Command):
         desired = self.desired(context, memory, steps, place)
         memory = memory._replace(gained=along(desired, motion))
         return Followed(memory, desired, tracking(desired, motion))
+
+    def resampled(self, memory: Scheduled, steps) -> Any:
+        """Return whether (...) the next command of the schedule holds since the latest step, and none is set live."""
+        step, numpy = steps % memory.ends[..., -1], memory.ends.__array_namespace__()
+        changes = (step[..., None] == memory.ends).any(axis=-1) | ((step == 0) & (steps > 0))
+        return changes & numpy.isnan(memory.live).any(axis=-1)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -353,6 +353,10 @@ class CommandTask(Task):
             **self.settings.ground.progress(memory.ground),
         }
 
+    def resampled(self, memory: Memory) -> Any:
+        """Return whether the latest step drew a new command."""
+        return self.command.resampled(memory.command, memory.core.steps)
+
     def judged(self, memory: Memory):
         """Return the steps (...) over which an episode is judged: a full episode once it is over, else those so far."""
         steps, (terminated, truncated) = memory.core.steps, self.ended(memory, None)

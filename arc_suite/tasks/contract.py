@@ -279,6 +279,10 @@ class Task(ABC):
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""
         return {}
 
+    def resampled(self, memory) -> Any:
+        """Return whether (...) the latest step drew a new command, whatever the body did; see `VectorEnv.resampled`."""
+        return False
+
     def markers(self, memory, readings: Readings) -> list[Marker]:
         """Return the markers of command and kicks in pictures of one environment; no leading axes."""
         return []

@@ -316,6 +316,10 @@ class Modified(Task):
         metrics = self.task.progress(memory.task)
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
+    def resampled(self, memory: Memory) -> Any:
+        """Return whether the latest step drew a new command."""
+        return self.task.resampled(memory.task)
+
     def markers(self, memory: Memory, readings: Readings) -> list[Marker]:
         """Return the other task's, and for `SHOWN` steps a red arrow against the torso for a kick."""
         return [*self.task.markers(memory.task, readings), *self._kicked(memory.changes, readings)]

@@ -22,9 +22,10 @@ from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
 from arc_suite.robots import generator
+from arc_suite.tasks import command
 
 CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
-SIZES = Perceptron(6, 3)
+SIZES = Perceptron((6,), 3)
 SMALL = ProximalPolicy(**CHANGES)
 
 
@@ -131,6 +132,46 @@ def test_it_resumes_bit_exactly(begun, task):
     second = begun("tick", task, checkpoint=arrays)
     for name, array in whole.until(320).checkpoint.items():
         assert_array_equal(second.until(320).checkpoint[name], array, err_msg=name)
+
+
+def test_a_new_command_cuts_the_returns(begun, monkeypatch):
+    """The step that draws it bootstraps from the observation before, as the next command is not its doing."""
+    monkeypatch.setattr(command, "SHORTEST", 3)
+    monkeypatch.setattr(command, "LONGEST", 6)
+    agent = begun("tick", "steer", {"horizon": 24})
+    agent.advance()
+    rollout, _ = rolled_out(agent)
+    split = agent.collector.environment.task.split
+    here, there = (split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations"))
+    assert_array_equal(there, here)
+    new = (here[1:] != here[:-1]).any(axis=-1)
+    assert rollout["ended"][:-1][new].all()
+    drawn = new & ~rollout["terminated"][:-1]
+    assert drawn.sum() > 8
+    before, after = (rollout[name][:-1] for name in ("observations", "next_observations"))
+    assert_array_equal(before[drawn], after[drawn])
+    assert (before[~new] != after[~new]).any(axis=-1).all()
+
+
+def test_blocks_of_the_observation_weigh_alike():
+    architecture = Perceptron.of(Setup.of("tick", "steer").definition)
+    squares = architecture.scale.astype(float) ** 2
+    assert len(squares) == architecture.size and squares.mean() == pytest.approx(1.0)
+    ends = np.cumsum(architecture.blocks)
+    sums = [part.sum() for part in np.split(squares, ends[:-1])]
+    assert_allclose(sums, architecture.size / len(architecture.blocks), rtol=1e-5)
+    assert_array_equal(Perceptron((6,), 3).scale, np.ones(6))
+
+
+def test_a_network_is_exported_and_imported_as_it_acts():
+    architecture = Perceptron((2, 150, 6), 3)
+    random = np.random.default_rng(0)
+    parameters = architecture.drawn(random, 16)
+    x = random.normal(size=(5, 158)).astype(np.float32)
+    layers = architecture.exported(parameters)
+    acted = network.forward(layers, x)
+    assert_allclose(acted, ppo.mean_action(architecture, parameters, x), atol=1e-5)
+    assert_allclose(ppo.mean_action(architecture, architecture.imported(layers), x), acted, atol=1e-5)
 
 
 def test_every_transition_has_a_mirrored_one(begun):

@@ -19,7 +19,7 @@ from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.families import varied_body
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks import tokens
+from arc_suite.tasks import command, tokens
 from arc_suite.tasks.walk import Walk
 
 LAYOUTS = [
@@ -126,6 +126,24 @@ def test_each_of_all_layouts(task, mode):
 @pytest.mark.parametrize("task", ["slopes", "stairs", "gaps", "course", "roam", "navigate"])
 def test_each_on_other_grounds(task):
     assert_rows(FEW, task, "NextStep", 1, steps=25)
+
+
+def test_new_commands_of_each(monkeypatch):
+    monkeypatch.setattr(command, "SHORTEST", 3)
+    monkeypatch.setattr(command, "LONGEST", 6)
+    env = make(FEW, "steer")
+    singles, flat = alone(env, "steer"), FlatBodies(env)
+    flat.reset(seed=3)
+    for index, single in enumerate(singles):
+        single.reset(seed=3 + index)
+    found = []
+    for action in actions_of(env, 12):
+        flat.step(action)
+        for single, own, mask in zip(singles, action, env.description.mask, strict=True):
+            single.step(own[mask][None])
+        found.append(flat.resampled())
+        assert_array_equal(found[-1], [single.resampled()[0] for single in singles])
+    assert np.any(found, axis=0).all() and not np.all(found, axis=0).any()
 
 
 def test_bodies_of_one_layout_share_a_batch():

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation
-from arc_suite.agents import collecting, inputs, on_policy
+from arc_suite.agents import collecting, inputs, on_policy, worlds
 from arc_suite.agents import proximal_policy as ppo
 from arc_suite.agents.configuration import Configuration
 from arc_suite.agents.learner import RunContext
@@ -18,6 +18,7 @@ from arc_suite.agents.normaliser import Moments
 from arc_suite.agents.training import train
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import policy
+from arc_suite.tasks import command
 
 SMALL = {"num_envs": 4, "horizon": 4, "minibatch": 8, "epochs": 2, "hidden": 16}
 
@@ -45,6 +46,26 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
         found.append((leaves(updated), leaves(moments)))
     assert_allclose(found[1][0], found[0][0], atol=1e-5)
     assert_allclose(found[1][1], found[0][1], rtol=1e-4, atol=1e-5)
+
+
+def test_a_new_command_cuts_the_returns(monkeypatch):
+    """As in `collecting.Environments`: the step that draws it has the observation before it as the next one."""
+    monkeypatch.setattr(command, "SHORTEST", 3)
+    monkeypatch.setattr(command, "LONGEST", 6)
+    run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | {"horizon": 12, "simulation": "mjx"})
+    hp, context = run.hyperparameters, RunContext(run.setup, 0, 100, 100, pathlib.Path())
+    collector = worlds.Worlds(hp, context)
+    state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
+    normalise = Moments.none(collector.task.size).layer()
+    rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalise, 0.01, 0, 0))
+    here, there = (
+        collector.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")
+    )
+    new = (here[1:] != here[:-1]).any(axis=-1)
+    drawn = new & ~rollout["terminated"][:-1]
+    assert drawn.sum() > 4 and rollout["ended"][:-1][drawn].all()
+    assert_array_equal(there, here)
+    assert_array_equal(rollout["next_observations"][:-1][drawn], rollout["observations"][:-1][drawn])
 
 
 def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):

@@ -1,10 +1,12 @@
 """Steer: commands that are drawn, held, set from outside and obeyed."""
 
+import contextlib
 import types
 
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
@@ -48,6 +50,46 @@ def test_the_schedule_holds_each_command_and_begins_again():
         for tick in (end - length, end - 1):
             assert_array_equal(desired(tick), expected)
     assert_array_equal(desired(memory.ends[-1]), memory.schedule[0])
+
+
+@pytest.mark.parametrize("settings", [{}, {"motor_strength": 0.9}])
+def test_vectors_tell_which_steps_drew_a_new_command(settings):
+    """Those in which the observed command changes, in an episode that began before."""
+    with contextlib.closing(
+        VectorEnv("tick", "steer", num_envs=4, task_kwargs=settings, max_episode_steps=300, autoreset_mode="SameStep")
+    ) as envs:
+        with pytest.raises(ResetNeeded, match="no episode has begun"):
+            envs.resampled()
+        before, _ = envs.reset(seed=0)
+        assert not envs.resampled().any()
+        count = 0
+        for _ in range(500):
+            after, _, terminated, truncated, _ = envs.step(np.zeros((4, 18)))
+            desired = [envs.task.split(each)["command"][:, :3] for each in (before, after)]
+            changed, ended = (desired[0] != desired[1]).any(axis=-1), terminated | truncated
+            stops = ~np.any(desired, axis=(0, 2))  # a stop may follow a stop
+            assert_array_equal((envs.resampled() | ended)[~stops], (changed | ended)[~stops])
+            assert not envs.resampled()[ended].any()
+            before, count = after, count + envs.resampled().sum()
+        assert count > 8
+
+
+def test_a_schedule_begins_again_as_a_new_command_and_a_live_one_is_none():
+    schedule = command.Schedule()
+    memory = command.Scheduled(np.array([60, 130]), np.zeros((2, 3)), np.full(3, np.nan), np.float64(0.0))
+    drawn = [bool(schedule.resampled(memory, np.int64(steps))) for steps in range(300)]
+    assert np.flatnonzero(drawn).tolist() == [60, 130, 190, 260]
+    live = memory._replace(live=np.ones(3))
+    assert not any(schedule.resampled(live, np.int64(steps)) for steps in range(300))
+
+
+@pytest.mark.parametrize("task", ["walk", "rough", "navigate"])
+def test_other_tasks_draw_no_new_commands(task):
+    with contextlib.closing(VectorEnv("tick", task, num_envs=2)) as envs:
+        envs.reset(seed=0)
+        for _ in range(200):
+            envs.step(np.zeros((2, 18)))
+            assert not envs.resampled().any()
 
 
 def test_the_command_is_observed_and_changes_on_schedule():
