@@ -64,8 +64,8 @@ class Architecture(Protocol):
 class Perceptron(NamedTuple):
     """Multilayer perceptrons of two hidden layers, for one body; see `Architecture`.
 
-    Blocks of the observation weigh alike, whatever their sizes: the normalised numbers of a block are scaled, so that
-    their variances sum to the same for every block. Otherwise 150 contact forces would outweigh a clock of two numbers.
+    Normalised numbers of a block are scaled, so that the variances of every block have the same sum. Otherwise 150
+    contact forces would outweigh a clock of two numbers.
 
     Attributes:
         blocks: sizes of the observation's blocks, in order.
@@ -101,9 +101,10 @@ class Perceptron(NamedTuple):
 
     @property
     def scale(self) -> np.ndarray:
-        """(size,) factors of normalised numbers; the mean of their squares is 1."""
-        squares = [self.size / (len(self.blocks) * count) for count in self.blocks]
-        return np.sqrt(np.repeat(squares, self.blocks)).astype(np.float32)
+        """(size,) factors of normalised numbers; their mean square is 1, so that gains of first weights hold."""
+        counts = [count for count in self.blocks if count]
+        squares = [self.size / (len(counts) * count) for count in counts]
+        return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
 
     def seen(self, observations):
         """Return the observations."""

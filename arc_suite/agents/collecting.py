@@ -41,8 +41,9 @@ class Collector(Protocol):
             step: environment steps before it.
 
         Returns:
-            Arrays (horizon, num_envs, ...) of NumPy or JAX by the names of `TRANSITIONS`. A step that draws a new
-            command counts as `ended`, with the observation before it as the next one; see `VectorEnv.resampled`.
+            Arrays (horizon, num_envs, ...) of NumPy or JAX by the names of `TRANSITIONS`. A step that begins
+            another command counts as `ended`, and the observation before it as the next one; see
+            `VectorEnv.resampled`.
 
         Raises:
             Diverged: an action is not finite.

@@ -2,7 +2,8 @@
 
 With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`).
 A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
-ages, so their time limits fall on different steps.
+ages, so their time limits fall on different steps. A step that begins another command bootstraps from the observation
+before it (`VectorEnv.resampled`).
 """
 
 from collections.abc import Iterator, Mapping

@@ -77,9 +77,10 @@ def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, end
         hp: hyperparameters, for `discount` and `gae_lambda`.
         rewards: (steps, num_envs)
         values: (steps, num_envs) of the observations before the step.
-        next_values: (steps, num_envs) of the observations after the step, also after an episode's last.
+        next_values: (steps, num_envs) of the observations after the step, also after an episode's last; of those
+            before a step that began another command.
         terminated: (steps, num_envs) booleans: the return after the step is 0.
-        ended: (steps, num_envs) booleans: the next step is of another episode, or follows a new command.
+        ended: (steps, num_envs) booleans: the next step is of another episode, or follows another command.
     """
     numpy = rewards.__array_namespace__()
     surprise = rewards + hp.discount * numpy.where(terminated, 0.0, next_values) - values

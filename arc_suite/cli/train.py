@@ -3,7 +3,7 @@
 Killed at any moment, the same command resumes, bit-exactly. The folder holds tables of returns and losses, a
 checkpoint, the policy, and a picture of its returns, drawn anew after each evaluation.
 
-  arc-suite train --robot tick --steps 832000
+  arc-suite train --robot tick
   arc-suite train --robot queen --task steer --algorithm dagger
   arc-suite train --robot tick --algorithm sac_parallel --minutes 5
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0

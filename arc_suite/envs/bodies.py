@@ -177,7 +177,7 @@ class BodiesEnv(Together):
         return np.array(self._of_each(lambda group: group.batch.data.qpos[:, :3]))
 
     def resampled(self) -> np.ndarray:
-        """Return in which environments (num_envs,) the latest step drew a new command; see `VectorEnv.resampled`."""
+        """Return in which environments (num_envs,) the latest step began another command; see `VectorEnv.resampled`."""
         return np.array(self._of_each(lambda group: group.resampled()))
 
     def command(self, name: str, value, mask=None) -> None:

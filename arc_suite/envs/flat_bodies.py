@@ -90,7 +90,7 @@ class FlatBodies(gymnasium.vector.VectorWrapper):
         self.unwrapped.rest(mask)
 
     def resampled(self) -> np.ndarray:
-        """Return in which environments the latest step drew a new command; see `BodiesEnv.resampled`."""
+        """Return in which environments the latest step began another command; see `BodiesEnv.resampled`."""
         return self.unwrapped.resampled()
 
     def snapshot(self) -> dict[str, np.ndarray]:

@@ -8,7 +8,8 @@ from gymnasium.error import ClosedEnvironmentError
 
 from arc_suite import checks
 
-_OF_EACH = ("np_random", "np_random_seed", "render")  # attributes that have a value for each environment
+# Attributes that have a value for each environment.
+_OF_EACH = ("np_random", "np_random_seed", "render", "positions", "resampled")
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
 
 
@@ -35,7 +36,7 @@ class Together(gymnasium.vector.VectorEnv):
         value = getattr(self, _OF_ONE.get(name, name))
         if callable(value):
             value = value(*args, **kwargs)
-        return value if name in _OF_EACH and value is not None else (value,) * self.num_envs
+        return tuple(value) if name in _OF_EACH and value is not None else (value,) * self.num_envs
 
     def get_attr(self, name: str) -> tuple:
         """Return an attribute of every environment; see `call`."""

@@ -46,4 +46,6 @@ def _told(task: Task, memory, readings) -> dict[str, np.ndarray]:
     """Everything that a task tells of a step, by name."""
     blocks = {f"block {name}": block for name, block in task.observe(memory, readings).items()}
     metrics = {f"metric {name}": np.asarray(metric) for name, metric in task.progress(memory).items()}
-    return {f"term {name}": np.asarray(term) for name, term in task.terms(memory, readings).items()} | metrics | blocks
+    terms = {f"term {name}": np.asarray(term) for name, term in task.terms(memory, readings).items()}
+    resampled = np.broadcast_to(task.resampled(memory), np.shape(next(iter(terms.values()))))
+    return terms | metrics | blocks | {"resampled": resampled}

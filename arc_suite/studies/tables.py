@@ -286,7 +286,7 @@ def benchmark(track: str, algorithm: str) -> Study:
 
 
 def _collects(robot: str, task: str) -> str:
-    """The preset that collects prior data of a place: on `walk` that of the paper, elsewhere the best in the task."""
+    """The preset that collects prior data of a place: on `walk` that of the paper, elsewhere the one that suits."""
     return "medium" if task == "walk" else suited_preset(Setup.of(robot, task).definition)
 
 

@@ -90,7 +90,7 @@ class Command(ABC):
         """
 
     def resampled(self, memory, steps) -> Any:
-        """Return whether (...) a command that was drawn before holds since the latest of the control steps (...)."""
+        """Return whether (...) another drawn command holds since control step `steps` (...)."""
         return False
 
     def commanded(self, memory, name: str, value):
@@ -197,7 +197,7 @@ class Schedule(Command):
 
     def desired(self, context: Context, memory: Scheduled, steps, place):
         """Return the command that holds; a schedule that has run out begins again."""
-        step, numpy = steps % memory.ends[..., -1], memory.ends.__array_namespace__()
+        step, numpy = _step(memory, steps), memory.ends.__array_namespace__()
         current = (step[..., None] >= memory.ends).sum(axis=-1)[..., None, None]
         scheduled = numpy.take_along_axis(memory.schedule, current, axis=-2)[..., 0, :]
         return numpy.where(numpy.isnan(memory.live), scheduled, memory.live)
@@ -209,10 +209,15 @@ class Schedule(Command):
         return Followed(memory, desired, tracking(desired, motion))
 
     def resampled(self, memory: Scheduled, steps) -> Any:
-        """Return whether (...) the next command of the schedule holds since the latest step, and none is set live."""
-        step, numpy = steps % memory.ends[..., -1], memory.ends.__array_namespace__()
+        """Return whether (...) the next command of the schedule holds since step `steps`, unless a live one does."""
+        step, numpy = _step(memory, steps), memory.ends.__array_namespace__()
         changes = (step[..., None] == memory.ends).any(axis=-1) | ((step == 0) & (steps > 0))
         return changes & numpy.isnan(memory.live).any(axis=-1)
+
+
+def _step(memory: Scheduled, steps):
+    """The step (...) of a schedule that begins again when it has run out."""
+    return steps % memory.ends[..., -1]
 
 
 @dataclasses.dataclass(frozen=True)

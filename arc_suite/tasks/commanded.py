@@ -354,7 +354,7 @@ class CommandTask(Task):
         }
 
     def resampled(self, memory: Memory) -> Any:
-        """Return whether the latest step drew a new command."""
+        """Return whether the latest step began another drawn command."""
         return self.command.resampled(memory.command, memory.core.steps)
 
     def judged(self, memory: Memory):

@@ -280,7 +280,10 @@ class Task(ABC):
         return {}
 
     def resampled(self, memory) -> Any:
-        """Return whether (...) the latest step drew a new command, whatever the body did; see `VectorEnv.resampled`."""
+        """Return whether (...) the latest step began another drawn command; one boolean will do for all environments.
+
+        The reward of that step already judges the motion by it. See `VectorEnv.resampled`.
+        """
         return False
 
     def markers(self, memory, readings: Readings) -> list[Marker]:

@@ -317,7 +317,7 @@ class Modified(Task):
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
     def resampled(self, memory: Memory) -> Any:
-        """Return whether the latest step drew a new command."""
+        """Return whether the latest step began another drawn command."""
         return self.task.resampled(memory.task)
 
     def markers(self, memory: Memory, readings: Readings) -> list[Marker]:

@@ -83,9 +83,9 @@ def test_the_demonstrator_acts_in_half_of_the_environments_and_labels_all(begun,
     assert_array_equal(actions[:, :4].astype(np.float32), labels[:, :4])
     assert (abs(actions[:, 4:] - labels[:, 4:]).max(axis=-1) > 1e-3).all()
     demonstrator = Demonstrator("leaper", "refined")
-    for step, (observation, label) in enumerate(zip(arrays["observations"], labels, strict=True)):
+    for count, (observation, label) in enumerate(zip(arrays["observations"], labels, strict=True)):
         expected = demonstrator.act(agent.environment.task.split(observation)).astype(np.float32)
-        going = arrays["ages"][step] == step  # elsewhere the body fell, and the demonstrator began again
+        going = arrays["ages"][count] == count  # elsewhere the body fell, and the demonstrator began again
         assert going[:4].all()
         assert_array_equal(expected[going], label[going])
 

@@ -135,7 +135,7 @@ def test_it_resumes_bit_exactly(begun, task):
 
 
 def test_a_new_command_cuts_the_returns(begun, monkeypatch):
-    """The step that draws it bootstraps from the observation before, as the next command is not its doing."""
+    """The step that begins it bootstraps from the observation before."""
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
     agent = begun("tick", "steer", {"horizon": 24})
@@ -150,7 +150,10 @@ def test_a_new_command_cuts_the_returns(begun, monkeypatch):
     assert drawn.sum() > 8
     before, after = (rollout[name][:-1] for name in ("observations", "next_observations"))
     assert_array_equal(before[drawn], after[drawn])
-    assert (before[~new] != after[~new]).any(axis=-1).all()
+    # A stop may follow a stop, and is another command, too.
+    moving = ~new & here[:-1].any(axis=-1)
+    assert not rollout["ended"][:-1][moving].any()
+    assert (before[moving] != after[moving]).any(axis=-1).all()
 
 
 def test_blocks_of_the_observation_weigh_alike():
@@ -161,6 +164,7 @@ def test_blocks_of_the_observation_weigh_alike():
     sums = [part.sum() for part in np.split(squares, ends[:-1])]
     assert_allclose(sums, architecture.size / len(architecture.blocks), rtol=1e-5)
     assert_array_equal(Perceptron((6,), 3).scale, np.ones(6))
+    assert_array_equal(Perceptron((6, 0), 3).scale, np.ones(6))
 
 
 def test_a_network_is_exported_and_imported_as_it_acts():

@@ -128,7 +128,7 @@ def test_each_on_other_grounds(task):
     assert_rows(FEW, task, "NextStep", 1, steps=25)
 
 
-def test_new_commands_of_each(monkeypatch):
+def test_other_commands_of_each(monkeypatch):
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
     env = make(FEW, "steer")

@@ -49,7 +49,7 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
 
 
 def test_a_new_command_cuts_the_returns(monkeypatch):
-    """As in `collecting.Environments`: the step that draws it has the observation before it as the next one."""
+    """As in `collecting.Environments`: the step that begins it has the observation before it as the next one."""
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
     run = Configuration.of(Setup.of("leaper", "steer"), "ppo", SMALL | {"horizon": 12, "simulation": "mjx"})
@@ -65,7 +65,11 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     drawn = new & ~rollout["terminated"][:-1]
     assert drawn.sum() > 4 and rollout["ended"][:-1][drawn].all()
     assert_array_equal(there, here)
-    assert_array_equal(rollout["next_observations"][:-1][drawn], rollout["observations"][:-1][drawn])
+    before, after = (rollout[name][:-1] for name in ("observations", "next_observations"))
+    assert_array_equal(before[drawn], after[drawn])
+    moving = ~new & here[:-1].any(axis=-1)  # a stop may follow a stop, and is another command, too
+    assert not rollout["ended"][:-1][moving].any()
+    assert (before[moving] != after[moving]).any(axis=-1).all()
 
 
 def test_a_run_resumes_bit_exactly_and_its_policy_acts_everywhere(tmp_path):

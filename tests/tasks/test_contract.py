@@ -100,6 +100,7 @@ def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings)
             name: (size,) for name, size in task.blocks.items()
         }
         assert all(np.shape(figure) == () for figure in task.progress(memory).values())
+        assert np.shape(task.resampled(memory)) == ()
 
 
 def leaves(value):

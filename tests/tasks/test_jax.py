@@ -67,6 +67,7 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
             task.observe(memory, readings),
             ends[0],
             task.progress(memory),
+            task.resampled(memory) | np.zeros((), bool),
             task.begin(memory, readings),
             task.clear_spawn(memory, readings),
         )

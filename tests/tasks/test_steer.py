@@ -6,7 +6,6 @@ import types
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
 from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
@@ -53,43 +52,55 @@ def test_the_schedule_holds_each_command_and_begins_again():
 
 
 @pytest.mark.parametrize("settings", [{}, {"motor_strength": 0.9}])
-def test_vectors_tell_which_steps_drew_a_new_command(settings):
-    """Those in which the observed command changes, in an episode that began before."""
+def test_vectors_tell_which_steps_began_another_command(settings):
+    """Those in which the observed command changes within an episode."""
     with contextlib.closing(
         VectorEnv("tick", "steer", num_envs=4, task_kwargs=settings, max_episode_steps=300, autoreset_mode="SameStep")
     ) as envs:
-        with pytest.raises(ResetNeeded, match="no episode has begun"):
-            envs.resampled()
         before, _ = envs.reset(seed=0)
         assert not envs.resampled().any()
         count = 0
         for _ in range(500):
             after, _, terminated, truncated, _ = envs.step(np.zeros((4, 18)))
-            desired = [envs.task.split(each)["command"][:, :3] for each in (before, after)]
-            changed, ended = (desired[0] != desired[1]).any(axis=-1), terminated | truncated
-            stops = ~np.any(desired, axis=(0, 2))  # a stop may follow a stop
-            assert_array_equal((envs.resampled() | ended)[~stops], (changed | ended)[~stops])
-            assert not envs.resampled()[ended].any()
+            one, other = (envs.task.split(each)["command"][:, :3] for each in (before, after))
+            within = ~(terminated | truncated)
+            assert not envs.resampled()[~within].any()
+            told = within & (one.any(axis=-1) | other.any(axis=-1))  # a stop may follow a stop
+            assert_array_equal(envs.resampled()[told], (one != other).any(axis=-1)[told])
             before, count = after, count + envs.resampled().sum()
         assert count > 8
 
 
-def test_a_schedule_begins_again_as_a_new_command_and_a_live_one_is_none():
+def test_environments_that_rest_began_no_other_command(monkeypatch):
+    monkeypatch.setattr(command, "SHORTEST", 3)
+    monkeypatch.setattr(command, "LONGEST", 4)
+    with contextlib.closing(VectorEnv("tick", "steer", num_envs=3, autoreset_mode="Disabled")) as envs:
+        envs.reset(seed=0)
+        for _ in range(3):
+            envs.step(np.zeros((3, 18)))
+        assert envs.resampled().all()
+        assert envs.call("resampled") == (True, True, True)
+        envs.resampled()[:] = False
+        assert envs.resampled().all()
+        envs.reset(options={"reset_mask": np.array([True, False, False])})
+        assert envs.resampled().tolist() == [False, True, True]
+        envs.rest([False, True, False])
+        envs.restore(envs.snapshot())
+        assert not envs.resampled().any()
+        for _ in range(3):
+            envs.step(np.zeros((3, 18)))
+        assert envs.resampled().tolist() == [True, False, True]
+
+
+def test_a_schedule_begins_again_as_another_command_and_a_live_one_is_none():
     schedule = command.Schedule()
     memory = command.Scheduled(np.array([60, 130]), np.zeros((2, 3)), np.full(3, np.nan), np.float64(0.0))
-    drawn = [bool(schedule.resampled(memory, np.int64(steps))) for steps in range(300)]
-    assert np.flatnonzero(drawn).tolist() == [60, 130, 190, 260]
+    begun = [bool(schedule.resampled(memory, np.int64(steps))) for steps in range(300)]
+    assert np.flatnonzero(begun).tolist() == [60, 130, 190, 260]
     live = memory._replace(live=np.ones(3))
     assert not any(schedule.resampled(live, np.int64(steps)) for steps in range(300))
-
-
-@pytest.mark.parametrize("task", ["walk", "rough", "navigate"])
-def test_other_tasks_draw_no_new_commands(task):
-    with contextlib.closing(VectorEnv("tick", task, num_envs=2)) as envs:
-        envs.reset(seed=0)
-        for _ in range(200):
-            envs.step(np.zeros((2, 18)))
-            assert not envs.resampled().any()
+    partly = memory._replace(live=np.array([1.0, np.nan, np.nan]))
+    assert schedule.resampled(partly, np.int64(60))
 
 
 def test_the_command_is_observed_and_changes_on_schedule():
