@@ -45,7 +45,11 @@ MUTANTS = (
     Mutant("a scaled robot keeps its name", 'name=f"{stem}_{how}"', "name=body.name"),
     # Models.
     Mutant("contact margin doubled", "default=0.005", "default=0.01"),
-    Mutant("ballast touches the floor", '_TOUCHES_NOTHING = {"contype": 0', '_TOUCHES_NOTHING = {"contype": 1'),
+    Mutant(
+        "ballast touches the floor",
+        '"mass": solid.mass, **_TOUCHES_NOTHING}',
+        '"mass": solid.mass, **touches_floor}',
+    ),
     Mutant("wrong number of substeps", "SUBSTEPS = 25", "SUBSTEPS = 24"),
     Mutant("joints of a giant as fast as a mite's", "_STIFFNESS / control_timestep(body)", "7.0"),
     Mutant(
@@ -53,7 +57,7 @@ MUTANTS = (
     ),
     # Arenas.
     Mutant("triangles of the ground exchanged", "right = u > v", "right = u < v"),
-    Mutant("stairs without their fourth tread", "(steps + 1.0).clip(0.0, 4.0)", "(steps + 1.0).clip(0.0, 3.0)"),
+    Mutant("stairs without their fourth tread", "(steps + 1).clip(0, 4) -", "(steps + 1).clip(0, 3) -"),
     Mutant(
         "ground under the torso's middle alone",
         "for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0)",
@@ -128,13 +132,21 @@ MUTANTS = (
     Mutant("blocks cut one too early", "slice(end - size, end)", "slice(max(end - size - 1, 0), end - 1)"),
     Mutant("blocks joined unchecked", "for name, block in blocks.items()] != self._declared", "for name, block in ()]"),
     Mutant(
-        "feet stay in the ground", "(clear - readings.foot_heights).max", "0.0 * (clear - readings.foot_heights).max"
+        "feet stay in the ground",
+        "(self.clearances - readings.foot_heights).max",
+        "0.0 * (self.clearances - readings.foot_heights).max",
     ),
     Mutant(
-        "a memory written in place", "(1.0 - context.leak) * core.motion", "core.motion.__imul__(1.0 - context.leak)"
+        "a memory written in place", "(1.0 - context.leaks) * core.motion", "core.motion.__imul__(1.0 - context.leaks)"
     ),
     Mutant("a command that is ignored", "numpy.where(numpy.isnan(memory.live), scheduled, memory.live)", "scheduled"),
     Mutant("a schedule that does not end", "steps % memory.ends[..., -1]", "steps"),
+    Mutant("a live command counts as a new one", "changes & numpy.isnan(memory.live).any(axis=-1)", "changes"),
+    Mutant(
+        "who rests has another command",
+        "stepping & ~self._ended & task.resampled(memory)",
+        "~self._ended & task.resampled(memory)",
+    ),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),
     # Modifiers.
@@ -194,14 +206,22 @@ MUTANTS = (
     Mutant("steered the wrong way", "copysign(STEERING, speed)", "copysign(STEERING, -speed)"),
     Mutant("damping has the wrong sign", "- damping * velocities", "+ damping * velocities"),
     Mutant("no crouch", "steps < self.settle", "steps < 0"),
-    Mutant("a row walks by another's preset", "for value in values]", "for value in values[::-1]]"),
+    Mutant(
+        "a row walks by another's preset",
+        "np.atleast_1d(value) for value in values]",
+        "np.atleast_1d(value) for value in values[::-1]]",
+    ),
     Mutant("presets take turns from row to row", "= np.asarray(seeds) % len", "= np.asarray(rows) % len"),
     Mutant("the same noise in all episodes", "default_rng((seed, 1))", "default_rng(1)"),
     # Style.
     Mutant("feet in the air slip", " * track.contacts", ""),
     Mutant("early taken for late", "actual * wanted.conj()", "wanted * actual.conj()"),
     Mutant("mirror image of a foot's path forgotten", " * (1.0, -1.0, 1.0)", ""),
-    Mutant("motors win back what they brake", ".clip(0.0).sum()", ".sum()"),
+    Mutant(
+        "motors win back what they brake",
+        "np.diff(track.joint_angles, axis=0)).clip(0.0).sum()",
+        "np.diff(track.joint_angles, axis=0)).sum()",
+    ),
     Mutant("a foot that bounces strides", "0.5 * foot_clearance(track)", "0.0"),
     Mutant("order of tracks in a file", "index) for index in range(count)]", "index) for index in range(count)[::-1]]"),
     Mutant(
@@ -218,11 +238,11 @@ MUTANTS = (
     Mutant("axes of glTF are a mirror", "_AXES = (1, 2, 0)", "_AXES = (0, 2, 1)"),
     Mutant(
         "the seam of a loop is left",
-        "joints = motion.joints - share * (motion.joints[-1] - motion.joints[0])",
-        "joints = motion.joints + 0.0 * share",
+        "np.linspace(-0.5, 0.5, len(motion.joints))",
+        "np.zeros(len(motion.joints))",
     ),
-    Mutant("clips begin anywhere", "draft.motion.begun(downs[0])", "draft.motion.begun(0)"),
-    Mutant("soles of clips hover", "draft.motion.lowered(hover)", "draft.motion.lowered(0.0)"),
+    Mutant("clips begin anywhere", "draft.motion.begun(begin)", "draft.motion.begun(0)"),
+    Mutant("soles of clips hover", "self.motion.lowered(self.contacts(body)[0])", "self.motion.lowered(0.0)"),
     Mutant(
         "sRGB written as linear",
         "linear = np.where(colour <= 0.04045, colour / 12.92,",
