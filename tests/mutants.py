@@ -144,8 +144,8 @@ MUTANTS = (
     Mutant("a live command counts as a new one", "changes & numpy.isnan(memory.live).any(axis=-1)", "changes"),
     Mutant(
         "who rests has another command",
-        "stepping & ~self._ended & task.resampled(memory)",
-        "~self._ended & task.resampled(memory)",
+        "~(self._ended | self._resting) & self._task.resampled(self._memory)",
+        "~self._ended & self._task.resampled(self._memory)",
     ),
     Mutant("followed from behind", "cosine * x + sine * y", "cosine * x - sine * y"),
     Mutant("turned the wrong way", "2.0 * (w * z + x * y)", "2.0 * (x * y - w * z)"),

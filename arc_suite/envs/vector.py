@@ -151,7 +151,6 @@ class VectorEnv(Together):
         self._steps = np.zeros(self.num_envs, int)  # of the present episodes
         self._ended = np.zeros(self.num_envs, bool)  # environments whose episode has ended and whose next has not begun
         self._resting = np.zeros(self.num_envs, bool)
-        self._resampled = np.zeros(self.num_envs, bool)  # environments in which the latest step began another command
 
         self.metadata = {
             "render_modes": list(_RENDER_MODES),
@@ -242,7 +241,6 @@ class VectorEnv(Together):
         terminated = stepping & (diverged | failed) & ~time_is_up
         truncated = stepping & ((cut & ~terminated) | time_is_up | (self._steps >= self.step_limit))
         self._ended = waiting | terminated | truncated
-        self._resampled = stepping & ~self._ended & task.resampled(memory)
 
         info = {}
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
@@ -263,7 +261,9 @@ class VectorEnv(Together):
         reinforcement learning in input-driven environments", 2019). `ppo` bootstraps there from the observation
         before the step. Environments that rest, or whose episode ended or began in the step, have False.
         """
-        return self._resampled.copy()
+        if self._memory is None:
+            return np.zeros(self.num_envs, bool)
+        return ~(self._ended | self._resting) & self._task.resampled(self._memory)
 
     def command(self, name: str, value, mask=None) -> None:
         """Set a command of the task in some environments from the next step on, until their next episodes.
@@ -325,7 +325,6 @@ class VectorEnv(Together):
         """
         self._check_open("restore")
         snapshots.put(self, self._checked_snapshot(arrays))
-        self._resampled = np.zeros(self.num_envs, bool)
 
     @one_thread_at_a_time
     def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
@@ -423,7 +422,6 @@ class VectorEnv(Together):
         self._memory = memory if self._memory is None else _scattered(mask, memory, self._memory)
         self._steps[mask] = 0
         self._ended, self._resting = self._ended & ~mask, self._resting & ~mask
-        self._resampled = self._resampled & ~mask
         observation[mask] = task.vector(task.observe(memory, readings), np.float32)
 
     def _info(self, mask: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:

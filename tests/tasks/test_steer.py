@@ -85,11 +85,13 @@ def test_environments_that_rest_began_no_other_command(monkeypatch):
         envs.reset(options={"reset_mask": np.array([True, False, False])})
         assert envs.resampled().tolist() == [False, True, True]
         envs.rest([False, True, False])
-        envs.restore(envs.snapshot())
-        assert not envs.resampled().any()
+        assert envs.resampled().tolist() == [False, False, True]
+        snapshot = envs.snapshot()
         for _ in range(3):
             envs.step(np.zeros((3, 18)))
         assert envs.resampled().tolist() == [True, False, True]
+        envs.restore(snapshot)
+        assert envs.resampled().tolist() == [False, False, True]
 
 
 def test_a_schedule_begins_again_as_another_command_and_a_live_one_is_none():
