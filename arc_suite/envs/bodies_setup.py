@@ -78,15 +78,17 @@ class BodiesSetup(BaseSetup):
     def validation(self, count: int) -> "BodiesSetup":
         """Return the setup of at most `count` bodies that evaluate a policy while it learns.
 
-        Of families they are bodies of seeds from 100,000 on, else the first of the bodies themselves.
+        Of families they are bodies of seeds from 100,000 on, else the first of the bodies themselves. A curriculum is
+        left out, as in `Setup.validation`.
         """
+        settings = self._judged_json()
         families = [family for part in self.robot.split(",") if (family := part.rpartition(":")[0])]
         if not families:
-            return dataclasses.replace(self, robot=",".join(self.robot.split(",")[:count]))
+            return dataclasses.replace(self, settings_json=settings, robot=",".join(self.robot.split(",")[:count]))
         families = list(dict.fromkeys(families))[:count]
         each = count // len(families)
         ranges = (f"{family}:{HELD_OUT}-{HELD_OUT + each - 1}" for family in families)
-        return dataclasses.replace(self, robot=",".join(ranges))
+        return dataclasses.replace(self, settings_json=settings, robot=",".join(ranges))
 
     def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options) -> FlatBodies:
         """Open environments; environment i has body i, and so on from the first after the last.

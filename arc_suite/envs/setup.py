@@ -18,7 +18,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_from_json, body_to_json
-from arc_suite.tasks.contract import STEPS, Task
+from arc_suite.tasks.contract import CURRICULUM, STEPS, Task
 
 ATTRIBUTE = "arc_suite"  # of an observation space: the setup that an agent was trained in, as `Setup.to_dict`
 
@@ -49,6 +49,12 @@ class BaseSetup:
     def to_dict(self) -> dict[str, Any]:
         """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
         return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
+
+    def _judged_json(self) -> str:
+        """JSON of the settings with which a policy is evaluated while it learns: those without a curriculum."""
+        settings = self.task_kwargs
+        kept = {name: value for name, value in settings.items() if name not in CURRICULUM}
+        return checks.json_text("task_kwargs", kept if settings.get(CURRICULUM[0]) else settings)
 
     def _seeded(self, seed: int | None) -> dict[str, Any]:
         return self.task_kwargs | ({} if seed is None else {"random": seed})
@@ -111,8 +117,11 @@ class Setup(BaseSetup):
         return self.body.name
 
     def validation(self, count: int) -> "Setup":
-        """Return the setup that evaluates a policy while it learns: this one."""
-        return self
+        """Return the setup that evaluates a policy while it learns: this one, without a curriculum.
+
+        A curriculum begins at its first level in an evaluation, so policies are compared at `difficulty` instead.
+        """
+        return dataclasses.replace(self, settings_json=self._judged_json())
 
     @property
     def env_id(self) -> str:

@@ -74,7 +74,7 @@ def anchors(setup: Setup | BodiesSetup) -> Anchors:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
     """
     if isinstance(setup, BodiesSetup):
-        return _of_several(setup.validation(protocol.EPISODES))
+        return _of_several(setup)
     return of_returns(known(setup) or measured(setup))
 
 

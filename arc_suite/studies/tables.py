@@ -64,9 +64,14 @@ class Run(NamedTuple):
         return folder_name(f"{setup.body.name}-{setup.kind.name}-{self.kind}-{seed}")
 
     @property
+    def judged(self) -> Setup:
+        """Setup in which its policy is evaluated."""
+        return self.configuration.setup.validation(1)
+
+    @property
     def place(self) -> str:
-        """Robot, task and settings, by which results are grouped."""
-        return str(self.configuration.setup)
+        """Robot, task and settings of its evaluations, by which results are grouped."""
+        return str(self.judged)
 
 
 def run(

@@ -51,6 +51,9 @@ STEPS = 1000  # control steps of an episode
 # Fields of `MjModel` that an episode can have its own values of: masses and frictions.
 CHANGEABLE = ("body_mass", "body_inertia", "pair_friction", "geom_friction")
 
+# Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
+CURRICULUM = ("curriculum", "level")
+
 _CLEAR = 0.01  # of the standing height, by which a lift brings feet clear of the ground
 
 

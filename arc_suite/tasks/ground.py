@@ -16,7 +16,7 @@ from arc_suite.arenas.pillars import COUNT, RADIUS, Pillars
 from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.context import Context
-from arc_suite.tasks.contract import STEPS
+from arc_suite.tasks.contract import CURRICULUM, STEPS
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parameters import Parameters
@@ -209,13 +209,13 @@ class Lanes(Ground):
     @property
     def settings(self) -> tuple[str, ...]:
         """The names of the fields that a caller may set; sizes where there is one kind of ground."""
-        return ("difficulty", "curriculum", "level", "terrain_seed", *terrain.sizes(self.kinds))
+        return ("difficulty", *CURRICULUM, "terrain_seed", *terrain.sizes(self.kinds))
 
     def with_settings(self, overrides: Mapping[str, Any]) -> Self:
         """Return the lanes with checked settings."""
         given = {name: overrides.get(name, getattr(self, name)) for name in self.settings}
         sizes = [name for name in terrain.sizes(self.kinds) if given[name] is not None]
-        for name in ("difficulty", "curriculum", "level"):
+        for name in ("difficulty", *CURRICULUM):
             if sizes and name in overrides:
                 raise ValueError(f"{name}: expected none with {sizes[0]}={given[sizes[0]]}, got {overrides[name]}")
         return dataclasses.replace(

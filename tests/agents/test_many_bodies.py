@@ -114,7 +114,7 @@ def test_a_run_makes_a_policy_of_any_body(tmp_path):
 
 
 def test_anchors_are_means_over_bodies_of_validation():
-    scale = anchors.anchors(BodiesSetup.of("random:0-1", "walk", {"time_limit": 1.0}))
+    scale = anchors.anchors(BodiesSetup.of("random:0-1", "walk", {"time_limit": 1.0}).validation(2))
     assert scale.preset == "of each body" and scale.demonstrator > scale.zero > 0.0
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from arc_suite import registry
 from arc_suite.arenas import FLAT
+from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json
@@ -105,3 +106,14 @@ def test_tasks_of_other_packages_are_told_with_their_module(monkeypatch):
     setup = Setup.of("queen", f"{__name__}:steer")
     assert (setup.task, setup.kind.name) == (f"{__name__}:steer", "steer")
     assert setup == Setup.of("queen", "steer") == Setup.from_dict(setup.to_dict())
+
+
+def test_policies_are_evaluated_without_the_curriculum():
+    settings = {"curriculum": True, "level": 2, "time_limit": 4.0}
+    setup = Setup.of("tick", "gaps", settings)
+    assert setup.validation(10) == Setup.of("tick", "gaps", {"time_limit": 4.0})
+    assert BodiesSetup.of("queen,tick", "rough", settings).validation(1).task_kwargs == {"time_limit": 4.0}
+    easier = Setup.of("tick", "gaps", {"difficulty": 0.2, "curriculum": True})
+    assert easier.validation(10).task_kwargs == {"difficulty": 0.2}
+    fixed = Setup.of("tick", "gaps", {"difficulty": 0.2, "curriculum": False})
+    assert fixed.validation(10) == fixed

@@ -1,5 +1,6 @@
 """Studies: eight tiny runs, killed twice, are bit-exactly those of an uninterrupted study, apart from times."""
 
+import contextlib
 import dataclasses
 import importlib.util
 import json
@@ -17,9 +18,10 @@ import programs
 import pytest
 import tiny_studies
 
-from arc_suite import data, policies, registry, style
+from arc_suite import data, evaluation, policies, registry, style
 from arc_suite.agents import configuration, run_folder
 from arc_suite.agents.configuration import Configuration
+from arc_suite.agents.training import train
 from arc_suite.envs.dm import load
 from arc_suite.robots import generator
 from arc_suite.studies import publication, results, runner, tables
@@ -178,6 +180,22 @@ def test_prior_data_are_those_of_the_study(tmp_path, monkeypatch):
         runner.prepare([each], tmp_path / "runs", 1)
     what = f"dataset {dataset!r} has 3 episodes, and the study takes 2; delete it, to have it collected anew"
     assert str(error.value) == f"{each.name}: {what}"
+
+
+def test_a_curriculum_is_judged_at_the_difficulty(tmp_path):
+    settings = tiny_studies.SHORT | {"curriculum": True, "level": 3}
+    each = run("tick", "tiny_studies:CLIMB", 100, task="gaps", task_kwargs=settings, evaluate_every=100)
+    assert each.place == 'tick, gaps, {"time_limit": 2.0}'
+    folder, published = tmp_path / "runs", tmp_path / "results"
+    assert train(each.configuration, folder / each.name)
+    publication.publish_all([each], folder, published)
+    assert configuration.read(published / each.name / "config.json").setup.task_kwargs == settings
+    table = run_folder.table(folder / each.name, "evaluations")
+    assert "distance" in table and "level" not in table
+    assert results.demonstrators(published).keys() == {each.place}
+    with contextlib.closing(load("tick", "gaps", tiny_studies.SHORT)) as environment:
+        policy = policies.policy(folder / each.name, "tick", task=environment.task.definition)
+        assert evaluation.run(environment, policy, 4).total == table["return"][4]
 
 
 def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
