@@ -2,9 +2,10 @@
 
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. IQM is
 the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
-still, in one episode from the first seed. With --preset medium, which is the paper's demonstrator, the
-table ends with the paper's return. The JSON is an entry for `arc-suite enter`: it holds every episode, and
-hashes of policy, body, model and task.
+still in the same episodes, at most ten. The score is 0 for standing still and 1 for the best demonstrator of the
+suite; only the robots in tasks with default settings have one. With --preset medium, which is the paper's
+demonstrator, the table ends with the paper's return. The JSON is an entry for `arc-suite enter`: it holds every
+episode, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --episodes 10
   arc-suite evaluate --spec spider
@@ -28,7 +29,7 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
-from arc_suite.evaluation import entries
+from arc_suite.evaluation import anchors, entries
 
 FLAGS = flags.FLAGS
 define_body()
@@ -40,7 +41,7 @@ flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for eac
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
 
-_WIDTHS = (18, 9, 26, 9, 12)  # of the columns that every task has
+_WIDTHS = (18, 9, 7, 26, 9, 12)  # of the columns that every task has
 
 
 def line(first: str, metrics: Mapping[str, str], *cells: str) -> str:
@@ -66,25 +67,27 @@ def main() -> None:
         if chosen == "cpg":
             presets[name] = suited_preset(task) if FLAGS.preset is None else FLAGS.preset
         policy = policies.policy(chosen, body, presets.get(name, FLAGS.preset), task=task)
-        players[name] = environment, policy, policies.policy("zero", body, task=task)
+        players[name] = environment, policy
     experts = {name: evaluation.expert_return(setup) for name, setup in asked.items()}
     papers = [name for name, expert in experts.items() if expert is not None and presets.get(name) == "medium"]
     with files.writing_json(FLAGS.json) as file:
         reports = {}
         labels = {name: f"{name}, {presets[name]}" if name in presets else name for name in players}
         width = max(12, *map(len, labels.values()))
-        for robot, (environment, policy, zero) in players.items():
+        for robot, (environment, policy) in players.items():
             episodes = evaluate(robot, environment, policy)
-            stood = evaluation.run(environment, zero, FLAGS.seed).total
+            seeds = range(FLAGS.seed, FLAGS.seed + min(FLAGS.episodes, evaluation.EPISODES))
+            stood = float(anchors.played(asked[robot], anchors.ZERO, seeds).mean())
+            known = anchors.known(asked[robot])
             if not reports:
                 names = {name: name for name in episodes[0].progress}
-                heads = ["return", "zero", "IQM [95 % interval]", "steps", *["paper's cpg"] * bool(papers)]
+                heads = ["return", "zero", "score", "IQM [95 % interval]", "steps", *["paper's cpg"] * bool(papers)]
                 header = line("robot".ljust(width), names, *heads)
                 print(header, "-" * len(header), sep="\n")
             reports[robot] = {
                 "provenance": entries.provenance(asked[robot]),
                 "preset": presets.get(robot),
-                **report(episodes, stood, experts[robot]),
+                **report(episodes, stood, experts[robot], None if known is None else anchors.of_returns(known)),
             }
             print(row(labels[robot].ljust(width), reports[robot], robot in papers), flush=True)
         file.update(
@@ -110,19 +113,24 @@ def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
         return evaluation.episodes(environment, policy, bar)
 
 
-def report(episodes: list[evaluation.Episode], zero: float, expert: float | None) -> dict:
+def report(
+    episodes: list[evaluation.Episode], zero: float, expert: float | None, scale: anchors.Anchors | None
+) -> dict:
     """Return the metrics of one robot, as in the JSON.
 
     Args:
         episodes: of the robot.
         zero: return of standing still.
         expert: return of the paper's demonstrator, if it has one.
+        scale: committed anchors of the score, if there are any.
     """
+    total = evaluation.summary([episode.total for episode in episodes])
     progress = {name: [episode.progress[name] for episode in episodes] for name in episodes[0].progress}
     return {
         "zero_return": zero,
         "expert_return": expert,
-        "return": evaluation.summary([episode.total for episode in episodes]),
+        "return": total,
+        "score": None if scale is None else float(scale.score(total.mean)),
         "length": evaluation.summary([episode.length for episode in episodes]),
         **{name: evaluation.summary(values) for name, values in progress.items()},
         "episodes": episodes,
@@ -137,6 +145,7 @@ def row(robot: str, metrics: dict, with_paper: bool) -> str:
         {name: f"{metrics[name].mean:.3f}" for name in progress},
         f"{total.mean:.1f} +- {total.deviation:.1f}",
         f"{metrics['zero_return']:.1f}",
+        "-" if metrics["score"] is None else f"{metrics['score']:z.2f}",
         "{:.1f} [{:.1f}, {:.1f}]".format(total.iqm, *total.interval),
         f"{metrics['length'].mean:.1f}",
         *([f"{metrics['expert_return']:.0f}"] if with_paper else []),

@@ -8,6 +8,8 @@ import programs
 import pytest
 from returns import RETURNS
 
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
 from arc_suite.robots import ROBOTS
 
 
@@ -27,6 +29,7 @@ def test_table_of_all_robots(tmp_path):
         "cost_of_transport",
         "return",
         "zero",
+        "score",
         "IQM",
         "[95",
         "%",
@@ -38,6 +41,7 @@ def test_table_of_all_robots(tmp_path):
     for row in rows:  # standing earns more than a fall
         total, zero = float(row.split()[4]), float(row.split()[7])
         assert zero == pytest.approx(reports[row.split()[0]]["zero_return"], abs=0.05)
+        assert row.split()[8] == "-" and reports[row.split()[0]]["score"] is None  # of a task with settings
         assert total < zero == pytest.approx(163.0, abs=20.0)
 
 
@@ -83,10 +87,11 @@ def test_figures_of_a_demonstrator():
     assert 0 < float(fields[3]) < 1
     assert float(fields[5]) == pytest.approx(RETURNS["queen"].medium, rel=0.015)
     assert float(fields[8]) == pytest.approx(1635.0, rel=0.015)
-    iqm, low, high = (float(field.strip("[],")) for field in fields[9:12])
+    assert 0.1 < float(fields[9]) < 0.3
+    iqm, low, high = (float(field.strip("[],")) for field in fields[10:13])
     assert low <= iqm <= high
     assert iqm == pytest.approx(RETURNS["queen"].medium, rel=0.015)
-    assert fields[12:] == ["1000.0", f"{RETURNS['queen'].paper:.0f}"]
+    assert fields[13:] == ["1000.0", f"{RETURNS['queen'].paper:.0f}"]
 
 
 def test_json_holds_every_episode_and_the_versions(tmp_path):
@@ -171,3 +176,18 @@ def test_help_shows_an_example_and_the_flags():
     assert "arc-suite evaluate --robot all --policy cpg" in result.stdout
     for flag in ("--robot", "--policy", "--preset", "--episodes", "--seed", "--json"):
         assert flag in result.stdout
+
+
+@pytest.mark.slow
+def test_standing_still_has_score_0(tmp_path):
+    """Of the same ten episodes as the committed anchors, from any number of them."""
+    path = tmp_path / "zero.json"
+    result = evaluate("--robot=tick", "--policy=zero", "--episodes=12", f"--json={path}")
+    assert result.returncode == 0, result.stderr
+    report = json.loads(path.read_text())["robots"]["tick"]
+    assert report["zero_return"] == pytest.approx(sum(each["total"] for each in report["episodes"][:10]) / 10)
+    assert result.stdout.splitlines()[-1].split()[8] == "0.00"
+    scale = anchors.anchors(Setup.of("tick"))
+    assert report["zero_return"] == pytest.approx(scale.zero) and report["score"] == pytest.approx(
+        scale.score(report["return"]["mean"])
+    )
