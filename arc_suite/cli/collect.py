@@ -6,8 +6,8 @@ Both use all cores. Killed or interrupted, the same command continues. Minari ke
   arc-suite collect --robot queen --policy cpg --preset medium --episodes 1000
   arc-suite collect --robot tick --preset slow,medium,fast --noise 0.1
   arc-suite collect --spec spider --policy my_package.policies:make
-  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --checkpoint 200000
-  arc-suite collect --robot tick --policy runs/tick-walk-sac-0 --quality medium
+  arc-suite collect --robot tick --policy runs/tick-walk-ppo-0 --checkpoint 200704
+  arc-suite collect --robot tick --policy runs/tick-walk-ppo-0 --quality medium
   arc-suite collect --verify arc_suite/queen/walk/cpg-medium-v0
 
 --verify imports no module that the dataset names: --task and --set name those that it needs, as in collecting.

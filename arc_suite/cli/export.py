@@ -3,8 +3,8 @@
 The normaliser is inside; the metadata hold the robot, the observation's blocks, the control step, the
 gears of the motors and the rule of the gait's clock.
 
-  arc-suite export runs/tick-walk-sac-0
-  arc-suite export runs/tick-walk-sac-0 -o tick.onnx
+  arc-suite export runs/tick-walk-ppo-0
+  arc-suite export runs/tick-walk-ppo-0 -o tick.onnx
   arc-suite export ppo.zip
   arc-suite export universal --spec spider --task steer -o spider.onnx
 
