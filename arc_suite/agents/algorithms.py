@@ -25,7 +25,7 @@ class Algorithm(NamedTuple):
         evaluate_every: environment steps between evaluations, by default.
         steps: environment steps of a run, by default.
         terrain_steps: the same in another arena than the flat one; None for as many.
-        extends: whether a run can be extended to more steps, as no schedule hangs on them.
+        extends: whether a run can be extended to more steps, as no schedule depends on them.
         source: what it learns from, other than its own steps: one of `SOURCES`.
         several: whether it can learn with several bodies.
     """

@@ -8,7 +8,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.robots.spec import Body, Link
 
-STEPS = 100  # control steps: five seconds of the four robots, of which the first two are a start
+STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
 FIELDS = ("motor", "damping", "armature")  # of joints, which are sized where a spec leaves them out
 
 

@@ -110,7 +110,7 @@ class Inputs(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Task(ABC):
-    """What a body is asked to do: a frozen value, checked when it is made.
+    """Definition of what a body has to do: a frozen value, checked when it is made.
 
     Attributes:
         scene: what it is made for.
@@ -169,7 +169,7 @@ class Task(ABC):
 
     @property
     def adapts(self) -> bool:
-        """Whether the start of an episode hangs on the outcome of the one before, as in a curriculum."""
+        """Whether the start of an episode depends on the outcome of the one before, as in a curriculum."""
         return False
 
     @property
@@ -179,7 +179,7 @@ class Task(ABC):
 
     @property
     def target_velocity(self) -> float | None:
-        """The velocity along world x that is asked for all the time, m/s; None where it changes or is not."""
+        """The constant target velocity along world x, m/s; None where it changes or there is none."""
         return None
 
     @property

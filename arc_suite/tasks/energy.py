@@ -1,4 +1,4 @@
-"""Energy: the positive work of the motors, of which the cost of transport follows.
+"""Energy: the positive work of the motors, from which the cost of transport follows.
 
 Work is divided by the body's weight, so its unit is m. The motors do not win back what they brake, as in
 `style.metrics.cost_of_transport`.
