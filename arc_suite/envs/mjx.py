@@ -113,7 +113,8 @@ class Env:
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
         self.task, self.mj_model = prepared(domain_name, task_name, settings)
         if self.task.adapts:
-            raise ValueError(f"task {self.task.name}: expected no curriculum, as its starts depend on the episode before")
+            why = "as its starts depend on the episode before"
+            raise ValueError(f"task {self.task.name}: expected no curriculum, {why}")
         model = device.adapted(self.mj_model, self.impl)
         self._mjx_model = device.put(model, self.impl)
         self._data = device.made(model, self.impl, self.num_envs)

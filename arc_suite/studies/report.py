@@ -87,8 +87,8 @@ _STYLE = (
     "Heading and drift are relative to the x axis, which is not the direction of a command that turns."
 )
 _STRIPS = (
-    "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle. It is the fifth cycle, or "
-    "the latest whole one before a fall. The camera moves along and keeps its direction; in tasks with a command it "
+    "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle. It is the fifth cycle, "
+    "or the latest whole one before a fall. The camera moves along and keeps its direction; in tasks with a command it "
     "looks straight ahead. The command line makes a page that plays the policy."
 )
 
