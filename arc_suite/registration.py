@@ -56,8 +56,8 @@ def register(
             a module of that name.
 
     Raises:
-        ValueError: a name that is taken, or parameters or a preset that do not fit the body;
-            nothing has been registered.
+        ValueError: a name that is taken, a task that lacks methods, or parameters or a preset that do not fit the
+            body; nothing has been registered.
     """
     module = None if module == "__main__" else module
     new_tasks: dict[str, Any] = {_task_name(task): task for task in tasks}
@@ -95,6 +95,8 @@ def _task_name(task) -> str:
         raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {task!r}")
     if not (isinstance(name, str) and name.isidentifier()):
         raise ValueError(f"task {name!r}: expected a name of letters, digits and underscores")
+    if missing := sorted(task.__abstractmethods__):
+        raise ValueError(f"task {name!r}: has no {' and no '.join(missing)}, which arc_suite.tasks.Task asks for")
     return name
 
 

@@ -5,6 +5,7 @@ Arrays may carry any leading axes `...`: the same text serves one environment, a
 
 from collections.abc import Mapping
 
+from arc_suite import checks
 from arc_suite.tasks.readings import Readings, component
 
 
@@ -52,9 +53,15 @@ def limited(terms: Mapping, weights: Mapping, limit: float) -> dict:
 
 
 def total(terms: Mapping, weights: Mapping):
-    """Return the reward: the sum of the terms times their signed weights, in the order of the weights."""
+    """Return the reward: the sum of the terms times their signed weights, in the order of the weights.
+
+    Raises:
+        ValueError: a weight of a term that there is not.
+    """
     reward = 0
     for name, weight in weights.items():
+        if name not in terms:
+            checks.name(name, terms, "weight")
         reward = reward + weight * terms[name]
     return reward
 

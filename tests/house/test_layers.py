@@ -122,7 +122,7 @@ INSIDE = {
     "tasks.clock": set(),
     "tasks.readings": {"arenas"},
     "tasks.sensors": set(),
-    "tasks.terms": {"tasks.readings"},
+    "tasks.terms": {"checks", "tasks.readings"},
     "tasks.mirrors": {"robots.mirror"},
     "tasks.contract": {
         *("arenas", "markers", "robots.mirror", "robots.spec"),

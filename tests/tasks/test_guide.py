@@ -65,6 +65,29 @@ def test_a_task_in_the_arena_conforms(package):
     assert package("-c", code) == "None\n"
 
 
+WEIGHTS = '{"height": 3.0, "upright": 1.0, "control": -0.05}'
+UNCHECKED = CROUCHING.replace(f'parameters.weights({WEIGHTS}, values["weights"])', f'{WEIGHTS} | values["weights"]')
+OBSERVE = re.compile(r"    def observe\(.*?\n\n", re.DOTALL)
+MISSPELT = ("--set", 'weights={"heigt": 1.0}')
+UNKNOWN = "unknown weight 'heigt'; did you mean 'height'? (there are: height, upright, control)"
+
+
+@pytest.mark.parametrize(
+    ("module", "setting", "message"),
+    [
+        (CROUCHING, MISSPELT, UNKNOWN),
+        (UNCHECKED, MISSPELT, UNKNOWN),
+        (OBSERVE.sub("", CROUCHING), (), "task 'crouch': has no observe, which arc_suite.tasks.Task asks for"),
+    ],
+    ids=["weights that the task checks", "weights that it does not check", "a method is missing"],
+)
+def test_mistakes_in_a_task_and_its_settings_are_one_line(module, setting, message, tmp_path):
+    (tmp_path / "crouching.py").write_text(module)
+    arguments = ("--task=crouching:crouch", "--robot=tick", "--policy=zero", "--episodes=1", *setting)
+    done = programs.arc_suite("evaluate", *arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite evaluate: {message}\n")
+
+
 @pytest.mark.parametrize("command", tiers(COMMANDS, never, lambda command: "evaluate" in command))
 def test_commands(package, command, tmp_path, monkeypatch):
     """By the console script, in the folder of the modules alone."""
