@@ -78,6 +78,21 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextlib.contextmanager
+def reading(path: str | os.PathLike) -> Iterator[None]:
+    """Read a file or folder, with errors of one wording: `with reading("a.md"): text = page.read_text()`.
+
+    Raises:
+        OSError: it cannot be read, or is no text where text is read.
+    """
+    try:
+        yield
+    except UnicodeDecodeError:
+        raise OSError(f"cannot read {path}: expected text in UTF-8") from None
+    except OSError as error:
+        raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from None
+
+
 def plain(path: str | os.PathLike) -> Path:
     """Return the path of a file; reading a pipe would block.
 

@@ -124,6 +124,8 @@ def read(path: Path) -> Configuration:
         OSError: the file cannot be read.
     """
     try:
-        return Configuration.from_dict(checks.mapping("configuration", files.read_json(path)))
+        with files.reading(path):
+            found = files.read_json(path)
+        return Configuration.from_dict(checks.mapping("configuration", found))
     except ValueError as error:
         raise ValueError(f"{path}: {checks.quoted(error)}") from None

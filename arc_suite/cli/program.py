@@ -75,7 +75,8 @@ def marked_page(flag: str, path: str) -> Callable[[str], None]:
         ValueError: the page has no such lines.
         OSError: it cannot be read.
     """
-    page = Path(path).read_text(encoding="utf-8")
+    with files.reading(path):
+        page = Path(path).read_text(encoding="utf-8")
     if not _MARKS.search(page):
         raise ValueError(f"--{flag}={path}: expected the lines <!-- table --> and <!-- end -->, got none")
 

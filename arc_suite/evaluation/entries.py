@@ -53,15 +53,14 @@ def read(path: Path) -> dict[str, Any]:
         OSError: it cannot be read.
     """
     try:
-        found = checks.mapping("entry", files.read_json(path, _MAX_BYTES))
+        with files.reading(path):
+            found = checks.mapping("entry", files.read_json(path, _MAX_BYTES))
         for name in ("policy", "seed", "versions", "robots", "policy_sha256"):
             if name not in found:
                 raise ValueError(f"expected a field {name}, got none")
         for report in checks.mapping("robots", found["robots"]).values():
             checks.mapping("provenance", checks.mapping("report", report).get("provenance"))
         return dict(found)
-    except OSError as error:
-        raise OSError(f"cannot read {path}: {error.strerror.lower()}") from None
     except ValueError as error:
         raise ValueError(f"{path}: no entry: {checks.quoted(error)}") from None
 

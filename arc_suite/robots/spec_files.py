@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from arc_suite import checks
+from arc_suite import checks, files
 from arc_suite.robots.spec import Body, SpecError
 
 MAX_BYTES = 1 << 18  # of a file; a body of 64 legs with 16 links each has fewer
@@ -37,11 +37,8 @@ def load_body(path: str | os.PathLike) -> Body:
     """
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
         path = EXAMPLES[checks.name(path, EXAMPLES, "spec", near=("FILE.json",))]
-    try:
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise OSError(f"cannot read {path}: {(error.strerror or str(error)).lower()}") from None
+    with files.reading(path), Path(path).open("rb") as file:
+        data = file.read(MAX_BYTES + 1)
     try:
         if len(data) > MAX_BYTES:
             raise SpecError(f"expected at most {MAX_BYTES} bytes")

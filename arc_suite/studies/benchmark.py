@@ -86,7 +86,8 @@ def of_policies(folder: Path, progress: Callable) -> list[Score]:
     """
     places = "|".join("-".join(each) for each in PLACES)
     pattern = re.compile(rf"({places})-(\d+)(\.zip|{re.escape(network.EXTENSION)})?")
-    named = [(path, pattern.fullmatch(path.name)) for path in sorted(folder.iterdir())]
+    with files.reading(folder):
+        named = [(path, pattern.fullmatch(path.name)) for path in sorted(folder.iterdir())]
     found = [(path, match) for path, match in named if match]
     if not found:
         raise ValueError(f"{folder}: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none")

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, registry, versions
+from arc_suite import checks, files, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
@@ -78,10 +78,8 @@ def load(path: str | os.PathLike) -> list[Track]:
             been imported.
         OSError: the file cannot be read.
     """
-    try:
+    with files.reading(path):
         file = open(path, "rb")  # noqa: SIM115
-    except OSError as error:
-        raise OSError(f"cannot read {path}: {error.strerror.lower()}") from None
     with file:
         try:
             arrays = _arrays(file)

@@ -165,6 +165,8 @@ def run(*arguments, cwd):
         (["top", "--algorithm=bc"], "algorithm bc learns from prior data, and the track top takes those that learn "),
         (["top", "--policies=."], ".: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none"),
         (["top", "--policies=.", "--name=a/b"], "--name=a/b: expected letters, digits, _, - and ."),
+        (["top", "--policies=none"], "cannot read none: no such file or directory"),
+        (["--page=none.md"], "cannot read none.md: no such file or directory"),
         (["--page=page.md"], "--page=page.md: expected the lines <!-- table --> and <!-- end -->, got none"),
     ],
 )
