@@ -86,6 +86,8 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
     if policy is None and name not in policies.POLICIES:
         raise ValueError(f"{path}: policy {checks.quoted(name)!r}: expected --policy with its file, got none")
     _same(path, "policy_sha256", found["policy_sha256"], policy_sha256(name))
+    if found["policy_sha256"] is None:  # files may lie elsewhere; without them the name alone tells policies apart
+        _same(path, "policy", found["policy"], name)
     if found["seed"] != 0:
         raise ValueError(f"{path}: expected episodes from seed 0, got {checks.quoted(found['seed'])}")
     entries = []
@@ -99,14 +101,16 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
                 checks.name(checks.quoted(preset), policies.preset_names(), "preset")
         except (ValueError, registry.NotImported) as error:
             raise ValueError(f"{path}: {error}") from None
+        totals = _totals(report)
+        if len(totals) != EPISODES:
+            raise ValueError(f"{path}: expected {EPISODES} episodes of {setup.body.name}, got {len(totals)}")
         known = provenance(setup)
         for field in _OF_SETUP:
             _same(path, field, told.get(field), known[field])
         environment = setup.load()
         player = policies.policy(name, setup.body, preset, task=environment.task.definition)
         episodes = protocol.episodes(environment, player, progress(range(EPISODES)))
-        totals = [each.total for each in episodes]
-        _same(path, f"returns of {setup.body.name}", _totals(report), totals)
+        _same(path, f"returns of {setup.body.name}", totals, [each.total for each in episodes])
         entries.append(Entry(setup, name, preset, found["policy_sha256"], episodes))
     return entries
 

@@ -62,7 +62,8 @@ def _changed(report, *keys, value):
         (("robots", "tick", "provenance", "body_sha256"), "00", 'body_sha256: the file says "00", and here it is '),
         (("robots", "tick", "provenance", "task"), "nowhere:stroll", "task 'nowhere:stroll': files import nothing; "),
         (("robots", "tick", "provenance"), [], "no entry: provenance: expected a mapping of names to values, got []"),
-        (("robots", "tick", "episodes"), [], "returns of tick: the file says [], and here it is ["),
+        (("robots", "tick", "episodes"), [], "expected 10 episodes of tick, got 0\n"),
+        (("policy",), "mine:make", 'policy: the file says "mine:make", and here it is "random"\n'),
         (("robots", "tick", "episodes", 3, "total"), 3999.0, "returns of tick: the file says ["),
         (("robots",), {}, "expected robots, got none"),
     ],
@@ -71,7 +72,7 @@ def test_what_differs_is_one_line_and_enters_nothing(entry, tmp_path, keys, valu
     report = json.loads(entry.read_text())
     _changed(report, *keys, value=value)
     (tmp_path / "entry.json").write_text(json.dumps(report))
-    done = enter(tmp_path, "entry.json", "--name=noise")
+    done = enter(tmp_path, "entry.json", "--name=noise", *["--policy=random"][: value == "mine:make"])
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith(f"arc-suite enter: entry.json: {message}") and done.stderr.count("\n") == 1
     assert not (tmp_path / "studies").exists()
