@@ -33,9 +33,13 @@ def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> st
     if value in valid:
         return value
     valid += near
+    raise ValueError(f"unknown {kind} {value!r}{_hint(value, valid)} (there are: {', '.join(valid)})")
+
+
+def _hint(value, valid: Iterable[str]) -> str:
+    """Return how an error goes on that names an unknown value: with a valid one that is near, if there is any."""
     close = difflib.get_close_matches(str(value), valid, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    raise ValueError(f"unknown {kind} {value!r}{hint} (there are: {', '.join(valid)})")
+    return f"; did you mean {close[0]!r}?" if close else ""
 
 
 def extension(path: str | os.PathLike, valid: Iterable[str]) -> str:
@@ -205,4 +209,5 @@ def imported(path: str, kind: str) -> Any:
     try:
         return pkgutil.resolve_name(path)
     except (ImportError, ValueError, AttributeError) as error:
-        raise ValueError(f"{kind} {path!r}: {error}") from None
+        hint = _hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
+        raise ValueError(f"{kind} {path!r}: {error}{hint}") from None

@@ -80,9 +80,10 @@ def _members(domain) -> tuple[str, range] | None:
     if not isinstance(domain, str) or domain.startswith("{"):
         return None
     family, _, seeds = domain.rpartition(":")
-    if not (family in FAMILIES or ":" in family):
+    found = _SEEDS.fullmatch(seeds)
+    if not (family in FAMILIES or ":" in family or (family and found)):  # seeds are no name of a robot
         return None
-    if not (found := _SEEDS.fullmatch(seeds)):
+    if not found:
         raise ValueError(f"domain {domain!r}: expected {family}:seed or {family}:first-last, such as {family}:0-9")
     first, last = int(found[1]), int(found[2] or found[1])
     if not first <= last < first + MOST_BODIES:

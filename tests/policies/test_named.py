@@ -134,7 +134,7 @@ def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_an
     [
         ("own_polices:walk", "No module named 'own_polices'"),
         (":walk", "invalid format: ':walk'"),
-        ("own_policies:wlak", "module 'own_policies' has no attribute 'wlak'"),
+        ("own_policies:wlak", "module 'own_policies' has no attribute 'wlak'; did you mean 'walk'?"),
         ("own_policies:number", "expected a function that makes a policy from a robot's name"),
         ("own_policies:forgets", "expected it to return a function of a TimeStep, got NoneType"),
     ],

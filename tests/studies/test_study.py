@@ -291,6 +291,11 @@ def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
         ),
         (["first-steps", "--shard=6/7"], "arc-suite study: --shard=6/7: no run, as the study has 6"),
         (["arc_suite:load"], "arc-suite study: study 'arc_suite:load': expected a Study, got function"),
+        (
+            ["tiny_studies:TWIC"],
+            "arc-suite study: study 'tiny_studies:TWIC': module 'tiny_studies' has no attribute 'TWIC'; did you mean "
+            "'TWICE'?",
+        ),
         (["tiny_studies:TWICE"], "arc-suite study: study 'tiny_studies:TWICE': 2 runs are named tick-walk-sac-0; a "),
     ],
 )
