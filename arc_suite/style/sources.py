@@ -53,10 +53,14 @@ def source(name: str, preset: str | None = "medium") -> Source:
         return _played(name, preset)
     if name.endswith(".npz"):
         return _saved(name)
-    if ":" not in name and re.search(r"/|-v\d+$", name):
+    if ":" in name:
+        return _played(name, preset)
+    if re.search(r"-v\d+$", name):
         return _replayed(name)
-    if ":" not in name:
+    if "/" not in name:
         checks.name(name, policies.POLICIES, "policy")
+    elif not Path(name).exists():
+        raise OSError(f"cannot read {name}: no such file; the id of a dataset ends in a version, such as {name}-v0")
     return _played(name, preset)
 
 
