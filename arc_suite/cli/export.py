@@ -17,7 +17,7 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import policies
+from arc_suite import checks, policies
 from arc_suite.cli.flags import (
     ROBOT_HELP,
     define_body,
@@ -34,7 +34,7 @@ define_vecnormalize()
 define_body()
 define_task()
 _ROBOT = flags.DEFINE_string("robot", None, f"Body of a policy of many bodies: {ROBOT_HELP}.")
-flags.DEFINE_string("output", None, "File to write. [default: policy.onnx next to the policy]", short_name="o")
+flags.DEFINE_string("output", None, "File to write (.onnx). [default: policy.onnx next to the policy]", short_name="o")
 
 
 def main(run: str | None = None) -> None:
@@ -43,6 +43,7 @@ def main(run: str | None = None) -> None:
         raise ValueError("expected the folder of a run, a policy file or a zip of stable-baselines3; see --help")
     source, name = Path(run), policy_name(run)
     output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
+    checks.extension(output, [".onnx"])
     if _ROBOT.present or made_body() is not None:
         setup = only_setup(_ROBOT)
         task = setup.definition
