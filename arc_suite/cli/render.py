@@ -80,6 +80,8 @@ def main() -> None:
         raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html")
     extension = checks.extension(FLAGS.output, _STEPS)
     steps = _STEPS[extension] if FLAGS.steps is None else FLAGS.steps
+    if steps < 1 and extension != ".png":
+        raise ValueError(f"--steps={steps}: expected 1 or more for a film or a page")
 
     with files.writing(FLAGS.output) as temporary, contextlib.ExitStack() as stack:
         if extension == ".html":
@@ -102,8 +104,6 @@ def main() -> None:
 
 def write_page(path: Path, environments: Mapping, policies: Mapping[str, Policy], steps: int) -> None:
     """Record an episode of each policy and write the page that plays them side by side."""
-    if steps < 1:
-        raise ValueError(f"--steps={steps}: expected 1 or more for a page")
     pages.viewer()  # finds out at once whether there is one
     tracks = {}
     for name, walker in progress(policies.items(), "walking", leave=False):

@@ -178,7 +178,7 @@ def test_programs_write_pages(tmp_path):
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        (("render", "--steps=0", "-o", "a.html"), "--steps=0: expected 1 or more for a page"),
+        (("render", "--steps=0", "-o", "a.html"), "--steps=0: expected 1 or more for a film or a page"),
         (("style", "--page=a.htm"), "--page=a.htm: expected a file that ends in .html"),
     ],
 )
