@@ -115,12 +115,16 @@ def made_body() -> Body | None:
     return body if FLAGS.palette is None else body.replace(palette=palettes.parsed(FLAGS.palette))
 
 
-def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
+def bodies(robot: flags.FlagHolder, near: Iterable[str] = ("all",)) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
 
     A robot of another package is named `module:name`, and its module imported; `family:0-9` names ten bodies. Flaws of
     the body in a spec file, such as feet in the floor, are warned of with the values that fit, as `arc-suite check`
     has them.
+
+    Args:
+        robot: the flag.
+        near: other values of it that an unknown robot may mean.
 
     Raises:
         ValueError: as `made_body`, or an unknown robot, or a robot and a body.
@@ -128,7 +132,7 @@ def bodies(robot: flags.FlagHolder) -> dict[str, Body]:
     """
     body = made_body()
     if body is None:
-        return dict(ROBOTS) if robot.value == "all" else named_bodies(robot.value, ["all"])
+        return dict(ROBOTS) if robot.value == "all" else named_bodies(robot.value, near)
     if robot.present:
         raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
     for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
@@ -158,7 +162,7 @@ def only_body(robot: flags.FlagHolder) -> Body:
         ValueError: as `bodies`, or several bodies.
         OSError: as `bodies`.
     """
-    return only_one(bodies(robot), robot.value)
+    return only_one(bodies(robot, near=()), robot.value)
 
 
 def only_one(found: dict[str, Body], robot: str) -> Body:

@@ -8,7 +8,7 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import NoReturn
@@ -17,7 +17,7 @@ from absl import flags
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import files
+from arc_suite import checks, files
 from arc_suite.simulation.opengl import RenderingUnavailable
 
 _MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
@@ -55,7 +55,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
     arguments = given if arguments is None else arguments
 
     def work():
-        _, *rest = flags.FLAGS([script, *arguments])
+        _, *rest = _parsed([script, *arguments], sys.modules[main.__module__])
         if _HELP.value:
             return print(_help(sys.modules[main.__module__]))
         if _VERSION.value:
@@ -122,13 +122,37 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     sys.exit(status)
 
 
+def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
+    """Parse arguments into absl's flags, and return those that are none.
+
+    Raises:
+        ValueError: a flag that the program does not have, or a value that its flag does not take.
+        flags.Error: a flag without its value.
+    """
+    try:
+        return flags.FLAGS(arguments)
+    except flags.UnrecognizedFlagError as error:
+        checks.name(error.flagname, sorted({flag.name for flag in _flags(module)}), "flag")
+        raise
+    except flags.IllegalFlagValueError as error:
+        given = str(error).removesuffix(f": {error.__context__}")  # flag --NAME=VALUE
+        parser = flags.FLAGS[given.removeprefix("flag --").partition("=")[0]].parser
+        choices = getattr(parser, "enum_values", ("true", "false"))
+        raise ValueError(f"{given}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
+
+
+def _flags(module: ModuleType) -> Iterator[flags.Flag]:
+    """Yield the flags of a program and of this package."""
+    for name, defined in flags.FLAGS.flags_by_module_dict().items():
+        if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):
+            yield from defined
+
+
 def _help(module: ModuleType) -> str:
     """Return a program's docstring and flags."""
     shown = flags.FlagValues()
-    for name, defined in flags.FLAGS.flags_by_module_dict().items():
-        if name in (module.__name__, sys.argv[0]) or name.startswith(f"{__package__}."):
-            for flag in defined:
-                shown[flag.name] = flag
+    for flag in _flags(module):
+        shown[flag.name] = flag
     return f"{module.__doc__.strip()}\n\nFlags:\n{shown.get_help(include_special_flags=False)}"
 
 

@@ -67,14 +67,14 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
         ),
         (
             ["--episodes=4294967296"],
-            "flag --episodes=4294967296: 4294967296 is not an integer in the range [1, 100000]",
+            "flag --episodes=4294967296: expected an integer in the range [1, 100000]",
         ),
         (
             ["--id="],
             "dataset id '': expected names of letters, digits, '-' and '_' with '/' between, two characters at least "
             "before the last '/', and a version at the end alone, such as 'arc_suite/queen/walk/cpg-medium-v0'",
         ),
-        (["--noise=-1"], "flag --noise=-1: -1.0 is not a non-negative number"),
+        (["--noise=-1"], "flag --noise=-1: expected a non-negative number"),
         (["queen"], "unexpected argument 'queen'; see --help"),
     ],
 )

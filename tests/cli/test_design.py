@@ -97,7 +97,7 @@ def test_another_search_is_refused_and_left_alone(found):
         (("--mass=-1",), "mass: expected a number from 1e-06 to 1e+06, got -1.0"),
         (("--span=nan",), "span: expected a number from 0.05 to 100, got nan"),
         (("--mass=1e6", "--span=0.06"), "no body: "),
-        (("--bodies=0",), "flag --bodies=0: 0 is not an integer in the range [1, 100000]"),
+        (("--bodies=0",), "flag --bodies=0: expected an integer in the range [1, 100000]"),
         (("--task=stair",), "unknown task 'stair'; did you mean 'stairs'?"),
         (("--task=stairs", "--set=terrain_seed=x"), "terrain_seed: expected an integer from 0 to 4294967295, got 'x'"),
         (("--set=speed=3",), "unknown setting of walk 'speed'"),

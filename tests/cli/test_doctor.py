@@ -56,7 +56,7 @@ def test_it_goes_on_where_nobody_reads_on():
 def test_a_wrong_flag_is_one_line():
     done = programs.arc_suite("doctor", "--verbose=1")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith("arc-suite doctor: Unknown command line flag 'verbose'")
+    assert done.stderr.startswith("arc-suite doctor: unknown flag 'verbose' (there are: help, version)")
 
 
 @pytest.mark.slow

@@ -153,13 +153,12 @@ def test_json_is_refused_before_the_work_starts():
     ("arguments", "message"),
     [
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
-        (["--episodes=0"], "flag --episodes=0: 0 is not an integer in the range [1, 100000]"),
+        (["--episodes=0"], "flag --episodes=0: expected an integer in the range [1, 100000]"),
         (
             ["--episodes=200000"],
-            "flag --episodes=200000: 200000 is not an integer in the range [1, 100000]",
+            "flag --episodes=200000: expected an integer in the range [1, 100000]",
         ),
-        (["--episodes=1e20"], "flag --episodes=1e20: invalid literal for int() with base 10: '1e20'"),
-        (["--episode=3"], "Unknown command line flag 'episode'. Did you mean: episodes ?"),
+        (["--episodes=1e20"], "flag --episodes=1e20: expected an integer in the range [1, 100000]"),
         (["--set=time_limit=Infinity"], "time_limit: expected a finite number, as every episode must end, got inf"),
         (["queen"], "unexpected argument 'queen'; see --help"),
     ],

@@ -95,8 +95,11 @@ def test_without_a_reader_the_work_goes_on(tool, tmp_path, redirection):
 @pytest.mark.parametrize(
     ("argument", "message"),
     [
-        ("--count=-1", "flag --count=-1: "),
-        ("--cuont=1", "Unknown command line flag 'cuont'. Did you mean: count ?"),
+        ("--count=-1", "flag --count=-1: expected a non-negative integer\n"),
+        ("--count=many", "flag --count=many: expected a non-negative integer\n"),
+        ("--cuont=1", "unknown flag 'cuont'; did you mean 'count'? (there are: count, help, output, raises, "),
+        ("--xyz=1", "unknown flag 'xyz' (there are: count, help, output, raises, version)\n"),
+        ("--version=maybe", "flag --version=maybe: expected true or false\n"),
         ("stray", "unexpected argument 'stray'; see --help"),
     ],
 )

@@ -207,11 +207,18 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         (["--compare=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (["--compare=cpg"], "--compare: expected another one than 'cpg'"),
         (["--compare=none.npz"], "cannot read none.npz: no such file or directory"),
+        (
+            ["--policy=runs/none"],
+            "cannot read runs/none: no such file; the id of a dataset ends in a version, such as runs/none-v0",
+        ),
         (["--save=tracks.json"], "--save=tracks.json: expected a file that ends in .npz"),
         (["--save=a.npz", "--robot=all"], f"--save=a.npz: expected one robot, got {', '.join(ROBOTS)}"),
         (["--save=nowhere/a.npz"], "cannot write nowhere/a.npz: no such file or directory"),
         ([f"--spec={SPIDER}", "--robot=tick"], "--robot=tick: expected no robot with --spec or --legs"),
-        (["--policy=own_walkers:froze"], "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'"),
+        (
+            ["--policy=own_walkers:froze"],
+            "policy 'own_walkers:froze': module 'own_walkers' has no attribute 'froze'; did you mean 'frozen'?",
+        ),
         (
             ["--compare=own_walkers:broken", "--robot=leaper", "--episodes=1"],
             "policy 'own_walkers:broken': episode of seed 0, step 0: "
@@ -220,7 +227,7 @@ def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         (["--json=nowhere/a.json"], "cannot write nowhere/a.json: no such file or directory"),
         ([f"--output={SPIDER}"], f"cannot make folder {SPIDER}: file exists"),
-        (["--episodes=0"], "flag --episodes=0: 0 is not an integer in the range [1, 100000]"),
+        (["--episodes=0"], "flag --episodes=0: expected an integer in the range [1, 100000]"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(tmp_path, arguments, message):

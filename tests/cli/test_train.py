@@ -14,6 +14,7 @@ import programs
 import pytest
 
 from arc_suite.agents import configuration
+from arc_suite.robots import ROBOTS
 
 HAS_JAX = importlib.util.find_spec("jax") is not None
 ROOT = pathlib.Path(__file__).parents[2]
@@ -40,7 +41,21 @@ def one_line(done, line):
     ("flags", "line"),
     [
         (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
+        (
+            ["--algorithm=my_algorithms:PATIEN"],
+            "arc-suite train: algorithm 'my_algorithms:PATIEN': module 'my_algorithms' has no attribute 'PATIEN'; "
+            "did you mean 'PATIENT'?\n",
+        ),
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
+        (
+            ["--robot=tock"],
+            f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? (there are: {', '.join(ROBOTS)})\n",
+        ),
+        (["--stps=5"], "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, config, "),
+        (["--steps=abc"], "arc-suite train: flag --steps=abc: expected a positive integer\n"),
+        (["--minutes=x"], "arc-suite train: flag --minutes=x: expected a non-negative number\n"),
+        (["--config=none.json"], "arc-suite train: cannot read none.json: no such file or directory\n"),
+        (["--config=policy.npz"], "arc-suite train: cannot read policy.npz: expected text in UTF-8\n"),
         (
             ["--algorithm=sac", "--hp=batsch=3"],
             "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'batch'",
@@ -57,6 +72,8 @@ def one_line(done, line):
     ],
 )
 def test_errors_are_one_line(flags, line, tmp_path):
+    (tmp_path / "my_algorithms.py").write_text("PATIENT = None")
+    (tmp_path / "policy.npz").write_bytes(b"PK\x80")
     one_line(run("train", *flags, cwd=tmp_path), line)
     assert not list(tmp_path.rglob("*.csv"))
 
@@ -87,6 +104,10 @@ def test_without_jax_it_says_what_to_install(tmp_path):
 
 
 def test_export_of_what_is_no_run(tmp_path):
+    one_line(
+        run("export", "runs/none", "-o", "a.txt", cwd=tmp_path),
+        "arc-suite export: unknown extension '.txt' (there are: .onnx)",
+    )
     one_line(run("export", "runs/none", cwd=tmp_path), "arc-suite export: cannot read runs/none: no such file")
     one_line(
         run("export", cwd=tmp_path),

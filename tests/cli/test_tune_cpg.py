@@ -63,7 +63,7 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
     ("arguments", "message"),
     [
         (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'?"),
-        (["--generations=0"], "flag --generations=0: 0 is not an integer in the range [1, 100000]"),
+        (["--generations=0"], "flag --generations=0: expected an integer in the range [1, 100000]"),
         (["--resets=100000000000000000000"], "flag --resets=100000000000000000000: "),
         (["--steps=1001"], "flag --steps=1001: "),
         (["--space=torqes"], "unknown space 'torqes'; did you mean 'torques'?"),
