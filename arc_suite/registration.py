@@ -96,7 +96,7 @@ def _task_name(task) -> str:
     if not (isinstance(name, str) and name.isidentifier()):
         raise ValueError(f"task {name!r}: expected a name of letters, digits and underscores")
     if missing := sorted(task.__abstractmethods__):
-        raise ValueError(f"task {name!r}: has no {' and no '.join(missing)}, which arc_suite.tasks.Task asks for")
+        raise ValueError(f"task {name!r}: has no {' and no '.join(missing)}, which arc_suite.tasks.Task requires")
     return name
 
 

@@ -77,7 +77,7 @@ UNKNOWN = "unknown weight 'heigt'; did you mean 'height'? (there are: height, up
     [
         (CROUCHING, MISSPELT, UNKNOWN),
         (UNCHECKED, MISSPELT, UNKNOWN),
-        (OBSERVE.sub("", CROUCHING), (), "task 'crouch': has no observe, which arc_suite.tasks.Task asks for"),
+        (OBSERVE.sub("", CROUCHING), (), "task 'crouch': has no observe, which arc_suite.tasks.Task requires"),
     ],
     ids=["weights that the task checks", "weights that it does not check", "a method is missing"],
 )
