@@ -198,6 +198,14 @@ def test_a_curriculum_is_judged_at_the_difficulty(tmp_path):
         assert evaluation.run(environment, policy, 4).total == table["return"][4]
 
 
+def test_the_page_counts_runs():
+    rows = re.findall(r"^\| `([a-z-]+)` \| (\d+) \| (\d+) \|", (ROOT / "docs" / "study.md").read_text(), re.MULTILINE)
+    assert {name for name, *_ in rows} == tables.STUDIES.keys()
+    for name, runs, committed in rows:
+        assert len(tables.study(name).runs) == int(runs), name
+        assert len(list((ROOT / "studies" / name).glob("*/config.json"))) == int(committed), name
+
+
 def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
     body = dataclasses.replace(generator.generate(4, 2), name="creature")
     monkeypatch.setitem(sys.modules, "others", types.ModuleType("others"))
