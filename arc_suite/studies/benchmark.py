@@ -135,7 +135,7 @@ def text(studies: Path) -> str:
     """Return the table of the benchmark in Markdown: all learners in a folder of studies, by track and score.
 
     Raises:
-        ValueError: a damaged file of scores, or a folder of a name that begins with no track.
+        ValueError: no scores, a damaged file of them, or a folder of a name that begins with no track.
         OSError: a file cannot be read.
     """
     lines = []
@@ -146,6 +146,8 @@ def text(studies: Path) -> str:
             groups = _by_place(scores)
             middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
             lines.append((order, not all(groups), -middle, track, learner, *_cells(groups)))
+    if not lines:
+        raise ValueError(f"{studies}: holds no scores of the benchmark; run a track, or name their folder by --results")
     places = [" ".join(each) for each in PLACES]
     heads = ["track", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
     return table(heads, [line[3:] for line in sorted(lines)])

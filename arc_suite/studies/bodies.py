@@ -51,12 +51,18 @@ def text(folder: Path) -> str:
 
     A cell holds the share of bodies that walk, the score and, in brackets, that of the worst tenth. In tasks with a
     command it holds the score and the tracking as a share of the demonstrators'.
+
+    Raises:
+        ValueError: no tables of episodes in the folder, or a damaged one.
+        OSError: a file cannot be read.
     """
     rows = []
     for path in sorted(folder.glob("*.csv")):
         policy, _, task = path.stem.rpartition("-")
         results = {family: transfer.result(trials) for family, trials in read(path).items()}
         rows.append([policy, task, *(_cell(results.get(family)) for family in transfer.FAMILIES)])
+    if not rows:
+        raise ValueError(f"{folder}: holds no tables of episodes; write one by -o, or name their folder by --results")
     return table(("policy", "task", *transfer.FAMILIES), rows)
 
 

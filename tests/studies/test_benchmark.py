@@ -167,15 +167,20 @@ def run(*arguments, cwd):
         (["top", "--policies=.", "--name=a/b"], "--name=a/b: expected letters, digits, _, - and ."),
         (["top", "--policies=none"], "cannot read none: no such file or directory"),
         (["--page=none.md"], "cannot read none.md: no such file or directory"),
-        (["--page=page.md"], "--page=page.md: expected the lines <!-- table --> and <!-- end -->, got none"),
+        (["--page=plain.md"], "--page=plain.md: expected the lines <!-- table --> and <!-- end -->, got none"),
+        (["--page=page.md"], "studies: holds no scores of the benchmark; run a track, or name their folder by "),
+        ([], "studies: holds no scores of the benchmark; run a track, or name their folder by --results"),
     ],
 )
 def test_errors_are_one_line(tmp_path, arguments, line):
-    (tmp_path / "page.md").write_text("text")
+    """A page keeps its table."""
+    pages = {"page.md": "<!-- table -->\nrows\n<!-- end -->\n", "plain.md": "text"}
+    for name, text in pages.items():
+        (tmp_path / name).write_text(text)
     done = run(*arguments, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (1, "") and done.stderr.count("\n") == 1, done.stderr
     assert done.stderr.startswith(f"arc-suite benchmark: {line}")
-    assert [path.name for path in tmp_path.iterdir()] == ["page.md"]
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == pages
 
 
 @pytest.mark.long
