@@ -6,7 +6,7 @@ import math
 import operator
 import os
 import pkgutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -196,18 +196,19 @@ def quoted(value: Any) -> str:
     return " ".join(str(value).split())[:_LONGEST_QUOTE]
 
 
-def imported(path: str, kind: str) -> Any:
+def imported(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:
     """Return what `module:name` stands for; its module is imported.
 
     Args:
         path: the module and the name in it.
         kind: of what is wanted, with which an error begins.
+        resolve: returns it.
 
     Raises:
         ValueError: there is none.
     """
     try:
-        return pkgutil.resolve_name(path)
+        return resolve(path)
     except (ImportError, ValueError, AttributeError) as error:
         hint = _hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
         raise ValueError(f"{kind} {path!r}: {error}{hint}") from None

@@ -1,14 +1,18 @@
 """Policies by name: some need no training; any other is a file, or is found on Python's path."""
 
 import hashlib
+import importlib.util
 import os
+import pkgutil
+import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, versions
+from arc_suite import checks, files, versions
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.bodies_setup import BodiesSetup
@@ -22,6 +26,7 @@ from arc_suite.robots import ROBOTS, is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
+MODULE = ".py"  # extension of a file that holds a function which makes a policy
 _CHUNK = 256  # control steps that are drawn at once
 
 
@@ -69,8 +74,8 @@ POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, universa
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
-    "saved, whose pickles run code; or module:attribute, a function that makes a policy from a robot's name, or from "
-    "any other Body."
+    "saved, whose pickles run code; or module:attribute or file.py:attribute, a function that makes a policy from a "
+    "robot's name, or from any other Body."
 )
 PRESET_HELP = f"Of the cpg: {', '.join(preset_names())}, or another that the robot has."
 
@@ -92,7 +97,7 @@ def policy(
             policy file (.npz), see `network`, or of a folder of checkpoints, which take turns from seed to seed,
             see `checkpoints`; that of a zip of stable-baselines3, see `zips`; or `module:attribute`, a function on
             Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a
-            body that is none.
+            body that is none; or `file.py:attribute`, such a function in a file of any name.
         robot: queen, bastion, tick or leaper, or any body.
         presets: of the demonstrator, a name or several that take turns from seed to seed, see `cpg.Demonstrator`; None
             for the one that suits the task and the body.
@@ -149,11 +154,11 @@ def digest(name: str) -> str:
         OSError: a file cannot be read.
     """
     if zipped := zips.parts(name):
-        files = filter(None, (zipped[0], zips.statistics(*zipped)))
+        held = filter(None, (zipped[0], zips.statistics(*zipped)))
     else:
         path = Path(name)
-        files = network.checkpoint_files(path) or [path / network.FILE if path.is_dir() else path]
-    return hashlib.sha256(b"".join(file.read_bytes() for file in files)).hexdigest()
+        held = network.checkpoint_files(path) or [path / network.FILE if path.is_dir() else path]
+    return hashlib.sha256(b"".join(file.read_bytes() for file in held)).hexdigest()
 
 
 def trained(name: str | os.PathLike) -> Network:
@@ -225,12 +230,23 @@ def _check_joints(path: Path, joints: int, body: Body) -> None:
 
 
 def _from_path(path: str, body: Body, num_envs: int) -> Policy:
-    factory = checks.imported(path, "policy")
+    resolve = _in_file if path.rpartition(":")[0].endswith(MODULE) else pkgutil.resolve_name
+    factory = checks.imported(path, "policy", resolve)
     if not callable(factory):
         raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
     make = _checked(path, factory, body.name if is_robot(body) else body)
     make()  # finds out at once whether it makes one
     return Individuals(make, num_envs, len(body.joint_names), f"policy {path!r}")
+
+
+def _in_file(path: str) -> Any:
+    """Return what `file.py:attribute` stands for; the file is run."""
+    file, _, attribute = path.rpartition(":")
+    with files.reading(file):
+        spec = importlib.util.spec_from_file_location(file, files.plain(file))
+    module = sys.modules[file] = importlib.util.module_from_spec(spec)  # type: ignore[arg-type]
+    spec.loader.exec_module(module)  # type: ignore[union-attr]
+    return getattr(module, attribute)
 
 
 def _checked(path: str, factory: Callable, robot: str | Body) -> Callable[[], Callable]:

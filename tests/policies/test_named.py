@@ -120,6 +120,19 @@ def test_policies_from_pythons_path(own):
         np.testing.assert_array_equal(alone(policy(path, "tick"))(time_step), expected)
 
 
+def test_policies_from_files_of_any_name(own, tmp_path):
+    """The file is told where it lies, so that it finds its weights."""
+    (tmp_path / "own-policies-0.py").write_text(f"{OWN}\nassert __file__ == {str(tmp_path / 'own-policies-0.py')!r}")
+    time_step = arc_suite.load("tick", "walk", {"random": 0}).reset()
+    expected = alone(policy("cpg", "tick"))(time_step)
+    np.testing.assert_array_equal(alone(policy(f"{tmp_path}/own-policies-0.py:walk", "tick"))(time_step), expected)
+
+
+def test_a_file_that_is_not_there_is_one_line():
+    with pytest.raises(OSError, match="cannot read none.py: no such file or directory"):
+        policy("none.py:make", "tick")
+
+
 def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_any_other(own):
     body, denser = generate(4, 2), ROBOTS["tick"].replace(density=1000.0)
     for robot, told in (("tick", "tick"), (ROBOTS["tick"], "tick"), (body, body), (denser, denser)):
@@ -135,11 +148,15 @@ def test_policies_from_pythons_path_learn_the_name_of_a_robot_and_the_body_of_an
         ("own_polices:walk", "No module named 'own_polices'"),
         (":walk", "invalid format: ':walk'"),
         ("own_policies:wlak", "module 'own_policies' has no attribute 'wlak'; did you mean 'walk'?"),
+        ("own_policies.py:wlak", "module 'own_policies.py' has no attribute 'wlak'; did you mean 'walk'?"),
+        ("needs.py:walk", "No module named 'tortch'"),
         ("own_policies:number", "expected a function that makes a policy from a robot's name"),
         ("own_policies:forgets", "expected it to return a function of a TimeStep, got NoneType"),
     ],
 )
-def test_paths_that_lead_nowhere_are_named(own, path, message):
+def test_paths_that_lead_nowhere_are_named(own, tmp_path, monkeypatch, path, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "needs.py").write_text("import tortch")
     with pytest.raises(ValueError) as error:
         policy(path, "tick")
     assert str(error.value) == f"policy {path!r}: {message}"
