@@ -3,8 +3,8 @@
 A score is (return - standing still) / (best demonstrator - standing still). The track `top` gives an algorithm a
 million steps, three on uneven ground and among pillars; `samples` gives it 100,000; `demonstrations` gives it 100,000,
 and 100 episodes of a demonstrator. The runs of an algorithm on a track are a study: killed at any moment, the same
-command resumes. Policies of other libraries are files ROBOT-TASK-SEED in a folder. Without a track the command prints
-the table of all learners.
+command resumes. Policies of other libraries are files ROBOT-TASK-SEED in a folder: .zip of stable-baselines3, .npz,
+.py with a function make(robot), or folders of runs. Without a track the command prints the table of all learners.
 
   arc-suite benchmark samples --algorithm sac_parallel
   arc-suite benchmark top --algorithm ppo --seeds 2 --jobs 8
@@ -69,7 +69,8 @@ def scored(track: str) -> int:
     """Score the policies of a folder.
 
     Raises:
-        ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or no policies in the folder.
+        ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or a folder that
+            `benchmark.of_policies` refuses.
         OSError: a file cannot be read.
     """
     policies = Path(FLAGS.policies)

@@ -6,7 +6,9 @@ The table of all learners is made from these files alone.
 """
 
 import csv
-import re
+import difflib
+import itertools
+import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,17 +18,24 @@ import numpy as np
 from arc_suite import checks, evaluation, files, policies, style
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.policies import network
+from arc_suite.policies import named, network, zips
 from arc_suite.studies import results
 from arc_suite.studies.leaderboard import table
 from arc_suite.studies.results import Result
-from arc_suite.studies.tracks import PLACES, TRACKS, TURNING
+from arc_suite.studies.tracks import PLACES, SEEDS, TRACKS, TURNING
 
 SCORES = "scores.csv"
 CLIP = (-0.5, 1.2)  # of the score of a run
 HALF = 0.5  # score up to which minutes of the processor are counted
 STYLE, STYLE_HEADS = ("gait_compliance", "heading_error"), ("gait compliance", "heading error, rad")
 NOT_RUN = "not run"
+MAKE = "make"  # function of a module that makes a policy
+ENDINGS = (zips.EXTENSION, network.EXTENSION, named.MODULE)
+# Robot, task and seed by the names that policies of a folder can have.
+NAMES = {
+    f"{robot}-{task}-{seed}{ending}": (robot, task, seed)
+    for (robot, task), seed, ending in itertools.product(PLACES, range(SEEDS), ("", *ENDINGS))
+}
 
 
 class Score(NamedTuple):
@@ -75,31 +84,53 @@ def _score(setup: Setup, seed: int, result: float, minutes: float, measured, sca
 def of_policies(folder: Path, progress: Callable) -> list[Score]:
     """Play the protocol's episodes by the policies of a folder, and return their scores.
 
+    What has an ending of `ENDINGS` or a name of `NAMES` is a policy, and the folder of a run. Weights, statistics and
+    notes are none, nor are names that begin with `.` or `_`.
+
     Args:
-        folder: of policies named `ROBOT-TASK-SEED`, as `policies.policy` takes them: a zip of stable-baselines3, a
-            policy file (.npz), or the folder of a run.
+        folder: of policies named `ROBOT-TASK-SEED`: a zip of stable-baselines3, a policy file (.npz), a module with a
+            function `MAKE`, see `policies.policy`, or the folder of a run.
         progress: makes a progress bar as `tqdm` does.
 
     Raises:
-        ValueError: no policy of a place in the folder, or one that does not fit.
+        ValueError: no policy in the folder, another name, two policies of a place and seed, or one that does not fit.
         OSError: a file cannot be read.
     """
-    places = "|".join("-".join(each) for each in PLACES)
-    pattern = re.compile(rf"({places})-(\d+)(\.zip|{re.escape(network.EXTENSION)})?")
+    found = _by_name(folder)
+    return [
+        _of_policy(path, Setup.of(robot, task), seed)
+        for (robot, task, seed), path in progress(found.items(), desc=str(folder), unit="policy", leave=False)
+    ]
+
+
+def _by_name(folder: Path) -> dict[tuple[str, str, int], Path]:
+    """Return the policies of a folder by robot, task and seed, in the order of their names."""
+    found: dict[tuple[str, str, int], Path] = {}
     with files.reading(folder):
-        named = [(path, pattern.fullmatch(path.name)) for path in sorted(folder.iterdir())]
-    found = [(path, match) for path, match in named if match]
+        paths = sorted(filter(_is_policy, folder.iterdir()))
+    for path in paths:
+        if path.name not in NAMES:
+            (near,) = difflib.get_close_matches(path.name, NAMES, n=1, cutoff=0.0)
+            expected = f"ROBOT-TASK-SEED of a place and a seed from 0 to {SEEDS - 1}"
+            raise ValueError(f"{path}: expected {expected}, such as {near}")
+        if other := found.get(NAMES[path.name]):
+            raise ValueError(f"{path}: expected one policy of this place and seed, got {other.name}, too")
+        found[NAMES[path.name]] = path
     if not found:
         raise ValueError(f"{folder}: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none")
-    return [
-        _of_policy(path, Setup.of(*match[1].split("-")), int(match[2]))
-        for path, match in progress(found, desc=str(folder), unit="policy", leave=False)
-    ]
+    return found
+
+
+def _is_policy(path: Path) -> bool:
+    return path.name[0] not in "._" and (
+        path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path))
+    )
 
 
 def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
     environment = setup.load()
-    policy = policies.policy(path, setup.body, task=environment.task.definition)
+    name = f"{path}:{MAKE}" if path.suffix == named.MODULE else path
+    policy = policies.policy(name, setup.body, task=environment.task.definition)
     tracks = [style.record(environment, policy, seed) for seed in range(evaluation.EPISODES)]
     every = [style.measure(track) for track in tracks]
     measured = {each: np.array([metrics[each].value for metrics in every]) for each in STYLE}

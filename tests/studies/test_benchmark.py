@@ -183,17 +183,59 @@ def test_errors_are_one_line(tmp_path, arguments, line):
     assert {path.name: path.read_text() for path in tmp_path.iterdir()} == pages
 
 
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("tick-wlk-1.npz", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1.npz"),
+        ("leaper-walk-7.zip", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as leaper-walk-2.zip"),
+        ("queen-stair.py", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as queen-stairs-2.py"),
+        ("tick-walk-0.py", "expected one policy of this place and seed, got tick-walk-0.npz, too"),
+        ("tick-walk-01/policy.npz", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1"),
+    ],
+)
+def test_policies_of_other_names_are_refused_before_any_plays(tmp_path, name, line):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    for each in (path, tmp_path / "tick-walk-0.npz"):
+        each.write_bytes(b"")
+    with pytest.raises(ValueError) as error:
+        benchmark.of_policies(tmp_path, progress=None)
+    assert str(error.value) == f"{tmp_path / name.partition('/')[0]}: {line}"
+
+
+MODULE = """
+import pathlib
+import numpy as np
+
+def make(robot):
+    action = np.load(pathlib.Path(__file__).with_suffix(".npy"))
+    return lambda timestep: action
+"""
+
+
+def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypatch):
+    """A module acts by the weights next to it; this one stands still, for one episode in place of ten."""
+    monkeypatch.setattr(evaluation, "EPISODES", 1)
+    (tmp_path / "tick-walk-2.py").write_text(MODULE)
+    np.save(tmp_path / "tick-walk-2.npy", np.zeros(18))
+    for name in ("README.md", ".hidden.py", "_helpers.py", "tick-walk-2_vecnormalize.pkl", "studies/other.zip"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    (found,) = benchmark.of_policies(tmp_path, lambda each, **_: each)
+    assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
+
+
 @pytest.mark.long
 def test_policies_of_others_are_scored(tmp_path):
     """Those of the package stand for them; what is no policy of a place is left out."""
     (tmp_path / "theirs").mkdir()
-    (tmp_path / "theirs" / "tick-walk-3.npz").write_bytes((PACKAGED / "tick-walk.npz").read_bytes())
+    (tmp_path / "theirs" / "tick-walk-1.npz").write_bytes((PACKAGED / "tick-walk.npz").read_bytes())
     (tmp_path / "theirs" / "notes.txt").write_text("")
     (tmp_path / "page.md").write_text("# Mine\n\n<!-- table -->\n<!-- end -->\n")
     done = run("samples", "--policies=theirs", "--page=page.md", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     (found,) = benchmark.read(tmp_path / "studies" / "samples-theirs" / benchmark.SCORES)
-    assert (found.robot, found.task, found.seed) == ("tick", "walk", 3)
+    assert (found.robot, found.task, found.seed) == ("tick", "walk", 1)
     assert found.score == pytest.approx(scale().score(found.result)) and found.score > 0.9
     assert np.isnan(found.minutes) and found.gait_compliance > 0.95 and found.heading_error < 0.2
     page = (tmp_path / "page.md").read_text()
