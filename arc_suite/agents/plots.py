@@ -29,7 +29,9 @@ STYLES = {
     "finetune_bodies": ("#117733", "p"),
 }
 _OTHERS = (("#CC6677", "<"), ("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"))  # of other packages, in order
-_DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 4)))  # of runs of one algorithm that differ otherwise
+# Line and hollow marker of further kinds of runs of one algorithm in a study; the first has the algorithm's own.
+_VARIANTS = (("--", "o"), (":", "s"), ("-.", "^"), ((0, (8, 2)), "D"), ((0, (1, 4)), "v"))
+_MARKERS = 15  # of a curve, at most
 _GREY = "#6E6E6E"
 _GAP = 0.052  # between the labels of two levels, as a share of the axis
 
@@ -71,7 +73,7 @@ def returns(
     low, mean, high = np.array([(each.min(), each.mean(), each.max()) for each in episodes]).T
     colour, marker = _styles([algorithm])[algorithm]
     axis.fill_between(steps, low, high, color=colour, alpha=0.15, linewidth=0)
-    axis.plot(steps, mean, color=colour, marker=_shown(marker, steps))
+    axis.plot(steps, mean, color=colour, marker=marker, markevery=_every(steps))
     _finish(axis, title, lines, finals, _styles([algorithm, *finals]))
     axis.set_ylabel("return: mean, lowest and highest of ten episodes")
     return figure
@@ -97,17 +99,17 @@ def study(
     axes = figure.subplots(rows, columns, squeeze=False)
     used = [each.algorithm for kinds in groups.values() for each in kinds.values()]
     styles = _styles([*used, *(name for every in finals.values() for name in every)])
-    dashes = _dashes(groups)
+    variants = _variants(groups)
     for axis in axes.flat[len(groups) :]:
         axis.remove()
     for axis, (place, kinds) in zip(axes.flat, groups.items(), strict=False):
         for kind, each in kinds.items():
             colour, marker = styles[each.algorithm]
-            style = {"color": colour, "linestyle": dashes[kind], "marker": _shown(marker, each.steps), "markersize": 5}
+            style = {"color": colour, "marker": marker, "markersize": 5, "markevery": _every(each.steps)}
             robust = curve([each.returns])
             if len(each.returns) > 1:
                 axis.fill_between(each.steps, robust.low, robust.high, color=colour, alpha=0.15, linewidth=0)
-            axis.plot(each.steps, robust.iqm, label=kind, **style)
+            axis.plot(each.steps, robust.iqm, label=kind, **style | variants[kind])
         _finish(axis, place, lines.get(place, {}), finals.get(place, {}), styles)
     for axis in axes[:, 0]:
         axis.set_ylabel("return of an evaluation")
@@ -124,15 +126,17 @@ def _styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     return {name: STYLES[name] if name in STYLES else next(others) for name in dict.fromkeys(names)}
 
 
-def _dashes(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, Any]:
-    """Return the pattern of the lines of each kind: kinds of one algorithm differ."""
+def _variants(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, dict[str, Any]]:
+    """Return by kind what its line has other than the algorithm's style: kinds of one algorithm differ."""
     kinds = {kind: each.algorithm for every in groups.values() for kind, each in every.items()}
-    counts = {name: itertools.cycle(_DASHES) for name in kinds.values()}
-    return {kind: next(counts[algorithm]) for kind, algorithm in kinds.items()}
+    others = [{"linestyle": dashes, "marker": marker, "markerfacecolor": "white"} for dashes, marker in _VARIANTS]
+    turns = {name: itertools.cycle([{}, *others]) for name in kinds.values()}
+    return {kind: next(turns[algorithm]) for kind, algorithm in kinds.items()}
 
 
-def _shown(marker: str, steps: np.ndarray) -> str | None:
-    return marker if len(steps) < 15 else None
+def _every(steps: np.ndarray) -> int:
+    """Return of how many points one has a marker, so that there are at most `_MARKERS`."""
+    return -(-len(steps) // _MARKERS)
 
 
 def _finish(axis, title: str, lines: Mapping[str, float], finals: Mapping[str, float], styles: Mapping) -> None:

@@ -61,6 +61,29 @@ def test_one_run_has_no_band_and_kinds_of_one_algorithm_have_its_colour(crowded)
         drawn = {line.get_label(): line for line in axis.get_lines()}
         assert drawn["sac"].get_color() == drawn["sac-other"].get_color() == plots.STYLES["sac"][0]
         assert drawn["sac"].get_linestyle() != drawn["sac-other"].get_linestyle()
+        assert drawn["sac"].get_marker() == plots.STYLES["sac"][1]
+
+
+def test_kinds_of_one_algorithm_differ_in_their_markers():
+    """In the legend and in every panel; their number is that of the variants of `parallel-parts`."""
+    curve = Curve("sac_parallel", STEPS, np.arange(5.0)[None])
+    kinds = {f"sac_parallel-{part}": curve for part in "abcde"}
+    figure = plots.study({"a": kinds, "b": dict(reversed(kinds.items()))}, {}, {})
+    for lines in (figure.legends[0].get_lines(), *(axis.get_lines() for axis in figure.axes)):
+        assert {line.get_color() for line in lines} == {plots.STYLES["sac_parallel"][0]}
+        assert len({(line.get_marker(), line.get_markerfacecolor()) for line in lines}) == 5
+
+
+@pytest.mark.parametrize(("points", "shown"), [(1, 1), (15, 15), (16, 8), (30, 15), (50, 13)])
+def test_long_curves_have_few_markers_and_the_legend_shows_them(points, shown):
+    curves = {
+        place: {"ppo": Curve("ppo", np.arange(count), np.zeros((1, count)))}
+        for place, count in (("short", 5), ("long", points))
+    }
+    figure = plots.study(curves, {}, {})
+    (line,) = figure.axes[1].get_lines()
+    assert len(range(0, points, line.get_markevery())) == shown
+    assert {each.get_marker() for each in (line, *figure.legends[0].get_lines())} == {"o"}
 
 
 def test_unknown_algorithms_get_other_colours():
