@@ -2,8 +2,8 @@
 
 `anchors.csv` holds both for robots of the suite in tasks with default settings: the returns of the protocol's episodes,
 written by `python tools/results.py --anchors`. In places that it lacks they are measured. Episodes run in a batch,
-where policies observe float32 as learners do. `arc-suite evaluate` has float64, and chaotic walks diverge: Leaper's `medium`
-earns 2619.8 here and 2610.4 there.
+where policies observe float32 as learners do. `arc-suite evaluate` has float64, and chaotic walks diverge: Leaper's
+`medium` earns 2619.8 here and 2610.4 there.
 """
 
 import contextlib
