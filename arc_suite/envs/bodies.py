@@ -114,7 +114,9 @@ class BodiesEnv(Together):
         columns = zip(*(described[which] for which in which_body), strict=True)
         self.description = Description(*map(np.stack, columns))
         sizes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
-        boxes = {name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()}
+        boxes: dict[str, gymnasium.Space] = {
+            name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()
+        }
         self.single_observation_space = gymnasium.spaces.Dict(boxes)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS, tokens.JOINTS), np.float32)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -154,7 +156,7 @@ class BodiesEnv(Together):
         if not self._begun:
             raise ResetNeeded("cannot step: no episode has begun; call reset first")
         actions, info = checked_action(actions, self.action_space.shape), {}
-        reward, terminated, truncated = np.zeros(self.num_envs), *np.zeros((2, self.num_envs), bool)
+        reward, (terminated, truncated) = np.zeros(self.num_envs), np.zeros((2, self.num_envs), bool)
         for place in self._places:
             group, indices, _ = place
             _, reward[indices], terminated[indices], truncated[indices], own = group.step(

@@ -43,7 +43,7 @@ class Episodes:
         self._command()
         self._before, self._markers = self._qpos(), 2 * (self._asked(),)
 
-    def command(self, desired: Sequence[float] | None) -> None:
+    def command(self, desired: Sequence[float] | np.ndarray | None) -> None:
         """Set the command, clipped to [-1, 1], or leave it to the task; a task without a command ignores it."""
         if self.commanded:
             self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
@@ -76,7 +76,8 @@ class Episodes:
     def markers(self, share: float) -> list[Marker]:
         """Return the task's debug markers at a share, 0 to 1, of the latest control step."""
         before, now = self._markers
-        if [each._replace(start=0, end=0) for each in before] != [each._replace(start=0, end=0) for each in now]:
+        without_ends = dict.fromkeys(_ENDS)
+        if [each._replace(**without_ends) for each in before] != [each._replace(**without_ends) for each in now]:
             return now
         return [
             new._replace(**{end: (1.0 - share) * getattr(old, end) + share * getattr(new, end) for end in _ENDS})

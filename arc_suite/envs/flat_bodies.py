@@ -24,8 +24,10 @@ class FlatTask(NamedTuple):
     step_limit: float
     blocks: Mapping[str, int] = tokens.FLAT
 
-    # Where an environment of one body has a view of its task.
-    definition = property(lambda self: self)
+    @property
+    def definition(self) -> "FlatTask":
+        """Itself, where an environment of one body has a view of its task."""
+        return self
 
     @property
     def size(self) -> int:
@@ -52,6 +54,8 @@ class FlatBodies(gymnasium.vector.VectorWrapper):
     Observations are (num_envs, 664): legs, torso and command of the step, then legs and torso of the description.
     Actions are (num_envs, 48).
     """
+
+    unwrapped: BodiesEnv  # of Gymnasium, for which it is any environment
 
     def __init__(self, env: BodiesEnv):
         """Wrap environments of different bodies."""

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.envs.flat_bodies import FlatBodies
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.paper import DEMONSTRATORS, FINALS
@@ -105,7 +106,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 
 
 def episodes_in_batch(
-    environment: VectorEnv,
+    environment: VectorEnv | FlatBodies,
     policy: Policy,
     seeds: Sequence[int] = range(EPISODES),
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,

@@ -37,7 +37,7 @@ class Family(NamedTuple):
     """
 
     made: Callable[[int], Body]
-    count: int
+    count: int  # type: ignore[assignment]  # hides the method of tuples
 
 
 def _robot(index: int) -> Body:
@@ -113,7 +113,7 @@ class Result(NamedTuple):
         tracking: mean tracking as a share of the demonstrators' mean; NaN in tasks without this metric.
     """
 
-    count: int
+    count: int  # type: ignore[assignment]  # hides the method of tuples
     walk: float
     demonstrated: float
     score: float

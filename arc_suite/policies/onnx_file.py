@@ -30,7 +30,7 @@ def metadata(network: Network) -> dict:
     gears                       N m that an action of 1 is, by joint
     gait_clock                  how the block of that name follows from time; only where there is one
     """
-    return _metadata(network.setup, network.blocks)
+    return _metadata(network.setup, network.blocks)  # type: ignore[arg-type]  # of many bodies: `save_universal`
 
 
 def _metadata(setup: Setup, blocks: Mapping[str, int]) -> dict:

@@ -1,13 +1,17 @@
 """Teachers: the demonstrators of a batch of environments, one fitted to each body."""
 
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 import numpy as np
 
-from arc_suite.cpg import suited_preset
+from arc_suite.cpg import Demonstrator, suited_preset
+from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.flat_bodies import FlatBodies
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.named import policy
+from arc_suite.policies.protocol import Positioned
+from arc_suite.tasks import Task
 
 
 class Teacher:
@@ -26,8 +30,12 @@ class Teacher:
         Raises:
             ValueError: a body has no such preset.
         """
-        self._bodies = environment.unwrapped if isinstance(environment, FlatBodies) else None
-        tasks = [environment.task.definition] * environment.num_envs if self._bodies is None else self._bodies.tasks
+        self._bodies: BodiesEnv | None = None
+        tasks: Sequence[Task]
+        if isinstance(environment, FlatBodies):
+            self._bodies, tasks = environment.unwrapped, environment.unwrapped.tasks
+        else:
+            tasks = [environment.task.definition] * environment.num_envs
         self._mask = None if self._bodies is None else self._bodies.description.mask.reshape(len(tasks), -1)
         indices: dict[int, list[int]] = {}
         for index, task in enumerate(tasks):
@@ -37,7 +45,8 @@ class Teacher:
             task = tasks[places[0]]
             name = preset or suited_preset(task)
             demonstrator = policy("cpg", task.scene.body, name, len(places), task=task)
-            self._members.append((task, np.array(places), demonstrator))
+            remembering = cast(Demonstrator | Positioned, demonstrator)  # never several, as the preset is one
+            self._members.append((task, np.array(places), remembering))
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
         """Start episodes in some environments; demonstrators are the same in all episodes."""
