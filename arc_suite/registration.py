@@ -63,8 +63,8 @@ def register(
     new_tasks: dict[str, Any] = {_task_name(task): task for task in tasks}
     new_arenas = dict(arenas or {})
     new_families = {_family_name(name): make for name, make in (families or {}).items()}
-    added: tuple[tuple[str, dict, dict], ...]
-    added = ("task", TASKS, new_tasks), ("arena", ARENAS, new_arenas), ("family", FAMILIES, new_families)
+    added: list[tuple[str, dict, dict]]
+    added = [("task", TASKS, new_tasks), ("arena", ARENAS, new_arenas), ("family", FAMILIES, new_families)]
     for kind, table, new in added:
         for name, value in new.items():
             if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:

@@ -1,6 +1,5 @@
 """Bodies of other proportions: links, torso and heading of the legs by factors and degrees."""
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -55,7 +54,10 @@ def shaped(body: Body, **changes) -> Body:
         checks.name(name, link_names(body), "link"): checks.number(f"links[{name!r}]", factor, *FACTOR)
         for name, factor in shape.links.items()
     }
-    torso = tuple(checks.number(name, getattr(shape, name), *FACTOR) for name in ("length", "width", "thickness"))
+    length, width, thickness = (
+        checks.number(name, getattr(shape, name), *FACTOR) for name in ("length", "width", "thickness")
+    )
+    torso = length, width, thickness
     fan = checks.number("fan", shape.fan, *FAN)
     if shape._replace(links={}) == Shape() and set(factors.values()) <= {1.0}:
         return body
@@ -97,7 +99,7 @@ def _stretched(solid: Solid, factors: Vector) -> Solid:
 def _changed(solid: Solid, factors: Vector, **fields) -> Solid:
     """Return a solid with other fields; ballast gains weight as the torso gains volume."""
     mass = {"mass": solid.mass * math.prod(factors)} if isinstance(solid, Ballast) else {}
-    return dataclasses.replace(solid, **fields, **mass)
+    return solid.replace(**fields, **mass)
 
 
 def _axes(euler_deg: Vector) -> list[Vector]:

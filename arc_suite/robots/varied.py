@@ -112,7 +112,8 @@ def _made(random: np.random.Generator) -> Body:
     else:
         places = generator.left_side(count, 0.8 * half_length, 0.6 * half_width, fan)
         names = [f"l{i + 1}" for i in range(count)]
-    made = tuple(_leg(name, *place, *parts) for name, place, *parts in zip(names, places, shapes, joints, strict=True))
+    parts = zip(names, places, shapes, joints, strict=True)
+    made = tuple(_leg(name, *place, shape, jointed) for name, place, shape, jointed in parts)
     if layout == "pairs":
         made = (*made, *(leg.mirrored(leg.name.replace("l", "r")) for leg in made))
     solids, ballast = _torso(random, np.array((half_length, half_width, half_thickness)))
@@ -145,8 +146,8 @@ def _leg(name: str, mount: Vector, heading: float, shape: _Shape, joints: _Joint
     for i, (out, rise) in enumerate(zip(outs, rises, strict=True)):
         low, high = joints.ranges[i] if joints.signs[i] > 0.0 else (-joints.ranges[i][1], -joints.ranges[i][0])
         axis = joints.signs[i] * (normal if i else first)
-        joint = Joint(name=JOINT_NAMES[i], axis=tuple(map(float, axis)), range_deg=(low, high))
-        end = tuple(map(float, (0.0, out, 0.0) + rise * up))
+        joint = Joint(name=JOINT_NAMES[i], axis=_vector(axis), range_deg=(low, high))
+        end = _vector((0.0, out, 0.0) + rise * up)
         radius = 0.8 * shape.foot * (1.0 + 0.35 * (links - 1 - i))
         chain.append(Link(name=LINK_NAMES[links][i], end=end, radius=radius, joint=joint))
     return Leg(name=name, mount=mount, links=tuple(chain), foot=Foot(radius=shape.foot), yaw_deg=heading - 90.0)
@@ -163,13 +164,17 @@ def _torso(random: np.random.Generator, half: np.ndarray) -> tuple[tuple[Solid, 
     if kind < _BUILT:
         for name, share, along in (("head", front, 1.0), ("tail", rear, -1.0)):
             position = along * (1.0 + 0.4 * share) * half * (1.0, 0.0, 0.0) + lifted * half * (0.0, 0.0, 1.0)
-            ends = {"shape": "ellipsoid", "size": tuple(map(float, share * half))}
-            solids.append(Solid(name=name, position=tuple(map(float, position)), **ends))
+            solids.append(Solid(name=name, position=_vector(position), shape="ellipsoid", size=_vector(share * half)))
     if kind < 1.0 - _SHELLED:
         return tuple(solids), ()
     extents = half * shell
     # As heavy as a share of the chassis, were it solid at the density of a body.
     mass = weight * Body.density * 4.0 / 3.0 * math.pi * float(np.prod(half))
     position = (0.0, 0.0, float(lifted * half[2]))
-    shape = {"shape": "ellipsoid", "size": tuple(map(float, extents)), "position": position}
-    return tuple(solids), (Ballast(name="shell", mass=mass, **shape),)
+    ballast = Ballast(name="shell", mass=mass, shape="ellipsoid", size=_vector(extents), position=position)
+    return tuple(solids), (ballast,)
+
+
+def _vector(values: np.ndarray) -> Vector:
+    x, y, z = map(float, values)
+    return x, y, z

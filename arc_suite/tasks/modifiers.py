@@ -14,6 +14,7 @@ from arc_suite.robots.spec import Body
 FAILS_FROM = 40  # control steps after which the motors of a leg fail
 LONGEST_DELAY = 100  # control steps
 ACTIONS = ("torque", "position")
+_DELAYS = (0, LONGEST_DELAY)
 
 
 class Modifiers(NamedTuple):
@@ -54,7 +55,7 @@ BOUNDS = {
     "friction": (0.0, 100.0),
     "mass": (0.01, 100.0),
     "observation_noise": (0.0, 100.0),
-    "delay": (0, LONGEST_DELAY),
+    "delay": _DELAYS,
 }
 
 
@@ -100,7 +101,7 @@ def _noise(value, noisy: list[str]) -> dict[str, float]:
 
 def _delay(value) -> tuple[int, int]:
     low, high = value if isinstance(value, tuple | list) and len(value) == 2 else (value, value)
-    least, most = BOUNDS["delay"]
+    least, most = _DELAYS
     low = checks.integer("delay", low, least, most)
     return low, checks.integer("delay", high, low, most)
 
