@@ -58,8 +58,9 @@ class Showcase(NamedTuple):
     preset: str
 
 
-CLIPS = {
-    "walk": Walk((1.0, 0.0, 0.0)),
+WALK = Walk((1.0, 0.0, 0.0))
+CLIPS: dict[str, Walk | Passage | Idle | Acted | Showcase] = {
+    "walk": WALK,
     "slow": Walk((0.6, 0.0, 0.0)),
     "fast": Walk((1.25, 0.0, 0.0)),
     "turn_left": Walk((0.5, 0.0, 0.5)),

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from arc_suite import rotations
 from arc_suite.export import in_place, loops, planting, root_motion
-from arc_suite.export.catalogue import CLIPS, FASTER, REST, Acted, Passage, Showcase, Walk, sources
+from arc_suite.export.catalogue import CLIPS, FASTER, REST, WALK, Acted, Passage, Showcase, Walk, sources
 from arc_suite.export.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
 from arc_suite.export.recorder import Recorded, Recorder, Transition
 from arc_suite.export.root_motion import Motion, Pose
@@ -80,7 +80,7 @@ def drafts(
         plant: whether feet in stance do not slide.
     """
     body, recorded = recorder.body, _recordings(recorder, names, progress, left_out)
-    gaits = {name: each for name, each in recorded.items() if name != REST}
+    gaits = {name: each for name, each in recorded.items() if isinstance(each, Recorded)}
     clocked = {name: each for name, each in gaits.items() if each.phase is not None}
     found = _in_step(body, clocked, _MOST_CYCLES, loops.OPEN, left_out) if clocked else {}
     for name in gaits.keys() - clocked.keys():
@@ -91,8 +91,8 @@ def drafts(
         found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}
     if plant:
         found = {name: draft.planted(body) for name, draft in found.items()}
-    if REST in recorded:
-        found |= _connected(body, recorded[REST], names, found.get("walk"), plant, left_out)
+    if isinstance(transition := recorded.get(REST), Transition):
+        found |= _connected(body, transition, names, found.get("walk"), plant, left_out)
     if "limp" in found and not {"walk", "idle"} <= found.keys():
         left_out.setdefault("limp", "there is no walk that it differs from")
     elif "limp" in found:
@@ -113,8 +113,8 @@ def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Reco
 
 def _recording(recorder: Recorder, source: str) -> Recorded | Transition:
     if source == REST:
-        return recorder.transition(CLIPS["walk"].command)
-    spec = CLIPS[source]
+        return recorder.transition(WALK.command)
+    spec = cast(Walk | Showcase, CLIPS[source])  # `sources` names no others
     if isinstance(spec, Showcase):
         return recorder.showcase(spec.preset)
     return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(spec.command, spec.failing)

@@ -126,11 +126,11 @@ def _stances(low: np.ndarray, least: int, longest: int | None) -> list[tuple[int
     return [(start, end) for start, end in joined if longest is None or end - start < longest]
 
 
-def _corrections(places: np.ndarray, radius: float, intervals, keeps_ends: bool) -> np.ndarray:
+def _corrections(places: np.ndarray, radius: float, intervals: list[tuple[int, int]], keeps_ends: bool) -> np.ndarray:
     """Return what to add to the places (samples, 3) of a foot, m."""
     count = len(places)
     found = np.zeros_like(places)
-    before = 0, np.zeros(3)  # the end of the latest stance, and its correction there
+    before: tuple[int, np.ndarray] = (0, np.zeros(3))  # the end of the latest stance, and its correction there
     for start, end in intervals:
         share = (np.arange(end - start) / max(end - start - 1, 1))[:, None]
         weights = [fading(share), fading(1.0 - share)]  # of the motion's own first and last places

@@ -113,7 +113,7 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
     """
     inner = task.task if isinstance(task, Modified) else task
     headed = "command" in inner.commands
-    context, health = (inner if headed else steer).context, steer.health
+    context, health = (inner if headed else steer).context, steer.health  # type: ignore[attr-defined]  # of commands
     scene, (force_unit,) = steer.scene, context.force_unit
     return {
         "headed": headed,

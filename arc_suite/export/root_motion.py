@@ -1,6 +1,6 @@
 """Motions: a root that moves over the ground, and a body that moves relative to it."""
 
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
@@ -80,12 +80,12 @@ class Motion(NamedTuple):
         """Return the pose of a sample."""
         return Pose(self.positions[sample], self.quaternions[sample], self.joints[sample])
 
-    def stretched(self, seconds: float) -> Self:
+    def stretched(self, seconds: float) -> "Motion":
         """Return the motion over another duration, s."""
         ratio = seconds / self.seconds
         return self._replace(step=self.step * ratio, twist=self.twist / ratio)
 
-    def moved(self, difference: Pose, shares: np.ndarray) -> Self:
+    def moved(self, difference: Pose, shares: np.ndarray) -> "Motion":
         """Return the motion with a share (samples,) of a difference of poses added to each sample."""
         shares = shares[:, None]
         half = np.arctan2(np.linalg.norm(difference.quaternion[1:]), difference.quaternion[0])
@@ -98,12 +98,12 @@ class Motion(NamedTuple):
             joints=self.joints + shares * difference.joints,
         )
 
-    def on_root(self, root: np.ndarray) -> Self:
+    def on_root(self, root: np.ndarray) -> "Motion":
         """Return the same motion in the world on another path (samples, 3) of the root."""
         qpos = self.qpos()
         return on_root(self.step, qpos, root, relative(root, places(qpos)))._replace(twist=self.twist, seam=self.seam)
 
-    def meeting(self, pose: Pose, end: int, samples: int) -> Self:
+    def meeting(self, pose: Pose, end: int, samples: int) -> "Motion":
         """Return the motion with a pose at one of its ends.
 
         The root takes up what differs on the ground, over the whole motion, so that feet stay where they are. The
@@ -124,7 +124,7 @@ class Motion(NamedTuple):
         root = relative(root[0], root)
         return motion._replace(root=root, twist=logarithm(root[-1]) / motion.seconds).ending(pose, end, samples)
 
-    def ending(self, pose: Pose, end: int, samples: int) -> Self:
+    def ending(self, pose: Pose, end: int, samples: int) -> "Motion":
         """Return the motion with a pose at one of its ends, on the same path of the root.
 
         Args:
