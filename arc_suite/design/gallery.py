@@ -11,7 +11,7 @@ import string
 from collections.abc import Iterable, Mapping
 from importlib import resources
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, cast
 from xml.etree import ElementTree
 
 import numpy as np
@@ -59,7 +59,7 @@ def elites(search: Search, cells: Map) -> list[Elite]:
     found = []
     for cell, number in sorted(search.elites.items()):
         one = search.candidates[number]
-        body = search.body(one.genes, number)
+        body = cast(Body, search.body(one.genes, number))  # an elite has one, and no reason why it has none
         found.append(Elite(cells.label(cell), cell, number, body, one.outcome.first, one.outcome.second))
     return found
 

@@ -52,7 +52,7 @@ class Batch(NamedTuple):
 
 
 def _outcome(reason: str, first: Sequence | None, second: Sequence | None) -> Outcome:
-    return Outcome(reason, first and Walk(*first), second and Walk(*second))
+    return Outcome(reason, Walk(*first) if first else None, Walk(*second) if second else None)
 
 
 class Search:

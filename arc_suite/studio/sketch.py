@@ -106,7 +106,7 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
         field = checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
     except json.JSONDecodeError as error:
         raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
-    kind, found = registry.task_of(sketch.task), {}
+    kind, found = registry.task_of(sketch.task), dict[str, Any]()
     if sketch.gait != OWN:
         found["gait"] = sketch.gait
     if sketch.speed != 1.0:
@@ -174,6 +174,7 @@ def python_lines(sketch: Sketch) -> str:
 
 def opened_file(sketch: Sketch, text: str) -> Sketch:
     """Return the sketch with the body of a spec file's text, in its own proportions."""
+    as_it_is: dict[str, Any]
     as_it_is = {field.name: field.default for field in dataclasses.fields(Sketch) if field.name not in _DOING}
     return dataclasses.replace(sketch, **as_it_is | {"source": FILE, "file": text})
 
