@@ -164,11 +164,6 @@ class Motion(NamedTuple):
         )
 
 
-def _places(qpos) -> np.ndarray:
-    """Return where the torso is, seen from above: (samples, 3) x, y, m, and yaw, rad, that does not jump."""
-    return np.concatenate([qpos[:, :2], np.unwrap(rotations.yaw(qpos[:, 3:7]))[:, None]], axis=-1)
-
-
 def seam(difference: Pose) -> float:
     """Return the size of a difference of poses, rad: the largest of joint angles and the torso's turn."""
     turn = 2.0 * np.arctan2(np.linalg.norm(difference.quaternion[1:]), abs(difference.quaternion[0]))
