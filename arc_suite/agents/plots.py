@@ -135,7 +135,7 @@ def _variants(groups: Mapping[str, Mapping[str, Curve]]) -> dict[str, dict[str, 
 
 
 def _every(steps: np.ndarray) -> int:
-    """Return of how many points one has a marker, so that there are at most `_MARKERS`."""
+    """Return the number of points to each marker, so that there are at most `_MARKERS`."""
     return -(-len(steps) // _MARKERS)
 
 
