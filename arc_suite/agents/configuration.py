@@ -69,6 +69,11 @@ class Configuration:
         return cls(setup, algorithm, definition.hyperparameters, seed, steps, evaluate_every, prior)
 
     @property
+    def validation(self) -> Setup | BodiesSetup:
+        """Setup in which the policy is evaluated while it learns."""
+        return self.setup.validation(evaluation.EPISODES)
+
+    @property
     def definition(self) -> algorithms.Algorithm:
         """The algorithm, with these hyperparameters."""
         return algorithms.algorithm(self.algorithm)._replace(hyperparameters=self.hyperparameters)

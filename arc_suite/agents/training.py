@@ -70,8 +70,9 @@ def train(
             checkpoint=run_files.arrays,
         )
         slices = stack.enter_context(contextlib.closing(module.learn(definition.hyperparameters, context)))
-        validation = setup.validation(evaluation.EPISODES)
-        vector = validation.make_vec(evaluation.EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED)
+        vector = configuration.validation.make_vec(
+            evaluation.EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
+        )
         environment = stack.enter_context(contextlib.closing(vector))
         clocks, step = (time.monotonic(), time.process_time()), state["evaluated"]
         bar = progress(total=context.steps, initial=step, desc=Path(folder).name, unit="step", unit_scale=True)

@@ -102,7 +102,7 @@ def configured() -> Configuration:
 def earned(run: Configuration, folder: Path) -> str:
     """Return the result of a finished run, for people."""
     returns = run_folder.latest_returns(run_folder.table(folder, "evaluations"))
-    result, scale = returns.mean(), anchors.anchors(run.setup.validation(evaluation.EPISODES))
+    result, scale = returns.mean(), anchors.anchors(run.validation)
     levels = f"standing still {scale.zero:.1f}"
     if scale.demonstrator is not None:
         levels = f"score {scale.score(result):z.2f} ({levels}, demonstrator {scale.preset} {scale.demonstrator:.1f})"
@@ -117,7 +117,7 @@ def picture(run: Configuration, folder: Path) -> Callable:
 
     def draw(step, metrics):
         if "return" in metrics:
-            scale = anchors.anchors(run.setup.validation(evaluation.EPISODES))
+            scale = anchors.anchors(run.validation)
             lines = {"standing still": scale.zero}
             if scale.demonstrator is not None:
                 lines[f"demonstrator {scale.preset}"] = scale.demonstrator

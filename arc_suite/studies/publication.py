@@ -87,7 +87,7 @@ def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
     for run in runs:
         publish(run, folder, published)
     known = results.demonstrators(published)
-    setups = {run.place: run.judged for run in runs}
+    setups = {run.place: run.configuration.validation for run in runs}
     if setups.keys() <= known.keys() or not published.exists():
         return
     measured = {place: _demonstrated(setup) for place, setup in setups.items() if place not in known}
@@ -106,7 +106,7 @@ def _demonstrated(setup: Setup) -> anchors.Returns:
 @contextlib.contextmanager
 def _played(run: Run, folder: Path, step: int) -> Iterator[tuple[Environment, Policy]]:
     """Open the environment of a run, and its policy at a step, as a later one may exist already."""
-    path, setup = folder / checkpoints.FOLDER / str(step) / network.FILE, run.judged
+    path, setup = folder / checkpoints.FOLDER / str(step) / network.FILE, run.configuration.validation
     with contextlib.closing(setup.load()) as environment:
         yield environment, policies.policy(path, setup.body, task=environment.task.definition)
 

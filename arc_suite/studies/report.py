@@ -240,7 +240,7 @@ def _strips(name: str, groups: Groups, published: Path) -> list[str]:
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
             for run in [each.run for each in seeds if (published / each.run.name / STRIP).exists()][:1]:
-                setup, folder = run.judged, Path("runs", tables.folder_name(name), run.name)
+                setup, folder = run.configuration.validation, Path("runs", tables.folder_name(name), run.name)
                 command = ["arc-suite", "render", f"--robot={setup.body.name}", f"--task={setup.task}"]
                 command += [
                     f"--policy={folder}",

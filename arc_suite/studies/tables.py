@@ -64,14 +64,9 @@ class Run(NamedTuple):
         return folder_name(f"{setup.body.name}-{setup.kind.name}-{self.kind}-{seed}")
 
     @property
-    def judged(self) -> Setup:
-        """Setup in which its policy is evaluated."""
-        return self.configuration.setup.validation(1)
-
-    @property
     def place(self) -> str:
         """Robot, task and settings of its evaluations, by which results are grouped."""
-        return str(self.judged)
+        return str(self.configuration.validation)
 
 
 def run(
