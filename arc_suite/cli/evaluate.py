@@ -3,8 +3,8 @@
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. IQM is
 the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
 still in the same episodes, at most ten. The score is 0 for standing still and 1 for the best demonstrator of the
-suite; only the robots in tasks with default settings have one. With --preset medium, which is the paper's
-demonstrator, the table ends with the paper's return. The JSON is an entry for `arc-suite enter`: it holds every
+suite; only places of the benchmark have one. With --preset medium, which is the paper's demonstrator, the table
+ends with the paper's return. The JSON is an entry for `arc-suite enter`: it holds every
 episode, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --episodes 10
