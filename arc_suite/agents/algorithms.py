@@ -136,7 +136,7 @@ ALGORITHMS = {
         evaluate_every=20_000,
         steps=100_000,
     ),
-    # Noise falls over the length of a run: on rough ground a million steps end below standing still.
+    # Noise falls over the length of a run: uneven ground takes a longer one.
     "ppo": Algorithm(
         "arc_suite.agents.on_policy",
         ProximalPolicy(),

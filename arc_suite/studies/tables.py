@@ -12,7 +12,7 @@ from arc_suite.cpg.selection import suited_preset
 from arc_suite.data import Settings
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
-from arc_suite.studies.tracks import FAR, PLACES, SEEDS, TRACKS
+from arc_suite.studies.tracks import PLACES, SEEDS, TRACKS
 
 _EPISODES = 1000  # of prior data, as in the paper
 
@@ -193,41 +193,29 @@ STUDIES = {
             if each.prior is not None
         ),
     ),
-    "tasks": Study(
-        "learners in tasks in which feedback pays; prior data are 100 episodes",
+    # Half a minute of a core a run, two on `gaps`.
+    "imitation": Study(
+        "imitation of the demonstrators by DAgger in tasks in which feedback pays",
         (
-            *(
-                each
-                for task, preset in (("steer", "steered"), ("rough", "surefooted"))
-                for each in (
-                    run("tick", "ppo", 1_000_000, task=task),
-                    run("tick", "sac", 50_000, task=task, evaluate_every=5000),
-                    run("tick", "sacfd", 50_000, task=task, evaluate_every=5000, prior=Prior(preset, 100)),
-                )
-            ),
             *(
                 run("tick", "dagger", 38_400, task=task, evaluate_every=38_400)
                 for task in ("steer", "rough", "slopes", "stairs", "navigate")
             ),
             # A foot misses a trench in a few steps of an episode alone: that takes more episodes.
             run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
-            # The noise falls over the length of a run; with a million steps on rough ground it is gone too early.
-            *(run("tick", "ppo", 3_000_000, task=task, label="ppo-3M") for task in ("rough", "steer")),
             run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
-            run("queen", "ppo", 2_000_000, task="steer"),
         ),
     ),
-    # Steps as on the track `top`; slopes are as uneven as its other ground.
+    # Steps as on the track `top`.
     "from-nothing": Study(
         "PPO from nothing in the other tasks, Tick; uneven ground and pillars three million steps",
         (
             *(
-                run("tick", "ppo", TRACKS["top"].steps, task=task)
-                for task in ("steer", "shoved", "limp", "roam", "gaps", "course")
-            ),
-            *(
-                run("tick", "ppo", TRACKS["top"].far_steps, task=task)
-                for task in ("navigate", "rough", "stairs", "slopes")
+                run("tick", "ppo", TRACKS["top"].steps_in(task), task=task)
+                for task in (
+                    *("steer", "shoved", "limp", "roam", "gaps", "course"),
+                    *("navigate", "rough", "stairs", "slopes"),
+                )
             ),
             # Without a curriculum it learns to stand at the first trench.
             run("tick", "ppo", TRACKS["top"].far_steps, 0, "gaps", {"curriculum": True}, label="ppo-curriculum"),
@@ -288,8 +276,7 @@ def benchmark(track: str, algorithm: str) -> Study:
     runs = []
     for seed, (robot, task) in itertools.product(range(SEEDS), PLACES):
         prior = Prior(_collects(robot, task), rule.episodes) if rule.episodes else None
-        steps = rule.far_steps if task in FAR else rule.steps
-        runs.append(run(robot, algorithm, steps, seed, task, prior=prior))
+        runs.append(run(robot, algorithm, rule.steps_in(task), seed, task, prior=prior))
     return Study(f"track {track} of the benchmark: {algorithm}", tuple(runs))
 
 

@@ -4,13 +4,13 @@ from typing import NamedTuple
 
 SEEDS = 3  # of every place
 
-# Robot and task of each place, with default settings; those on uneven ground and among pillars are `FAR`.
+# Robot and task of each place, with default settings.
 PLACES = (
     *(("queen", "walk"), ("bastion", "walk"), ("tick", "walk"), ("leaper", "walk")),
     *(("queen", "steer"), ("tick", "steer"), ("leaper", "steer")),
     *(("tick", "rough"), ("queen", "stairs"), ("tick", "navigate")),
 )
-FAR = ("rough", "stairs", "navigate")
+FAR = ("rough", "slopes", "stairs", "navigate")  # tasks that take more steps: uneven ground and pillars
 TURNING = ("steer", "navigate")  # tasks with commands that turn: a heading error says nothing there
 
 
@@ -28,6 +28,10 @@ class Track(NamedTuple):
     far_steps: int
     source: str = "nothing"
     episodes: int = 0
+
+    def steps_in(self, task: str) -> int:
+        """Return the environment steps of a run in a task."""
+        return self.far_steps if task in FAR else self.steps
 
 
 TRACKS = {
