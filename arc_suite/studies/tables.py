@@ -150,13 +150,14 @@ def six(
 # A tenth of the published phases, of the interval of their checks, and of the patience.
 _SHORT = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
 
-# Hyperparameters that leave out a part of `sac_parallel`.
+# `sac_parallel` with all parts, then without one of them.
 _PARTS = {
-    "raw": {"normalize": False},
-    "contacts": {"exclude_blocks": []},
-    "unmirrored": {"symmetry_augmentation": False},
-    "8-environments": {"num_envs": 8},
-    "one-step": {"n_step": 1},
+    "sac_parallel": {},
+    "sac_parallel-raw": {"normalize": False},
+    "sac_parallel-contacts": {"exclude_blocks": []},
+    "sac_parallel-unmirrored": {"symmetry_augmentation": False},
+    "sac_parallel-8-environments": {"num_envs": 8},
+    "sac_parallel-one-step": {"n_step": 1},
 }
 
 # The paper's own study is `paper`: 3,000 hours of a core. The others fit fewer hours.
@@ -229,25 +230,26 @@ STUDIES = {
             for seed, robot in itertools.product(range(3), ("tick", "leaper", "queen", "bastion"))
         ),
     ),
-    # What each part of it gives; the runs with all parts are those of `parallel`.
+    # What each part of it gives.
     "parallel-parts": Study(
-        "SAC in parallel environments without one of its parts, 60,000 steps",
+        "SAC in parallel environments with all its parts and without one, 60,000 steps",
         tuple(
-            run(robot, "sac_parallel", 60_000, seed, hyperparameters=changes, label=f"sac_parallel-{part}")
-            for seed, robot, (part, changes) in itertools.product(range(2), ("tick", "leaper"), _PARTS.items())
+            run(robot, "sac_parallel", 60_000, seed, hyperparameters=changes, label=label)
+            for seed, robot, (label, changes) in itertools.product(range(2), ("tick", "leaper"), _PARTS.items())
         ),
     ),
-    # The paper's two ideas on a learner that learns without them; the runs without are those of `parallel`.
+    # The paper's two ideas on a learner that learns without them.
     "parallel-prior": Study(
         "SAC in parallel environments with prior data of 100 episodes, or short phases, 60,000 steps",
         tuple(
-            run(robot, "sac_parallel", 60_000, hyperparameters=changes, prior=prior, label=f"sac_parallel-{part}")
-            for robot, (part, changes, prior) in itertools.product(
+            run(robot, "sac_parallel", 60_000, hyperparameters=changes, prior=prior, label=label)
+            for robot, (label, changes, prior) in itertools.product(
                 ("tick", "leaper"),
                 (
-                    ("medium", {"prior": "symmetric_sampling"}, Prior("medium", 100)),
-                    ("refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
-                    ("phases", _SHORT, None),
+                    ("sac_parallel", {}, None),
+                    ("sac_parallel-medium", {"prior": "symmetric_sampling"}, Prior("medium", 100)),
+                    ("sac_parallel-refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
+                    ("sac_parallel-phases", _SHORT, None),
                 ),
             )
         ),
