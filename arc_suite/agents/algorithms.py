@@ -113,7 +113,7 @@ ALGORITHMS = {
         dataclasses.replace(_SAC, dropout=0.01, utd_ratio=20),
         "SAC with 20 updates of critics with dropout in every step",
     ),
-    # Discount and several steps are what makes it learn: docs/agents.md.
+    # What each part gives: docs/algorithms.md.
     "sac_parallel": _off_policy(
         SoftActorCritic(
             learning_rate=5e-4,

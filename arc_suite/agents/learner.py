@@ -14,11 +14,14 @@ from arc_suite.envs.bodies_setup import BodiesSetup
 from arc_suite.envs.flat_bodies import FlatBodies
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import teachers
 from arc_suite.policies.network import Layer
 
 _SEEDS = 100_000  # of the environments of a run; those below are left for evaluation
 MOST_SEEDS = 40_000
-ENVIRONMENT = "environment/"  # prefix of the names in a checkpoint that are not learned, and may be NaN
+ENVIRONMENT = "environment/"  # prefix of the names in a checkpoint
+# Prefixes of what is not learned: commands of tasks may be NaN, and ground that nobody has seen is at -inf.
+NOT_LEARNED = (ENVIRONMENT, teachers.PREFIX)
 
 
 class Diverged(ValueError):

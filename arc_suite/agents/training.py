@@ -13,7 +13,7 @@ from tqdm import tqdm
 from arc_suite import checks, evaluation, files
 from arc_suite.agents import priors, run_folder
 from arc_suite.agents.configuration import PRIOR_SHA256, Configuration
-from arc_suite.agents.learner import ENVIRONMENT, Damaged, Diverged, RunContext, Slice
+from arc_suite.agents.learner import NOT_LEARNED, Damaged, Diverged, RunContext, Slice
 from arc_suite.agents.run_folder import RunFolder
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import checkpoints, network
@@ -107,7 +107,7 @@ def _check_finite(found: Slice) -> None:
         if not np.isfinite(metric):
             raise Diverged(f"{name} is {metric}", found.step)
     for name, array in found.checkpoint.items():
-        is_learned = array.dtype.kind == "f" and not name.startswith(ENVIRONMENT)  # commands of tasks may be NaN
+        is_learned = array.dtype.kind == "f" and not name.startswith(NOT_LEARNED)
         if is_learned and not np.isfinite(array).all():
             raise Diverged(f"{name} is not finite", found.step)
 

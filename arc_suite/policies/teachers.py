@@ -13,6 +13,8 @@ from arc_suite.policies.named import policy
 from arc_suite.policies.protocol import Positioned
 from arc_suite.tasks import Task
 
+PREFIX = "teacher/"  # of the names in a snapshot
+
 
 class Teacher:
     """A policy: a demonstrator for each body of some environments, fitted to its task.
@@ -69,7 +71,7 @@ class Teacher:
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return what the demonstrators remember, arrays by name."""
         found = enumerate(demonstrator.snapshot() for _, _, demonstrator in self._members)
-        return {f"teacher/{number}/{name}": array for number, arrays in found for name, array in arrays.items()}
+        return {f"{PREFIX}{number}/{name}": array for number, arrays in found for name, array in arrays.items()}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Go on from a snapshot.
@@ -78,6 +80,6 @@ class Teacher:
             KeyError: an array is missing.
         """
         for number, (_, _, demonstrator) in enumerate(self._members):
-            prefix = f"teacher/{number}/"
+            prefix = f"{PREFIX}{number}/"
             own = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
             demonstrator.restore(own)
