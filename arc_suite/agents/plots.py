@@ -33,6 +33,7 @@ _OTHERS = (("#CC6677", "<"), ("#88CCEE", "H"), ("#6699CC", "8"), ("#661100", ">"
 _VARIANTS = (("--", "o"), (":", "s"), ("-.", "^"), ((0, (8, 2)), "D"), ((0, (1, 4)), "v"))
 _MARKERS = 15  # of a curve, at most
 _GREY = "#6E6E6E"
+_ENTRY, _CHARACTER = 0.8, 0.08  # inches of a legend's entry without a text, and of a letter of the text
 _GAP = 0.052  # between the labels of two levels, as a share of the axis
 
 
@@ -114,9 +115,9 @@ def study(
     for axis in axes[:, 0]:
         axis.set_ylabel("return of an evaluation")
     handles = {label: line for axis in axes.flat for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
-    figure.legend(
-        handles.values(), handles, loc="outside upper left", ncols=min(len(handles), 3 * columns), frameon=False
-    )
+    fitting = int(figure.get_figwidth() / (_ENTRY + _CHARACTER * max(map(len, handles))))
+    ncols = min(len(handles), 3 * columns, max(fitting, 1))
+    figure.legend(handles.values(), handles, loc="outside upper left", ncols=ncols, frameon=False)
     return figure
 
 

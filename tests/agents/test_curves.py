@@ -74,6 +74,18 @@ def test_kinds_of_one_algorithm_differ_in_their_markers():
         assert len({(line.get_marker(), line.get_markerfacecolor()) for line in lines}) == 5
 
 
+@pytest.mark.parametrize("places", ["a", "ab"])
+def test_a_legend_of_long_names_lies_in_the_picture(places):
+    kinds = {
+        f"sac_parallel-three-step-{part}-environments": Curve("sac_parallel", STEPS, np.zeros((1, 5)))
+        for part in "abcde"
+    }
+    figure = plots.study(dict.fromkeys(places, kinds), {}, {})
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
+
+
 @pytest.mark.parametrize(("points", "shown"), [(1, 1), (15, 15), (16, 8), (30, 15), (50, 13)])
 def test_long_curves_have_few_markers_and_the_legend_shows_them(points, shown):
     curves = {
