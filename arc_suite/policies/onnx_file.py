@@ -29,8 +29,13 @@ def metadata(network: Network) -> dict:
     joints                      names, in the order of the actions
     gears                       N m that an action of 1 is, by joint
     gait_clock                  how the block of that name follows from time; only where there is one
+
+    Raises:
+        ValueError: a policy of many bodies.
     """
-    return _metadata(network.setup, network.blocks)  # type: ignore[arg-type]  # of many bodies: `save_universal`
+    if not isinstance(network.setup, Setup):
+        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; save_universal takes others")
+    return _metadata(network.setup, network.blocks)
 
 
 def _metadata(setup: Setup, blocks: Mapping[str, int]) -> dict:
@@ -53,13 +58,14 @@ def _metadata(setup: Setup, blocks: Mapping[str, int]) -> dict:
 
 
 def save(path: str | os.PathLike, network: Network) -> None:
-    """Write a policy as ONNX, atomically.
+    """Write a policy of one body as ONNX, atomically.
 
     Raises:
-        ValueError: the package onnx is not installed.
+        ValueError: the package onnx is not installed, or a policy of many bodies.
         OSError: the file cannot be written.
     """
-    _write(path, graphs.of(network), network.size, network.joints, metadata(network))
+    known = metadata(network)
+    _write(path, graphs.of(network), network.size, network.joints, known)
 
 
 def save_universal(path: str | os.PathLike, network: Network, setup: Setup) -> None:

@@ -109,3 +109,9 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
     assert greatest < 1e-4
     texts = run.get_modelmeta().custom_metadata_map
     assert json.loads(texts["joints"]) == list(setup.body.joint_names)
+
+
+def test_a_policy_of_many_bodies_needs_one_of_them(tmp_path):
+    with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; save_universal takes others$"):
+        onnx_file.save(tmp_path / "policy.onnx", legs.network())
+    assert not list(tmp_path.iterdir())
