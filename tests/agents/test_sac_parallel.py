@@ -56,17 +56,18 @@ def test_the_policy_acts_from_the_first_step_and_updates_are_rarer_than_steps(le
     assert 0.2 < np.arctanh(agent.buffer.at(np.arange(32)).actions).std() < 0.4
 
 
-def test_what_an_update_sees(learner, drawn):
-    """Rewards of three steps, scaled; inputs normalised, without contact forces; every other transition mirrored."""
-    agent = learner(NAME, small(NAME, batch=64, start_steps=0))
+@pytest.mark.parametrize(("n_step", "discounts"), [(1, {1.0}), (3, {1.0, np.float32(0.97), np.float32(0.97) ** 2})])
+def test_what_an_update_sees(learner, drawn, n_step, discounts):
+    """Rewards of its steps, scaled; inputs normalised, without contact forces; every other transition mirrored."""
+    agent = learner(NAME, small(NAME, batch=64, start_steps=0, n_step=n_step))
     agent.until(200)
     task, (batch, _) = agent.task, drawn[-1]
     assert batch.observations.shape == (64, task.size - task.blocks["contact_forces"])
     places = off_policy.generator(0, "update", agent.updates - 1).integers(0, 200, size=64)
-    raw = agent.buffer.at(places, 3, 0.97)
+    raw = agent.buffer.at(places, n_step, 0.97)
     assert_array_equal(batch.rewards, np.float32(0.1) * raw.rewards)
     assert_array_equal(batch.goes_on, raw.goes_on)
-    assert set(np.unique(raw.goes_on)) - {0.0} == {1.0, np.float32(0.97), np.float32(0.97) * np.float32(0.97)}
+    assert set(np.unique(raw.goes_on)) - {0.0} == discounts
     mirrored = np.arange(64) % 2 == 1
     for name in ("observations", "next_observations"):
         whole = getattr(raw, name)
@@ -85,10 +86,11 @@ def test_its_policy_takes_whole_observations(learner):
     assert_allclose(network.forward(found.policy, observations), np.tanh(mean), atol=1e-5)
 
 
-def test_phases_and_prior_data_go_with_it(learner, prior, drawn):
-    """Its transitions are of several steps and mirrored, so the policy's next actions are not cached."""
+@pytest.mark.parametrize("changes", [{}, {"n_step": 1}, {"symmetry_augmentation": False}])
+def test_phases_and_prior_data_go_with_it(learner, prior, drawn, changes):
+    """Transitions that are mirrored, or of several steps, have next actions of the policy that are not cached."""
     phases = {"phase_every": 95, "phase_updates": 40, "check_every": 20, "early_stop": "published", "batch": 16}
-    agent = learner(NAME, small(NAME, prior="symmetric_sampling", **phases), prior=prior, evaluate_every=100)
+    agent = learner(NAME, small(NAME, prior="symmetric_sampling", **phases, **changes), prior=prior, evaluate_every=100)
     agent.advance()
     assert agent.latest.step == 90 and agent.phase.next_actions is None
     agent.until(100)
