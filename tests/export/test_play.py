@@ -91,7 +91,7 @@ def assert_networks_agree(script, setup, driver, name):
     for block in creature["policy"]["constants"]["blocks"]:
         ported = [observation[block] for observation in found["observations"]]
         np.testing.assert_allclose(ported, [observation[block] for observation in observations], rtol=0.0, atol=1e-8)
-    np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=2e-6)  # float32
+    np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=1e-5)  # float32: sums differ by processor
 
 
 @pytest.mark.slow
