@@ -221,11 +221,9 @@ STUDIES = {
     "parallel": Study(
         "SAC from nothing in parallel environments, 100,000 steps, with returns of three steps and of one",
         tuple(
-            run(robot, "sac_parallel", 100_000, seed, hyperparameters=changes, label=label)
-            for (label, changes), seed, robot in itertools.product(
-                (("sac_parallel", {}), ("sac_parallel-one-step", {"n_step": 1})),
-                range(3),
-                ("tick", "leaper", "queen", "bastion"),
+            run(robot, "sac_parallel", 100_000, seed, hyperparameters=_PARTS[kind], label=kind)
+            for kind, seed, robot in itertools.product(
+                ("sac_parallel", "sac_parallel-one-step"), range(3), ("tick", "leaper", "queen", "bastion")
             )
         ),
     ),
