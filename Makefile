@@ -146,7 +146,7 @@ check-notebooks: setup.cfg
 ENGINES := out/engines
 
 # What it makes is not committed, and goes into wheels.
-VIEWER := arc_suite/export/web/mujoco.wasm.zlib
+VIEWER := arc_suite/animation/web/mujoco.wasm.zlib
 web: $(VIEWER)
 $(VIEWER): $(wildcard web/*)
 	mkdir -p .node-web $(dir $@)
@@ -167,7 +167,7 @@ check-web: setup.cfg $(VIEWER)
 	tools/ensure_venv.sh $(VENV)
 	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
 	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
-	$(VENV)/bin/python -m pytest tests/export/test_pages.py
+	$(VENV)/bin/python -m pytest tests/animation/test_pages.py
 	$(VENV)/bin/python tests/engines/make_files.py $(ENGINES) few
 	NODE_PATH=$(CURDIR)/.node-web/node_modules .node-web/node_modules/.bin/esbuild tests/engines/loader.js --bundle \
 		--outfile=$(ENGINES)/loader.js --log-level=warning
@@ -179,14 +179,14 @@ check-studio: setup.cfg $(VIEWER)
 	tools/ensure_egl.sh $(VENV)/bin/python
 	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
 	$(VENV)/bin/python -m pip install -q -e '.[test,studio]' playwright==1.65.2
-	$(VENV)/bin/python -m pytest tests/studio
+	$(VENV)/bin/python -m pytest tests/animation/studio
 
 check-play: VENV := .venv-web
 check-play: setup.cfg $(VIEWER)
 	tools/ensure_venv.sh $(VENV)
 	command -v chromium google-chrome >/dev/null || tools/ensure_packages.sh chromium
 	$(VENV)/bin/python -m pip install -q -e '.[test]' playwright==1.65.2
-	$(VENV)/bin/python -m pytest tests/export/test_play.py tests/export/test_play_page.py
+	$(VENV)/bin/python -m pytest tests/animation/test_play.py tests/animation/test_play_page.py
 
 check-glb: $(INSTALLED)
 	mkdir -p .node-glb
@@ -233,7 +233,7 @@ check-agents-release: MARKS := long or release
 check-agents check-agents-release: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(VENV)/bin/python -m pip install -q -e '.[test,agents,cluster,onnx,tensorboard]' onnxruntime rliable 'pandas<3'
-	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/agents tests/studies/test_study.py tests/cli/test_train.py \
+	$(VENV)/bin/python -m pytest $(PARALLEL) -m "$(MARKS)" tests/learning/agents tests/learning/studies/test_study.py tests/learning/cli/test_train.py \
 		tests/policies/test_onnx_file.py tests/evaluation/test_statistics.py
 
 check-bodies: $(INSTALLED)

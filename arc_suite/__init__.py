@@ -24,7 +24,7 @@ with versions.explained():
     registration.register_ids()
 
 __version__ = "0.1.0"
-__all__ = ["ALL_TASKS", "Setup", "TASKS_BY_DOMAIN", "load", "register", "show", "symmetry"]
+__all__ = ["ALL_TASKS", "Setup", "TASKS_BY_DOMAIN", "load", "register", "symmetry"]
 
 
 def __getattr__(name):
@@ -32,8 +32,4 @@ def __getattr__(name):
         return registry.all_tasks()
     if name == "TASKS_BY_DOMAIN":
         return registry.tasks_by_domain()
-    if name == "show":  # only notebooks need what it imports
-        from arc_suite.export.notebook import show
-
-        return show
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

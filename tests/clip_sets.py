@@ -15,12 +15,12 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
+from arc_suite.animation.clips import planting
+from arc_suite.animation.clips.catalogue import CLIPS, DEFAULT, Walk
+from arc_suite.animation.clips.drafts import drafts, passage
+from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.cpg.kinematics import Legs
 from arc_suite.envs.setup import Setup
-from arc_suite.export import planting
-from arc_suite.export.catalogue import CLIPS, DEFAULT, Walk
-from arc_suite.export.drafts import drafts, passage
-from arc_suite.export.recorder import Recorder
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 

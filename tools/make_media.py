@@ -19,8 +19,8 @@ from arc_suite import checks, evaluation, files, policies, rotations
 from arc_suite.cli import program
 from arc_suite.cpg import suited_preset
 from arc_suite.envs.setup import Setup
-from arc_suite.export import films
 from arc_suite.models.outline import outline
+from arc_suite.simulation import films
 
 ROOT = Path(__file__).parents[1]
 TOTAL = 6_000_000  # bytes of all

@@ -13,10 +13,10 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import evaluation, files, policies
-from arc_suite.agents import configuration, run_folder
 from arc_suite.cli import program
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
+from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.policies import network, universal
 from arc_suite.policies.network import PACKAGED
 

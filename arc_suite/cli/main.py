@@ -20,7 +20,7 @@ def main(*given: str) -> None:
     if first in PROGRAMS:
         # Imported here and alone: a program defines its flags when it is imported, and some define the same.
         try:
-            module = importlib.import_module(f"arc_suite.cli.{first}")
+            module = importlib.import_module(f"{PROGRAMS[first]}.{first}")
         except versions.MissingExtra as error:
             sys.exit(f"arc-suite {first}: {error}")
         program.run(module.main, f"arc-suite {first}", others)

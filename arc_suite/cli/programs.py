@@ -3,28 +3,29 @@
 import ast
 from pathlib import Path
 
-PROGRAMS = (
-    "build_model",
-    "check",
-    "render",
-    "animate",
-    "play",
-    "view",
-    "studio",
-    "evaluate",
-    "style",
-    "collect",
-    "tune_cpg",
-    "train",
-    "study",
-    "benchmark",
-    "enter",
-    "export",
-    "survey",
-    "transfer",
-    "design",
-    "doctor",
-)
+# The package of each program: the core's own, and those of the wings, which nothing else of the core names.
+PROGRAMS = {
+    "build_model": "arc_suite.cli",
+    "check": "arc_suite.cli",
+    "render": "arc_suite.animation.cli",
+    "animate": "arc_suite.animation.cli",
+    "play": "arc_suite.animation.cli",
+    "view": "arc_suite.animation.cli",
+    "studio": "arc_suite.animation.cli",
+    "evaluate": "arc_suite.cli",
+    "style": "arc_suite.animation.cli",
+    "collect": "arc_suite.cli",
+    "tune_cpg": "arc_suite.learning.cli",
+    "train": "arc_suite.learning.cli",
+    "study": "arc_suite.learning.cli",
+    "benchmark": "arc_suite.learning.cli",
+    "enter": "arc_suite.learning.cli",
+    "export": "arc_suite.learning.cli",
+    "survey": "arc_suite.learning.cli",
+    "transfer": "arc_suite.learning.cli",
+    "design": "arc_suite.animation.cli",
+    "doctor": "arc_suite.cli",
+}
 
 _USAGE = """\
 arc-suite PROGRAM [flags]
@@ -42,5 +43,6 @@ def usage() -> str:
 
 def summary(name: str) -> str:
     """Return the first line of a program's docstring, read from its source without importing it."""
-    source = Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
+    folder = Path(__file__).parents[2].joinpath(*PROGRAMS[name].split("."))
+    source = (folder / f"{name}.py").read_text(encoding="utf-8")
     return ast.get_docstring(ast.parse(source)).splitlines()[0]

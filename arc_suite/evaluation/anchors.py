@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from arc_suite import policies
 from arc_suite.cpg.selection import suited_preset, suited_presets
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.robots import is_robot

@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.envs.flat_bodies import FlatBodies
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.paper import DEMONSTRATORS, FINALS
+from arc_suite.evaluation.published import DEMONSTRATORS, FINALS
 from arc_suite.policies import Policy, alone
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting

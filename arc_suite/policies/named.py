@@ -15,7 +15,7 @@ import numpy as np
 from arc_suite import checks, files, versions
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal, zips

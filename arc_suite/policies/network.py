@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import archives, checks, files, registry
-from arc_suite.envs import bodies_setup
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies import bodies_setup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.tasks import tokens
 

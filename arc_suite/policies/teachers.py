@@ -7,7 +7,7 @@ import numpy as np
 
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.envs.flat_bodies import FlatBodies
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.named import policy
 from arc_suite.policies.protocol import Positioned

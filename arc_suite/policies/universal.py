@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from arc_suite.cpg.law import Clocked, checked, proprioception, torques
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.policies import network

@@ -13,7 +13,7 @@ import sys
 
 from matplotlib.figure import Figure
 
-from arc_suite import paper
+from arc_suite.evaluation import published
 
 
 def evaluate(policy: pathlib.Path, robot: str, task: str, episodes: int) -> None:
@@ -30,7 +30,11 @@ def plot(folder: pathlib.Path, robot: str, task: str) -> None:
     figure = Figure(figsize=(8.0, 4.5), layout="constrained")
     axis = figure.subplots()
     axis.plot(steps, [reports[step]["robots"][robot]["return"]["mean"] for step in steps], marker=".")
-    lines = {**paper.FINALS.get(robot, {}), "demonstrator": paper.DEMONSTRATORS.get(robot)} if task == "walk" else {}
+    lines = (
+        {**published.FINALS.get(robot, {}), "demonstrator": published.DEMONSTRATORS.get(robot)}
+        if task == "walk"
+        else {}
+    )
     for name, value in lines.items():
         axis.axhline(value, color="grey", linestyle="--", linewidth=0.8)
         axis.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), ha="right", va="bottom", fontsize=7)

@@ -12,8 +12,8 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
+from arc_suite.learning.tuning import Evaluator
 from arc_suite.robots import ROBOTS
-from arc_suite.tuning import Evaluator
 
 
 @pytest.mark.long

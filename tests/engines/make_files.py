@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 from tqdm import tqdm
 
-from arc_suite import export
+from arc_suite.animation import clips as export
+from arc_suite.animation.clips.catalogue import CLIPS
 from arc_suite.envs.setup import Setup
-from arc_suite.export.catalogue import CLIPS
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 

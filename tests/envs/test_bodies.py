@@ -12,9 +12,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
-from arc_suite.envs import stacked
-from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.envs.flat_bodies import FlatBodies
+from arc_suite.envs.bodies import BodiesEnv, stacked
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.families import varied_body

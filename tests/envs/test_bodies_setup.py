@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from arc_suite.envs import bodies_setup
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies import bodies_setup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 
 SHORT = {"time_limit": 0.5}

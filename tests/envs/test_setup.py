@@ -9,7 +9,7 @@ import pytest
 
 from arc_suite import registry
 from arc_suite.arenas import FLAT
-from arc_suite.envs.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json

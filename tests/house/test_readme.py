@@ -13,9 +13,9 @@ from tiers import tiers
 
 import arc_suite
 from arc_suite import data
+from arc_suite.animation import pages
 from arc_suite.cli import main
 from arc_suite.envs.setup import Setup
-from arc_suite.export import pages
 from arc_suite.robots import gaits
 from arc_suite.tasks import TASKS
 

@@ -1,4 +1,4 @@
-"""`arc_suite.envs.mjx`: its starts, its interface and its errors."""
+"""`arc_suite.envs.worlds.mjx`: its starts, its interface and its errors."""
 
 import subprocess
 import sys
@@ -11,10 +11,10 @@ import pytest
 from conftest import WORLDS, compiled
 
 import arc_suite
-from arc_suite.envs import mjx
 from arc_suite.envs.prepare import prepared
-from arc_suite.envs.randomization import randomization_fn
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.envs.worlds import mjx
+from arc_suite.envs.worlds.randomization import randomization_fn
 from arc_suite.robots import generator
 from arc_suite.simulation import device
 

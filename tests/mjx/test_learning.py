@@ -10,13 +10,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation
-from arc_suite.agents import collecting, inputs, on_policy, worlds
-from arc_suite.agents import proximal_policy as ppo
-from arc_suite.agents.configuration import Configuration
-from arc_suite.agents.learner import RunContext
-from arc_suite.agents.normaliser import Moments
-from arc_suite.agents.training import train
 from arc_suite.envs.setup import Setup
+from arc_suite.learning.agents import collecting, inputs, on_policy, worlds
+from arc_suite.learning.agents import proximal_policy as ppo
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.learner import RunContext
+from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.training import train
 from arc_suite.policies import policy
 from arc_suite.tasks import command
 

@@ -8,7 +8,7 @@ from conftest import WORLDS, recorded, stepped
 from mujoco import mjx as upstream
 from mujoco.mjx._src import collision_driver
 
-from arc_suite.envs import mjx
+from arc_suite.envs.worlds import mjx
 from arc_suite.robots import generator
 from arc_suite.simulation import device
 

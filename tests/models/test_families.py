@@ -12,7 +12,7 @@ import pytest
 
 from arc_suite import registry
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import transfer
+from arc_suite.learning import transfer
 from arc_suite.models import families
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator

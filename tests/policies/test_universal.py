@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation, policies
 from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.envs.flat_bodies import FlatBodies
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal
 from arc_suite.policies.universal import Universal

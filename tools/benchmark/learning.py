@@ -12,11 +12,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.agents import off_policy
-from arc_suite.agents import soft_actor_critic as sac
-from arc_suite.agents.algorithms import ALGORITHMS
-from arc_suite.agents.learner import generator
-from arc_suite.agents.replay import Transitions
+from arc_suite.learning.agents import off_policy
+from arc_suite.learning.agents import soft_actor_critic as sac
+from arc_suite.learning.agents.algorithms import ALGORITHMS
+from arc_suite.learning.agents.learner import generator
+from arc_suite.learning.agents.replay import Transitions
 
 SIZE, JOINTS, BATCH, HIDDEN = 199, 18, 256, 256
 _PRODUCTS = 50  # of matrices in a compiled call

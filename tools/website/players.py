@@ -4,7 +4,7 @@ from pathlib import Path
 
 import arc_suite
 from arc_suite import policies, registry, style
-from arc_suite.export import pages, play
+from arc_suite.animation import pages, play
 from arc_suite.robots import ROBOTS
 from website import markdown
 

@@ -6,12 +6,12 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from arc_suite import paper
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
+from arc_suite.evaluation.published import DEMONSTRATORS, FINALS
+from arc_suite.learning.studies.leaderboard import table
 from arc_suite.policies.network import PACKAGED
 from arc_suite.robots import ROBOTS
-from arc_suite.studies.leaderboard import table
 from arc_suite.tasks import TASKS
 
 ROOT = Path(__file__).parents[2]
@@ -54,7 +54,7 @@ def _learners() -> Iterator[dict[str, str]]:
 def published(robot: str) -> str:
     """Return the table of what the paper publishes for a robot in `walk`, and of the policy in the package."""
     packaged = json.loads((PACKAGED / "policies.json").read_text(encoding="utf-8"))[f"{robot}-walk"]
-    lines = [("the paper's demonstrator", paper.DEMONSTRATORS[robot])]
-    lines += [(f"the paper's {name}, 1,000,000 steps", value) for name, value in paper.FINALS[robot].items()]
+    lines = [("the paper's demonstrator", DEMONSTRATORS[robot])]
+    lines += [(f"the paper's {name}, 1,000,000 steps", value) for name, value in FINALS[robot].items()]
     lines += [("`--policy ppo`, which comes with the package", packaged["return"])]
     return table(("policy", "return"), ((name, f"{value:.0f}") for name, value in lines))

@@ -5,8 +5,8 @@ from typing import Any
 
 from arc_suite.arenas import ARENAS, terrain
 from arc_suite.envs.setup import Setup
+from arc_suite.learning.studies.leaderboard import table
 from arc_suite.robots import ROBOTS, gaits
-from arc_suite.studies.leaderboard import table
 from arc_suite.tasks import modifiers, parameters, walk
 from arc_suite.tasks.contract import STEPS, Task
 from arc_suite.tasks.ground import LEVELS, Lanes

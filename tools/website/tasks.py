@@ -6,8 +6,8 @@ import re
 import arc_suite
 from arc_suite.cpg.selection import suited_presets
 from arc_suite.envs.setup import Setup
+from arc_suite.learning.studies.leaderboard import table
 from arc_suite.robots import ROBOTS
-from arc_suite.studies.leaderboard import table
 from arc_suite.tasks import TASKS, ground
 from arc_suite.tasks.commanded import CommandTask
 from arc_suite.tasks.contract import STEPS, Task

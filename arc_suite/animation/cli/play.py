@@ -1,0 +1,39 @@
+"""Make a page to play in (.html): walk a creature about with keys, a gamepad or touch.
+
+  arc-suite play --robot queen -o queen.html
+  arc-suite play --robot all -o robots.html
+  arc-suite play --spec spider -o spider.html
+  arc-suite play --robot queen --policy runs/queen-steer-ppo-0 -o trained.html
+  arc-suite play --spec spider --policy universal -o universal.html
+
+The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
+E step to a side; dragging the body pulls it, space kicks it, R restarts. Bodies are chosen among those that the
+command names. The demonstrator follows the command. A policy of a task with a command, such as steer, is given the
+keys' command; one of walk keeps walking, and left and right turn its course.
+"""
+
+from absl import flags
+
+from arc_suite import checks, files
+from arc_suite.animation import play
+from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_policy, define_preset, policy_name
+from arc_suite.cli.program import progress
+
+FLAGS = flags.FLAGS
+define_body()
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all of them to choose from.")
+define_policy()
+define_preset()
+flags.DEFINE_string("output", None, "File to write, .html. Required.", short_name="o")
+
+
+def main() -> None:
+    """Write the page."""
+    if not FLAGS.output:
+        raise ValueError("no file to write; say --output=FILE.html")
+    checks.extension(FLAGS.output, [".html"])
+    walkers = progress(bodies(_ROBOT).values(), "fitting", leave=False)
+    with files.writing(FLAGS.output) as temporary:
+        page = play.page([play.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
+        temporary.write_text(page, encoding="utf-8")
+    print(f"wrote {FLAGS.output}, {len(page.encode()) / 1e6:.1f} MB")

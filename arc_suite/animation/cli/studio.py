@@ -1,0 +1,71 @@
+"""Design a creature while it walks, on a local web page.
+
+  arc-suite studio
+  arc-suite studio --legs 6 --links 2 --task rough
+  arc-suite studio --robot queen --policy runs/queen-steer-ppo-0
+  arc-suite studio --spec spider --port 9000
+
+Sliders change body, gait, speed, task and ground; the creature changes in about a second and walks on. Buttons save
+spec, MJCF, clips, page, picture and film. All visitors see one creature. Closing the page ends nothing; Ctrl-C does.
+The page listens on this machine alone, unless --host says otherwise; over SSH, forward the port:
+ssh -L 8080:localhost:8080 MACHINE.
+"""
+
+import dataclasses
+import json
+
+from absl import flags
+
+from arc_suite import versions
+from arc_suite.animation.studio.session import Session
+from arc_suite.animation.studio.sketch import OWN, Sketch, cured
+from arc_suite.cli.flags import (
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_preset,
+    define_task,
+    named_values,
+    only_body,
+    policy_name,
+    task,
+)
+from arc_suite.robots.spec_files import EXAMPLES
+
+FLAGS = flags.FLAGS
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
+define_policy()
+define_preset()
+flags.DEFINE_string("host", "127.0.0.1", "Address to listen on; 0.0.0.0 lets in everyone who can reach this machine.")
+flags.DEFINE_integer("port", 8080, "Port to listen on; the next free one if it is taken.", 1, 65535)
+
+
+def main() -> None:
+    """Open the page and step until Ctrl-C."""
+    try:
+        from arc_suite.animation.studio.page import serve
+    except ImportError as error:
+        raise versions.MissingExtra("the studio needs viser", "studio", error) from None
+    serve(Session(_sketch()), FLAGS.host, FLAGS.port, lambda url: print(f"the studio is at {url}", flush=True))
+
+
+def _sketch() -> Sketch:
+    """Return what the flags say."""
+    body, (name, settings) = only_body(_ROBOT), task()
+    ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
+    doing = Sketch(
+        task=name,
+        ground=ground,
+        kicks=kicks,
+        settings=json.dumps(settings),
+        policy=policy_name(FLAGS.policy),
+        preset=FLAGS.preset or OWN,
+    )
+    if FLAGS.spec is not None and FLAGS.spec not in EXAMPLES:
+        return cured(doing, body)
+    shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
+    if FLAGS.legs is not None:
+        return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
+    return dataclasses.replace(doing, source=FLAGS.spec or body.name, **shape)

@@ -1,0 +1,54 @@
+"""Watch a robot live: pull at it with the mouse, steer it with the arrow keys.
+
+  arc-suite view --robot queen
+  arc-suite view --robot tick --task steer
+  arc-suite view --spec spider --set arena=bumps
+
+Double-click a part and drag with Ctrl held to pull at it; drag without Ctrl to turn the camera. Space pauses,
+backspace restarts. In a task with a command, such as steer, the arrow keys set it: forward and back, turn left
+and right. Until the first of them the task's own schedule holds. A fall begins the next episode.
+"""
+
+import contextlib
+import math
+import queue
+
+from absl import flags
+
+import arc_suite
+from arc_suite import policies
+from arc_suite.animation.cli.live import Live, play
+from arc_suite.cli.flags import (
+    ROBOT_HELP,
+    define_body,
+    define_policy,
+    define_preset,
+    define_task,
+    only_body,
+    policy_name,
+    task,
+)
+from arc_suite.envs.window import Window
+
+_INSTEAD = "`arc-suite render -o walk.html` writes a page that plays in any browser"
+
+FLAGS = flags.FLAGS
+define_body()
+define_task()
+_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
+define_policy()
+define_preset()
+
+
+def main() -> None:
+    """Open the window and play until it is closed."""
+    body = only_body(_ROBOT)
+    name, settings = task()
+    environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings)
+    definition = environment.task.definition
+    policy = policies.policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=definition)
+    live = Live(environment, policies.alone(policy))
+    keys = queue.SimpleQueue()
+    window = Window(live.shown, pressed=keys.put, instead=_INSTEAD)
+    with contextlib.closing(window):
+        play(window, live, keys)

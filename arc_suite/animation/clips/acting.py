@@ -1,0 +1,123 @@
+"""Motions in which nobody walks, simulated from the pose at rest: a blow, a rise from the belly, a death."""
+
+import copy
+import math
+
+import mujoco
+import numpy as np
+
+from arc_suite.animation.clips.in_place import sunk
+from arc_suite.animation.clips.recordings import Recording
+from arc_suite.animation.clips.root_motion import Motion, Pose, standing
+from arc_suite.cpg.law import torques
+from arc_suite.models import sizing
+from arc_suite.models.outline import solid_corners
+from arc_suite.models.standing import standing as mechanics
+from arc_suite.robots.spec import Body
+from arc_suite.simulation.model import compiled
+
+# Durations are multiples of sqrt(h / g), speeds of sqrt(g h), h being the standing height.
+_BLOW = 0.5  # change of the torso's velocity, backwards
+_STAGGER, _SINK, _HOLD, _GIVE, _FALL = 8.0, 6.0, 2.0, 1.5, 6.0
+_FLACCID = 0.05  # of the damping of joints without life
+_LIES = 0.6  # of the height at rest, below which a torso lies
+_NEAR = 0.1  # of the height at rest, within which a torso lies on the ground
+
+
+def hit(body: Body, rest: Pose) -> Motion:
+    """Return how a body sways under a blow from ahead, while its joints hold the pose."""
+    steps = _steps(body, _STAGGER)
+    backwards = -_BLOW * math.sqrt(sizing.GRAVITY * body.torso.standing_height)
+    recording = _driven(body, rest, np.tile(_holding(body, rest), (steps + 1, 1)), push=backwards)
+    return standing(recording, 0, len(recording.qpos) - 1)
+
+
+def rise(body: Body, rest: Pose) -> Motion:
+    """Return how a body rises from its belly, or as near to it as its legs fold.
+
+    Raises:
+        ValueError: the legs hardly fold.
+    """
+    sink, hold = _steps(body, _SINK), _steps(body, _HOLD)
+    share = np.concatenate([_eased(sink), np.ones(hold), _eased(sink)[::-1], np.zeros(hold)])
+    joints, _ = sunk(body, rest, share * _depth(body, rest))
+    recording = _driven(body, rest, joints + _holding(body, rest) - rest.joints)
+    first = sizing.SUBSTEPS * (sink + hold)
+    _check_lies(body, rest, recording.qpos[first])
+    return standing(recording, first, len(recording.qpos) - 1 - first)
+
+
+def death(body: Body, rest: Pose) -> Motion:
+    """Return how a body collapses: its legs give way, then its joints are without torque and nearly without damping.
+
+    Raises:
+        ValueError: the legs hardly fold.
+    """
+    give, fall = _steps(body, _GIVE), _steps(body, _FALL)
+    joints, _ = sunk(body, rest, np.append(_eased(give), 1.0) * _depth(body, rest))
+    limp = np.full((fall, len(rest.joints)), np.nan)
+    recording = _driven(body, rest, np.concatenate([joints, limp]), damping=_FLACCID)
+    _check_lies(body, rest, recording.qpos[-1])
+    return standing(recording, 0, len(recording.qpos) - 1)
+
+
+def _depth(body: Body, rest: Pose) -> float:
+    """Return the height of the torso's lowest point over the ground at rest, m."""
+    return rest.position[2] + min(solid_corners(solid)[:, 2].min() for solid in body.torso.solids)
+
+
+def _check_lies(body: Body, rest: Pose, qpos: np.ndarray) -> None:
+    """Raise a ValueError if a torso stands still."""
+    if (
+        qpos[2] > _LIES * rest.position[2]
+        and qpos[2] - rest.position[2] + _depth(body, rest) > _NEAR * rest.position[2]
+    ):
+        raise ValueError("the legs do not fold far enough to lie down")
+
+
+def _steps(body: Body, duration: float) -> int:
+    """Return the number of control steps in a multiple of sqrt(h / g)."""
+    return round(duration * math.sqrt(body.torso.standing_height / sizing.GRAVITY) / sizing.control_timestep(body))
+
+
+def _eased(steps: int) -> np.ndarray:
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(steps) / steps)
+
+
+def _holding(body: Body, rest: Pose) -> np.ndarray:
+    """Return the target angles (joints,), rad, at which position control holds a pose under the body's weight."""
+    sized = sizing.sized(body)
+    pose = mechanics(sized, tuple(rest.joints))
+    stiffness, _ = sizing.position_gains(sized, pose.inertias)
+    gears = np.array([joint.motor.gear for leg in sized.legs for joint in leg.joints])
+    return rest.joints + pose.loads / (gears * stiffness)
+
+
+def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damping: float = 1.0) -> Recording:
+    """Simulate a body from rest.
+
+    Args:
+        body: the spec.
+        rest: first pose.
+        targets: (steps + 1, joints) of position control, rad; NaN for no torque.
+        push: forward velocity of the torso at the start, m/s.
+        damping: of the joints, as a share of their own.
+
+    Returns:
+        A pose for every substep.
+    """
+    sized = sizing.sized(body)
+    gains = sizing.position_gains(sized, mechanics(sized, tuple(rest.joints)).inertias)
+    model = copy.copy(compiled(body))
+    model.dof_damping[6:] *= damping
+    data, step = mujoco.MjData(model), sizing.control_timestep(body)
+    data.qpos[:] = np.concatenate(rest)
+    data.qvel[0] = push
+    poses = [data.qpos.copy()]
+    for target, later in zip(targets[:-1], targets[1:], strict=True):
+        speeds = data.qvel[6:] - (later - target) / step
+        data.ctrl[:] = np.nan_to_num(torques(target, data.qpos[7:], speeds, *gains))
+        for _ in range(sizing.SUBSTEPS):
+            mujoco.mj_step(model, data)
+            poses.append(data.qpos.copy())
+    return Recording(model.opt.timestep, np.stack(poses))

@@ -1,0 +1,102 @@
+"""The clips that a body can have, by name."""
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from arc_suite.animation.clips import acting
+from arc_suite.animation.clips.root_motion import Motion, Pose
+from arc_suite.robots.spec import Body
+
+
+class Walk(NamedTuple):
+    """A loop under a command.
+
+    Attributes:
+        command: forward, left and turning, in units of the task: the body's own speed.
+        failing: index of a leg whose motors fail; None for a sound body.
+    """
+
+    command: tuple[float, float, float]
+    failing: int | None = None
+
+
+class Passage(NamedTuple):
+    """A clip between the walk and rest.
+
+    Attributes:
+        starts: whether it begins at rest.
+        cycles: of the gait.
+    """
+
+    starts: bool
+    cycles: int
+
+
+class Idle(NamedTuple):
+    """Rest: a breath."""
+
+
+class Acted(NamedTuple):
+    """A motion simulated from rest.
+
+    Attributes:
+        play: makes it of the body and its pose at rest.
+        ends: those at which it has the first pose of idle: 0 and -1.
+    """
+
+    play: Callable[[Body, Pose], Motion]
+    ends: tuple[int, ...]
+
+
+class Showcase(NamedTuple):
+    """A loop of a preset of the demonstrator, in a gait of its own.
+
+    Attributes:
+        preset: its name.
+    """
+
+    preset: str
+
+
+WALK = Walk((1.0, 0.0, 0.0))
+CLIPS: dict[str, Walk | Passage | Idle | Acted | Showcase] = {
+    "walk": WALK,
+    "slow": Walk((0.6, 0.0, 0.0)),
+    "fast": Walk((1.25, 0.0, 0.0)),
+    "turn_left": Walk((0.5, 0.0, 0.5)),
+    "turn_right": Walk((0.5, 0.0, -0.5)),
+    "forward_left": Walk((0.7, 0.0, 0.3)),
+    "forward_right": Walk((0.7, 0.0, -0.3)),
+    "turn_in_place_left": Walk((0.0, 0.0, 1.0)),
+    "turn_in_place_right": Walk((0.0, 0.0, -1.0)),
+    "strafe_left": Walk((0.0, 0.5, 0.0)),
+    "strafe_right": Walk((0.0, -0.5, 0.0)),
+    "back": Walk((-0.5, 0.0, 0.0)),
+    "start": Passage(starts=True, cycles=3),
+    "stop": Passage(starts=False, cycles=3),
+    "idle": Idle(),
+    "hit": Acted(acting.hit, (0, -1)),
+    "limp": Walk((1.0, 0.0, 0.0), failing=0),
+    "rise": Acted(acting.rise, (-1,)),
+    "death": Acted(acting.death, (0,)),
+    "tuned": Showcase("tuned"),
+    "refined": Showcase("refined"),
+}
+DEFAULT = ("walk", "slow", "fast", "turn_left", "turn_right", "start", "stop", "idle")
+ADDITIVE = ("hit", "limp")  # to the first pose of idle
+FASTER = {"slow": -1.0, "fast": 1.0}  # than the walk; the sign of the difference that their names promise
+ALL = "all"  # in place of all names
+REST = "rest"  # the recording of a stop, of rest and of a start
+
+
+def sources(names: Sequence[str]) -> dict[str, list[str]]:
+    """Return the names of the recordings that clips are made of, each with the clips that cannot be made without it."""
+    found: dict[str, list[str]] = {}
+    for name in names:
+        recorded = isinstance(CLIPS[name], Walk | Showcase)
+        found.setdefault(name if recorded else REST, []).append(name)
+        if isinstance(CLIPS[name], Passage) or name in FASTER or name == "limp":
+            found.setdefault("walk", [])
+        if name == "limp":
+            found.setdefault(REST, []).append(name)
+    return found

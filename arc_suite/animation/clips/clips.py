@@ -1,0 +1,126 @@
+"""Animation clips: named motions of one body, which loop, stay in step and connect."""
+
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import checks
+from arc_suite.animation.clips.catalogue import CLIPS
+from arc_suite.animation.clips.drafts import Draft, drafts
+from arc_suite.animation.clips.foot_contacts import FootContact
+from arc_suite.animation.clips.recorder import Recorder
+from arc_suite.animation.clips.root_motion import Motion
+from arc_suite.envs.setup import Setup
+from arc_suite.robots.spec import Body
+
+FPS = 60
+_PRESET = "steered"  # its integral brings the speeds of clips to those of their commands
+_RATE = 30.0  # Hz: a clip lasts a whole number of frames at this rate, and so at 60 Hz
+
+
+class Clip(NamedTuple):
+    """A named motion, sampled at the frames of a clip.
+
+    Attributes:
+        name: of `CLIPS`.
+        motion: a sample for each frame, both ends included.
+        loops: whether the last pose is the first one.
+        cycles: of the gait.
+        foot_contacts: events, in the order of time.
+        feet: names of all feet.
+    """
+
+    name: str
+    motion: Motion
+    loops: bool
+    cycles: int
+    foot_contacts: tuple[FootContact, ...]
+    feet: tuple[str, ...]
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times (frames,) of the frames, s."""
+        return self.motion.step * np.arange(len(self.motion.joints))
+
+    @property
+    def moves(self) -> bool:
+        """Whether the root moves."""
+        return bool(self.motion.root.any())
+
+
+def clips(
+    setup: Setup,
+    names: Sequence[str],
+    policy: str = "cpg",
+    preset: str | None = None,
+    fps: float = FPS,
+    progress: Callable[[Iterable[str]], Iterable[str]] = iter,
+    straight: bool = False,
+    plant: bool = False,
+) -> list[Clip]:
+    """Make clips of a body, all of them by one policy, except the showcases of presets.
+
+    The policy walks under the commands of `CLIPS` where the task has a command; in another task there is the clip walk
+    alone. A cycle of the gait is a whole number of control steps, unless the setup sets `gait_frequency`.
+
+    Loops begin where the gait schedules the touchdown of the first foot, and hold the same number of cycles: the least
+    with which the most of them close within two degrees. Stops begin and starts end with the first pose of the walk;
+    stops end and starts begin with the first pose of idle. A clip lasts a whole number of frames at 30 and at 60 a
+    second. The median height of soles in stance is 0.
+
+    A clip that cannot be made is left out with a warning: a loop that does not close, a slow or fast walk whose speed
+    is within 10 % of the walk's, a preset that the body lacks.
+
+    Args:
+        setup: body and task.
+        names: of `CLIPS`.
+        policy: see `policies.policy`.
+        preset: of the policy; None for `steered` on level ground with a command, elsewhere for the one that suits the
+            task and the body.
+        fps: frames a second.
+        progress: wraps the recordings, such as `tqdm`.
+        straight: whether loops that do not turn go exactly where their commands say; without it, they veer as the body
+            does.
+        plant: whether inverse kinematics keeps feet in stance where they are; without it, they slide as in the physics.
+
+    Raises:
+        ValueError: no name, an unknown one, a value out of range, a policy that does not fit, or no clip that can be
+            made.
+        OSError: a file cannot be read.
+    """
+    checks.number("fps", fps, 1.0, 1000.0)
+    if not names:
+        raise ValueError(f"clips: expected one or more of {', '.join(CLIPS)}, got none")
+    for name in names:
+        checks.name(name, CLIPS, "clip")
+    if len(set(names)) < len(names):
+        raise ValueError(f"clips: expected each once, got {', '.join(names)}")
+    if policy == "cpg" and preset is None and "command" in setup.definition.blocks and not setup.kind.own_arena:
+        preset = _PRESET
+    recorder, left_out = Recorder(setup, policy, preset), {}
+    made = drafts(recorder, names, progress, left_out, straight, plant)
+    told = {name: f"{setup.body.name}, clip {name}" for name in names if name in left_out}
+    if len(told) == len(names):
+        name = names[0]
+        raise ValueError(f"{told[name]}: {left_out[name]}")
+    for name, clip in told.items():
+        warnings.warn(f"{clip} is left out: {left_out[name]}", stacklevel=2)
+    return [_framed(name, setup.body, made[name], fps) for name in names if name not in left_out]
+
+
+def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
+    """Return a draft as frames: a whole number of them at 30 and at 60 a second."""
+    seconds = max(1, round(draft.motion.seconds * _RATE)) / _RATE
+    cycle = draft.cycle * seconds / draft.motion.seconds
+    draft = draft._replace(motion=draft.motion.stretched(seconds), cycle=cycle)
+    frames = max(1, round(seconds * fps))
+    return Clip(
+        name=name,
+        motion=draft.motion.at(np.linspace(0.0, seconds, frames + 1)),
+        loops=draft.loops,
+        cycles=draft.cycles,
+        foot_contacts=tuple(draft.contacts(body)[1]),
+        feet=body.foot_names,
+    )

@@ -1,0 +1,244 @@
+"""Drafts of clips: motions at the pace of the physics, made of recordings, which connect."""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
+from typing import NamedTuple, cast
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.animation.clips import in_place, loops, planting, root_motion
+from arc_suite.animation.clips.catalogue import CLIPS, FASTER, REST, WALK, Acted, Passage, Showcase, Walk, sources
+from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
+from arc_suite.animation.clips.recorder import Recorded, Recorder, Transition
+from arc_suite.animation.clips.root_motion import Motion, Pose
+from arc_suite.robots.spec import Body
+from arc_suite.simulation.model import compiled
+
+_MOST_CYCLES = 4  # of loops that stay in step
+_MOST_ALONE = 12  # of a loop with a gait of its own
+_FOLLOWS = 0.25  # of its command's velocity, that a loop has at least
+_FAR = np.radians(20.0)  # from the pose of a clip, from which a stop or a start is not made to meet it
+_APART = 1.1  # ratio of the speeds of two clips, one of which is called faster
+
+
+class Draft(NamedTuple):
+    """A motion with a sample for every substep.
+
+    Attributes:
+        motion: of the body.
+        cycles: of the gait; 0 without a gait.
+        cycle: s.
+        loops: whether its last pose is its first one.
+        stands: whether there is nothing to tell of feet.
+    """
+
+    motion: Motion
+    cycles: int = 0
+    cycle: float = math.nan
+    loops: bool = True
+    stands: bool = False
+
+    @property
+    def start(self) -> Pose:
+        """First pose."""
+        return self.motion.pose(0)
+
+    def contacts(self, body: Body) -> tuple[float, list[FootContact]]:
+        """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
+        heights = sole_heights(compiled(body), body, self.motion.qpos())
+        if self.stands:
+            return float(np.median(heights)), []
+        found, stance = foot_contacts(self.motion, body, heights, self.cycle, self.loops)
+        return float(np.median(heights[stance])) if stance.any() else 0.0, found
+
+    def planted(self, body: Body) -> "Draft":
+        """Return the draft with feet in stance that do not slide; see `planting.planted`."""
+        return self._replace(motion=planting.planted(body, self.motion, self.cycle, self.loops))
+
+    def grounded(self, body: Body) -> "Draft":
+        """Return the draft with soles in stance on the ground."""
+        return self._replace(motion=self.motion.lowered(self.contacts(body)[0]))
+
+
+def drafts(
+    recorder: Recorder,
+    names: Sequence[str],
+    progress: Callable[[Iterable], Iterable],
+    left_out: MutableMapping[str, str],
+    straight: bool = False,
+    plant: bool = False,
+) -> dict[str, Draft]:
+    """Record what clips need and return their drafts by name, and those of clips that these connect to.
+
+    Args:
+        recorder: of the body.
+        names: of `catalogue.CLIPS`.
+        progress: wraps the recordings.
+        left_out: takes the reasons why clips cannot be made, by name.
+        straight: whether loops that do not turn go exactly where their commands say.
+        plant: whether feet in stance do not slide.
+    """
+    body, recorded = recorder.body, _recordings(recorder, names, progress, left_out)
+    gaits = {name: each for name, each in recorded.items() if isinstance(each, Recorded)}
+    clocked = {name: each for name, each in gaits.items() if each.phase is not None}
+    found = _in_step(body, clocked, _MOST_CYCLES, loops.OPEN, left_out) if clocked else {}
+    for name in gaits.keys() - clocked.keys():
+        found |= _in_step(body, {name: gaits[name]}, _MOST_ALONE, loops.CLOSED, left_out)
+    _check_commands(found, recorder.units, left_out)
+    _check_speeds(found, left_out)
+    if straight:
+        found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}
+    if plant:
+        found = {name: draft.planted(body) for name, draft in found.items()}
+    if isinstance(transition := recorded.get(REST), Transition):
+        found |= _connected(body, transition, names, found.get("walk"), plant, left_out)
+    if "limp" in found and not {"walk", "idle"} <= found.keys():
+        left_out.setdefault("limp", "there is no walk that it differs from")
+    elif "limp" in found:
+        found["limp"] = _difference(found["limp"], found["walk"], found["idle"].start)
+    return found
+
+
+def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Recorded | Transition]:
+    """Return recordings by name; reasons of failures go to `left_out`."""
+    found = {}
+    for source, needed_by in progress(list(sources(names).items())):
+        try:
+            found[source] = _recording(recorder, source)
+        except ValueError as error:
+            left_out |= dict.fromkeys(needed_by, str(error))
+    return found
+
+
+def _recording(recorder: Recorder, source: str) -> Recorded | Transition:
+    if source == REST:
+        return recorder.transition(WALK.command)
+    spec = cast(Walk | Showcase, CLIPS[source])  # `sources` names no others
+    if isinstance(spec, Showcase):
+        return recorder.showcase(spec.preset)
+    return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(spec.command, spec.failing)
+
+
+def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: float, left_out) -> dict[str, Draft]:
+    """Return loops of recordings that hold the same number of cycles and begin at the same phase, on the ground."""
+    closings = {name: loops.closings(each.recording, each.cycle, most) for name, each in recorded.items()}
+    cycles, found = loops.best(closings, bound), {}
+    for name, each in recorded.items():
+        closing = closings[name][cycles]
+        if closing.seam > loops.OPEN:
+            bound, seam = np.degrees((loops.OPEN, closing.seam))
+            left_out[name] = f"the pose does not return within {bound:.0f} degrees: {seam:.1f} after {cycles} cycles"
+            continue
+        first = loops.usual(each.recording, closing.samples)
+        draft = Draft(loops.loop(each.recording, first, closing.samples), cycles, each.cycle)
+        begin = _first_touchdown(body, draft) if each.phase is None else each.wait(first)
+        found[name] = draft._replace(motion=draft.motion.begun(begin)).grounded(body)
+    return found
+
+
+def _straight(name: str, motion: Motion) -> Motion:
+    """Return a loop that goes where its command says, unless that is a turn."""
+    spec = CLIPS[name]
+    forward, left, turning = spec.command if isinstance(spec, Walk) else (1.0, 0.0, 0.0)
+    return motion if turning else loops.straightened(motion, math.atan2(left, forward))
+
+
+def _first_touchdown(body: Body, draft: Draft) -> int:
+    """Return the sample in which the first foot that steps touches down; 0 if none does."""
+    downs = [contact for contact in draft.contacts(body)[1] if contact.event == TOUCH_DOWN]
+    return min(downs, key=lambda contact: (body.foot_names.index(contact.foot), contact.sample)).sample if downs else 0
+
+
+def _check_commands(found: dict[str, Draft], units: np.ndarray | None, left_out) -> None:
+    """Leave out loops that do not follow their commands."""
+    for name, draft in list(found.items()):
+        if units is not None and isinstance(spec := CLIPS[name], Walk):
+            command = np.array(spec.command)
+            share = command @ (draft.motion.twist / units) / (command @ command)
+            if share < _FOLLOWS:
+                left_out[name] = f"the policy moves at {round(100.0 * share)} % of its command"
+                del found[name]
+
+
+def _check_speeds(found: dict[str, Draft], left_out) -> None:
+    """Leave out loops whose speed is not what their names say, given that of the walk."""
+    if "walk" not in found:
+        return
+    usual = np.hypot(*found["walk"].motion.twist[:2])
+    for name, sign in FASTER.items():
+        if name in found:
+            speed = np.hypot(*found[name].motion.twist[:2])
+            if (speed / usual) ** sign < _APART:
+                left_out[name] = f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}"
+                del found[name]
+
+
+def _connected(
+    body: Body, transition: Transition, names: Sequence[str], walk: Draft | None, plant: bool, left_out
+) -> dict[str, Draft]:
+    """Return the draft of idle, and of the clips that connect to it where they are asked for."""
+    rest = root_motion.standing(transition.recorded.recording, transition.start, 1).pose(0)
+    idle = Draft(in_place.idle(body, rest), stands=True).grounded(body)
+    found = {"idle": idle}
+    for name in names:
+        try:
+            match CLIPS[name]:
+                case Acted() as spec:
+                    found[name] = _acted(body, spec, rest, idle.start)
+                case Passage() as spec:
+                    draft = _passage(body, spec, transition, idle.start, walk)
+                    found[name] = draft.planted(body) if plant else draft
+        except ValueError as error:
+            left_out[name] = str(error)
+    return found
+
+
+def _acted(body: Body, spec: Acted, rest: Pose, idle: Pose) -> Draft:
+    """Return a motion simulated from the pose at rest, which meets idle; see `Acted`."""
+    motion = spec.play(body, rest).lowered(rest.position[2] - idle.position[2])
+    for end in spec.ends:
+        motion = motion.ending(idle, end, len(motion.joints) // 3)
+    return Draft(motion, loops=False, stands=True)
+
+
+def _passage(body: Body, spec: Passage, transition: Transition, idle: Pose, walk: Draft | None) -> Draft:
+    """Return a stop or a start, which meets idle and the walk.
+
+    Raises:
+        ValueError: there is no walk, or its pose is far from that of the passage.
+    """
+    if walk is None:
+        raise ValueError("there is no walk that it connects to")
+    draft = passage(body, spec, transition)
+    cycle, still, going = round(draft.cycle / draft.motion.step), *((0, -1) if spec.starts else (-1, 0))
+    motion = draft.motion.meeting(idle, still, cycle).meeting(walk.start, going, cycle)
+    if motion.seam > _FAR:
+        raise ValueError(f"its pose is {np.degrees(motion.seam):.0f} degrees from that of the walk or of idle")
+    return draft._replace(motion=motion)
+
+
+def passage(body: Body, spec: Passage, transition: Transition) -> Draft:
+    """Return a stop or a start as it was recorded, with soles in stance on the ground."""
+    recorded = transition.recorded
+    cycle = round(recorded.cycle / recorded.recording.step)
+    first = transition.start if spec.starts else transition.stop
+    samples = spec.cycles * cycle - transition.late * spec.starts
+    motion = root_motion.passage(recorded.recording, first, samples, cycle)
+    return Draft(motion, spec.cycles, recorded.cycle, loops=False).grounded(body)
+
+
+def _difference(draft: Draft, usual: Draft, pose: Pose) -> Draft:
+    """Return how a loop differs from another in step with it, added to a pose; its root stays."""
+    times = np.linspace(0.0, usual.motion.seconds, len(usual.motion.joints))
+    motion, same = draft.motion.at(times * draft.motion.seconds / usual.motion.seconds), usual.motion
+    turns = rotations.product(motion.quaternions, same.quaternions * (1.0, -1.0, -1.0, -1.0))
+    motion = motion._replace(
+        step=same.step,
+        root=np.zeros_like(same.root),
+        positions=pose.position + motion.positions - same.positions,
+        quaternions=rotations.product(turns, np.broadcast_to(pose.quaternion, turns.shape)),
+        joints=pose.joints + motion.joints - same.joints,
+        twist=np.zeros(3),
+    )
+    return draft._replace(motion=motion, cycle=usual.cycle, stands=True)

@@ -1,0 +1,111 @@
+"""Foot contact events of a motion, from the heights of the feet, as the contacts of the simulation chatter."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from arc_suite.animation.clips.root_motion import Motion
+from arc_suite.robots.spec import Body
+
+TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
+
+# Shares of the range of a foot's height: a swing rises above the upper one, and lasts while the foot is above the
+# lower one.
+_RISES, _LASTS = 0.5, 0.2
+_BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
+_LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
+
+
+class FootContact(NamedTuple):
+    """A touchdown or liftoff of one foot.
+
+    Attributes:
+        foot: name of its body.
+        event: `TOUCH_DOWN` or `LIFT_OFF`.
+        sample: of the motion.
+        time: s from its start.
+    """
+
+    foot: str
+    event: str
+    sample: int
+    time: float
+
+
+def sole_heights(model: mujoco.MjModel, body: Body, qpos: np.ndarray) -> np.ndarray:
+    """Return the heights (samples, feet), m, of the feet's lowest points over a level floor.
+
+    Args:
+        model: of the body.
+        body: its spec.
+        qpos: (samples, nq)
+    """
+    data = mujoco.MjData(model)
+    feet = [model.body(name).id for name in body.foot_names]
+    heights = np.empty((len(qpos), len(feet)))
+    for pose, row in zip(qpos, heights, strict=True):
+        data.qpos[:] = pose
+        mujoco.mj_kinematics(model, data)
+        row[:] = data.xpos[feet, 2]
+    return heights - [leg.foot.radius for leg in body.legs]
+
+
+def swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.ndarray:
+    """Return when a foot swings, (samples,) booleans.
+
+    Args:
+        heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
+        least: m; a foot that rises less does not swing.
+        bounce: samples; a shorter contact does not end a swing.
+        loops: whether the first sample follows the last.
+    """
+    low, lift = heights.min(), np.ptp(heights)
+    if lift < least:
+        return np.zeros(len(heights), bool)
+    up, high = (heights > low + share * lift for share in (_LASTS, _RISES))
+    begin = int(up.argmin()) if loops else 0  # in stance, so that no swing is cut in two
+    up, high = np.roll(up, -begin), np.roll(high, -begin)
+    starts, ends = _runs(up)
+    for end, start in zip(ends[:-1], starts[1:], strict=True):
+        up[end:start] |= start - end < bounce
+    for start, end in zip(*_runs(up), strict=True):
+        up[start:end] = high[start:end].any()
+    return np.roll(up, begin)
+
+
+def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return where runs of true values start, and where they have ended."""
+    edges = np.diff(mask.astype(int), prepend=0, append=0)
+    return np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
+
+
+def foot_contacts(
+    motion: Motion, body: Body, heights: np.ndarray, cycle: float, loops: bool
+) -> tuple[list[FootContact], np.ndarray]:
+    """Return the foot contact events of a motion in the order of time, and the feet in stance, (samples, feet).
+
+    Args:
+        motion: of the body.
+        body: its spec.
+        heights: (samples, feet) of the soles, m.
+        cycle: of the gait, s.
+        loops: whether the motion is a loop; its last sample is its first one then, and has no events.
+    """
+    least, bounce = _LEAST_LIFT * body.torso.standing_height, _BOUNCE * cycle / motion.step
+    end = len(heights) - 1 if loops else len(heights)
+    found, swing = [], np.zeros(heights.shape, bool)
+
+    def mark(foot, event, at):
+        found.extend(
+            FootContact(foot, event, int(sample), float(sample * motion.step)) for sample in np.flatnonzero(at)
+        )
+
+    for leg, foot in enumerate(body.foot_names):
+        up = swings(heights[:end, leg], least, bounce, loops)
+        before = np.roll(up, 1) if loops else np.concatenate([up[:1], up[:-1]])
+        mark(foot, LIFT_OFF, up & ~before)
+        mark(foot, TOUCH_DOWN, ~up & before)
+        swing[:end, leg] = up
+    swing[end:] = swing[:1]
+    return sorted(found, key=lambda contact: (contact.sample, contact.foot, contact.event)), ~swing

@@ -1,0 +1,88 @@
+"""Metadata of clips, JSON-able: speeds, foot contact events, and where clips stand in blend spaces."""
+
+import collections
+from collections.abc import Sequence
+from typing import Any
+
+from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, Idle, Walk
+from arc_suite.animation.clips.clips import Clip
+from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
+from arc_suite.robots.spec import Body
+
+ROOT_MOTIONS = {"both": (True, False), "moving": (True,), "in_place": (False,)}
+
+# Blend spaces by name: the metadata along both axes, and which component of their clips' commands is 0.
+_SPACES = {"turning": (("turn_rate", "forward_speed"), 1), "strafing": (("left_speed", "forward_speed"), 2)}
+
+
+def sidecar(body: Body, clips: Sequence[Clip], root_motion: str = "both") -> dict[str, Any]:
+    """Return the metadata of clips by name of the animation, and their blend spaces.
+
+    Args:
+        body: of the clips.
+        clips: of one file.
+        root_motion: that of the file; see `creatures.glb`.
+    """
+    moving = ROOT_MOTIONS[root_motion]
+    return {
+        "body": body.name,
+        "units": {"length": "m", "time": "s", "angle": "rad"},
+        "axes": {"up": "y", "forward": "z", "left": "x"},
+        "clips": {name: metadata(clip) for clip in clips for name in animations(clip, moving)},
+        "blend": _spaces(clips, moving),
+    }
+
+
+def metadata(clip: Clip) -> dict[str, Any]:
+    """Return the metadata of a clip.
+
+    `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
+    `additive_to` is the animation whose first frame is the reference of an additive clip.
+    """
+    forward, left, turning = (round(float(value), 6) for value in clip.motion.twist)
+    found = {
+        "seconds": clip.motion.seconds,
+        "frames": len(clip.times),
+        "loops": clip.loops,
+        "cycles": clip.cycles,
+        "forward_speed": forward,
+        "left_speed": left,
+        "turn_rate": turning,
+        "foot_contacts": [
+            {"foot": contact.foot, "event": contact.event, "time": round(contact.time, 6)}
+            for contact in clip.foot_contacts
+        ],
+    }
+    if clip.name in ADDITIVE:
+        return found | {"additive_to": "idle_loop"}
+    return found | ({"missing_steps": missing_steps(clip)} if clip.loops else {})
+
+
+def missing_steps(clip: Clip) -> dict[str, int]:
+    """Return the feet of a loop that touch down less often than once a cycle, and how many times less."""
+    downs = collections.Counter(contact.foot for contact in clip.foot_contacts if contact.event == TOUCH_DOWN)
+    return {foot: clip.cycles - downs[foot] for foot in clip.feet if downs[foot] < clip.cycles}
+
+
+def animations(clip: Clip, moving: Sequence[bool]) -> dict[str, bool]:
+    """Return the names of a clip's animations, and whether the root moves in them."""
+    end = "_loop" if clip.loops else ""
+    if not clip.moves:
+        return {f"{clip.name}{end}": False}
+    return {f"{clip.name}{'' if moves else '_in_place'}{end}": moves for moves in moving}
+
+
+def _spaces(clips: Sequence[Clip], moving: Sequence[bool]) -> dict[str, Any]:
+    """Return the points of blend spaces: an animation for each place in the plane of two speeds."""
+    found = {}
+    for name, (axes, zero) in _SPACES.items():
+        points = []
+        for clip in clips:
+            spec = CLIPS[clip.name]
+            walks = isinstance(spec, Walk) and clip.name not in ADDITIVE and spec.command[zero] == 0.0
+            if walks or isinstance(spec, Idle):
+                figures = metadata(clip)
+                animation = next(iter(animations(clip, moving)))
+                points.append({"animation": animation, "at": [figures[axis] for axis in axes]})
+        found[name] = {"axes": list(axes), "points": points}
+    return found

@@ -1,0 +1,176 @@
+"""Recordings of one body under one policy: walks under commands, a stop and a start, showcases of presets."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.animation.clips import loops
+from arc_suite.animation.clips.recordings import Recording, record
+from arc_suite.cpg.selection import presets_of
+from arc_suite.envs.setup import Setup
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.policies import policy as named_policy
+from arc_suite.tasks.fitting import velocity_units
+
+_SETTLE = 200  # control steps, after which starts and changes of command are forgotten
+_LONG = 700  # control steps without a command: a speed that varies is that of most of an episode
+_CYCLES = 20  # of the gait in a recording under a command, to choose loops from
+_BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
+
+
+class Recorded(NamedTuple):
+    """A recording of a gait.
+
+    Attributes:
+        recording: the poses.
+        cycle: of the gait, s.
+        phase: of the first foot at the first sample, cycles since its scheduled touchdown; None if the task has no
+            clock.
+    """
+
+    recording: Recording
+    cycle: float
+    phase: float | None = None
+
+    def wait(self, sample: int) -> int:
+        """Return the samples from a sample to the next touchdown of the first foot that the clock schedules."""
+        cycle = self.cycle / self.recording.step
+        return round((-self.phase * cycle - sample) % cycle) % round(cycle)
+
+
+class Transition(NamedTuple):
+    """A body that walks, stops, stands, starts and walks.
+
+    Attributes:
+        recorded: the recording.
+        stop: first sample of the stop, at a scheduled touchdown of the first foot.
+        start: sample in which the command starts the body.
+        late: samples from a scheduled touchdown to the command's change.
+    """
+
+    recorded: Recorded
+    stop: int
+    start: int
+    late: int
+
+
+class Recorder:
+    """Makes recordings of a body, each from the start of an episode.
+
+    Attributes:
+        body: of the recordings.
+        follows: whether the task has a command.
+        units: (3,) of commands: forward and left, m/s, turning, rad/s; None without a command.
+    """
+
+    def __init__(self, setup: Setup, policy: str, preset: str | None):
+        """Take what moves the body.
+
+        With a command, the frequency of the gait is set so that a cycle is a whole number of control steps, unless
+        the setup sets it: a pose then returns after one cycle.
+
+        Args:
+            setup: body and task.
+            policy: see `policies.policy`.
+            preset: of the policy; None for the one that suits the task and the body.
+
+        Raises:
+            ValueError: a policy or preset that does not fit.
+            OSError: a file cannot be read.
+        """
+        task = setup.definition
+        named_policy(policy, setup.body, preset, task=task)  # errors of the policy are no errors of a clip
+        self.body, self._policy, self._preset = setup.body, policy, preset
+        self.follows = task.commands.get("command") == 3 and task.parameters is not None
+        if self.follows and "gait_frequency" not in setup.task_kwargs:
+            step = task.scene.control_timestep
+            steps = max(1, round(1.0 / (task.parameters.gait_frequency * step)))
+            setup = _changed(setup, gait_frequency=1.0 / (steps * step))
+        self.units = velocity_units(self.body, task.parameters.target_velocity) if self.follows else None
+        self._setup = setup
+
+    def walk(self, command: tuple[float, float, float], failing: int | None = None) -> Recorded:
+        """Return a recording of the policy under a command.
+
+        Args:
+            command: forward, left and turning, in units of the task.
+            failing: index of the leg whose motors fail; None for a sound body.
+
+        Raises:
+            ValueError: the episode ends, or the task has no command.
+        """
+        self._need_command()
+        setup = self._setup if failing is None else _changed(self._setup, actuator_failure=failing)
+        cycle, offset, step = self._gait()
+        recording = self._recorded(setup, _SETTLE, round(_CYCLES * cycle / step), [(0, command)])
+        return Recorded(recording, cycle, (_SETTLE * step / cycle + offset) % 1.0)
+
+    def alone(self) -> Recorded:
+        """Return a recording of the policy in a task without a command.
+
+        Raises:
+            ValueError: the episode ends, or the pose does not return.
+        """
+        return _periodic(self._recorded(self._setup, _SETTLE, _LONG))
+
+    def showcase(self, preset: str) -> Recorded:
+        """Return a recording of a preset of the demonstrator that walks straight ahead in the task walk.
+
+        Raises:
+            ValueError: the body has no such preset, the episode ends, or the pose does not return.
+        """
+        if preset not in presets_of(self.body):
+            raise ValueError(f"{self.body.name} has no preset {preset}")
+        environment = Setup.of(self.body).load(seed=0)
+        actor = named_policy("cpg", self.body, preset, task=environment.task.definition)
+        return _periodic(record(environment, actor, _SETTLE, _LONG))
+
+    def transition(self, command: tuple[float, float, float]) -> Transition:
+        """Return a recording of a stop from a command, and of a start into it.
+
+        Raises:
+            ValueError: the episode ends, or the task has no command.
+        """
+        self._need_command()
+        cycle, offset, step = self._gait()
+        steps = cycle / step
+
+        def phase(count):  # of the first foot, cycles
+            return (count / steps + offset) % 1.0
+
+        least = _SETTLE + round(_BEFORE * steps)
+        stop = min(range(least, least + round(steps)), key=phase)
+        start = stop + round(_REST * steps)
+        commands = [(0, command), (stop, (0.0, 0.0, 0.0)), (start, command)]
+        recording = self._recorded(self._setup, _SETTLE, start + round(_AFTER * steps) - _SETTLE, commands)
+        late = round(SUBSTEPS * steps * phase(stop))
+        stop, start = (SUBSTEPS * (count - _SETTLE) for count in (stop, start))
+        return Transition(Recorded(recording, cycle, phase(_SETTLE)), stop - late, start, late)
+
+    def _gait(self) -> tuple[float, float, float]:
+        """The cycle, s, the offset of the first foot, cycles, and the control step, s."""
+        task = self._setup.definition
+        gait = task.parameters
+        return 1.0 / gait.gait_frequency, gait.phase_offsets[0] / (2.0 * np.pi), task.scene.control_timestep
+
+    def _recorded(self, setup: Setup, settle: int, steps: int, commands=()) -> Recording:
+        environment = setup.load(seed=0)
+        actor = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
+        return record(environment, actor, settle, steps, commands)
+
+    def _need_command(self) -> None:
+        if not self.follows:
+            raise ValueError(f"the task {self._setup.kind.name} has no command")
+
+
+def _periodic(recording: Recording) -> Recorded:
+    cycle = loops.period(recording)
+    if cycle is None:
+        seconds = len(recording.qpos) * recording.step / 2.0
+        raise ValueError(f"the pose does not return within {seconds:.3g} s")
+    return Recorded(recording, cycle)
+
+
+def _changed(setup: Setup, **settings) -> Setup:
+    """Return the setup with other settings of its task."""
+    return Setup.of(setup.body, setup.task, setup.task_kwargs | settings)

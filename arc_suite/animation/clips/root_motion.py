@@ -1,0 +1,274 @@
+"""Motions: a root that moves over the ground, and a body that moves relative to it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.animation.clips.recordings import Recording
+
+
+class Pose(NamedTuple):
+    """A pose in the root's frame, or the difference of two.
+
+    Attributes:
+        position: (3,) of the torso, m.
+        quaternion: (4,) of the torso, w first.
+        joints: (joints,) rad.
+    """
+
+    position: np.ndarray
+    quaternion: np.ndarray
+    joints: np.ndarray
+
+    def relative(self, origin: "Pose") -> "Pose":
+        """Return the difference that leads from another pose to this one."""
+        turn = rotations.product(self.quaternion, _inverse(origin.quaternion))
+        return Pose(self.position - origin.position, turn, self.joints - origin.joints)
+
+
+class Motion(NamedTuple):
+    """A body over the time of a clip, at even steps, ends included.
+
+    Attributes:
+        step: s between two samples.
+        root: (samples, 3) the root on the ground: x, y, m, and yaw, rad, from 0.
+        positions: (samples, 3) of the torso in the root's frame, m.
+        quaternions: (samples, 4) of the torso in the root's frame, w first.
+        joints: (samples, joints) rad.
+        twist: (3,) mean velocity of the root in its own frame: forward and left, m/s, turning, rad/s.
+        seam: rad, largest difference of poses at an end that was made to meet another pose, before it met.
+    """
+
+    step: float
+    root: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+    joints: np.ndarray
+    twist: np.ndarray
+    seam: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """Duration, s."""
+        return self.step * (len(self.joints) - 1)
+
+    def qpos(self) -> np.ndarray:
+        """Return MuJoCo's positions in the world, (samples, 7 + joints)."""
+        heading = self.root[:, 2]
+        ahead, left, height = self.positions.T
+        across = rotations.headed(np.stack([ahead, left], axis=-1), -heading)
+        place = np.concatenate([self.root[:, :2] + across, height[:, None]], axis=-1)
+        return np.concatenate([place, rotations.turned(self.quaternions, heading), self.joints], axis=-1)
+
+    def lowered(self, height: float) -> "Motion":
+        """Return the motion with the torso lower by a height, m."""
+        return self._replace(positions=self.positions - (0.0, 0.0, height))
+
+    def begun(self, sample: int) -> "Motion":
+        """Return the loop with another of its samples first."""
+
+        def rolled(values):
+            turned = np.roll(values[:-1], -sample, axis=0)
+            return np.concatenate([turned, turned[:1]])
+
+        return self._replace(
+            positions=rolled(self.positions), quaternions=rolled(self.quaternions), joints=rolled(self.joints)
+        )
+
+    def pose(self, sample: int) -> Pose:
+        """Return the pose of a sample."""
+        return Pose(self.positions[sample], self.quaternions[sample], self.joints[sample])
+
+    def stretched(self, seconds: float) -> "Motion":
+        """Return the motion over another duration, s."""
+        ratio = seconds / self.seconds
+        return self._replace(step=self.step * ratio, twist=self.twist / ratio)
+
+    def moved(self, difference: Pose, shares: np.ndarray) -> "Motion":
+        """Return the motion with a share (samples,) of a difference of poses added to each sample."""
+        shares = shares[:, None]
+        half = np.arctan2(np.linalg.norm(difference.quaternion[1:]), difference.quaternion[0])
+        half -= np.pi * (half > 0.5 * np.pi)  # q and -q are one orientation
+        axis = difference.quaternion[1:] / max(np.linalg.norm(difference.quaternion[1:]), 1e-12)
+        turns = np.concatenate([np.cos(shares * half), np.sin(shares * half) * axis], axis=-1)
+        return self._replace(
+            positions=self.positions + shares * difference.position,
+            quaternions=rotations.product(turns, self.quaternions),
+            joints=self.joints + shares * difference.joints,
+        )
+
+    def on_root(self, root: np.ndarray) -> "Motion":
+        """Return the same motion in the world on another path (samples, 3) of the root."""
+        qpos = self.qpos()
+        return on_root(self.step, qpos, root, relative(root, places(qpos)))._replace(twist=self.twist, seam=self.seam)
+
+    def meeting(self, pose: Pose, end: int, samples: int) -> "Motion":
+        """Return the motion with a pose at one of its ends.
+
+        The root takes up what differs on the ground, over the whole motion, so that feet stay where they are. The
+        rest is spread over the samples next to the end.
+
+        Args:
+            pose: to meet.
+            end: 0 or -1.
+            samples: over which the difference of the poses fades.
+        """
+        count, place = len(self.joints), places(self.qpos()[[end]])[0]
+        wanted = after(place, relative(_place(pose), np.zeros(3)))
+        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
+        error = relative(self.root[end], wanted) * (1.0, 1.0, 0.0)
+        error[2] = rotations.wrapped(wanted[2] - self.root[end, 2])
+        root = after(self.root, fading(from_end / (count - 1))[:, None] * error)
+        motion = self.on_root(root)
+        root = relative(root[0], root)
+        return motion._replace(root=root, twist=logarithm(root[-1]) / motion.seconds).ending(pose, end, samples)
+
+    def ending(self, pose: Pose, end: int, samples: int) -> "Motion":
+        """Return the motion with a pose at one of its ends, on the same path of the root.
+
+        Args:
+            pose: to end with.
+            end: 0 or -1.
+            samples: next to the end, over which the difference of the poses fades.
+        """
+        count, difference = len(self.joints), pose.relative(self.pose(end))
+        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
+        met = self.moved(difference, fading(from_end / samples))
+        return met._replace(seam=max(self.seam, seam(difference)))
+
+    def part(self, first: int, samples: int) -> "Motion":
+        """Return a part of the motion, `samples` after the first one, whose root starts at 0."""
+        rows = slice(first, first + samples + 1)
+        fields = {name: getattr(self, name)[rows] for name in ("positions", "quaternions", "joints")}
+        root = relative(self.root[first], self.root[rows])
+        return self._replace(root=root, **fields, twist=logarithm(root[-1]) / (self.step * (len(root) - 1)))
+
+    def at(self, times: np.ndarray) -> "Motion":
+        """Return the motion at even times (frames,), s, interpolated between samples."""
+        place = (np.asarray(times) / self.step).clip(0.0, len(self.joints) - 1)
+        before = np.minimum(place.astype(int), len(self.joints) - 2)
+        share = (place - before)[:, None]
+
+        def between(values):
+            return (1.0 - share) * values[before] + share * values[before + 1]
+
+        quaternions = between(self.quaternions)  # 2 ms apart, where a straight line is as good as an arc
+        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+        return self._replace(
+            step=float(times[1] - times[0]),
+            root=between(self.root),
+            positions=between(self.positions),
+            quaternions=quaternions,
+            joints=between(self.joints),
+        )
+
+
+def seam(difference: Pose) -> float:
+    """Return the size of a difference of poses, rad: the largest of joint angles and the torso's turn."""
+    turn = 2.0 * np.arctan2(np.linalg.norm(difference.quaternion[1:]), abs(difference.quaternion[0]))
+    return float(max(abs(difference.joints).max(), turn))
+
+
+def fading(share: np.ndarray) -> np.ndarray:
+    """Return weights that fall smoothly from 1 at 0 to 0 at 1 and beyond."""
+    share = share.clip(0.0, 1.0)
+    return 1.0 - share**2 * (3.0 - 2.0 * share)
+
+
+def places(qpos) -> np.ndarray:
+    """Return where the torso is, seen from above: (samples, 3) x, y, m, and yaw, rad, that does not jump."""
+    return np.concatenate([qpos[:, :2], np.unwrap(rotations.yaw(qpos[:, 3:7]))[:, None]], axis=-1)
+
+
+def passage(recording: Recording, first: int, samples: int, window: int) -> Motion:
+    """Return a part of a recording unchanged, whose root follows the moving average of the torso's path.
+
+    Args:
+        recording: with half a window more at both ends.
+        first: sample with which the motion begins.
+        samples: of it, without the last.
+        window: samples that the mean is taken over, a gait cycle.
+    """
+    qpos = recording.qpos
+    place = places(qpos)
+    low, sums = first - window // 2, np.cumsum(np.concatenate([np.zeros((1, 3)), place]), axis=0)
+    path = (sums[low + window : low + window + samples + 1] - sums[low : low + samples + 1]) / window
+    rows = slice(first, first + samples + 1)
+    motion = on_root(recording.step, qpos[rows], relative(path[0], path), relative(path, place[rows]))
+    path = motion.root
+    return motion._replace(twist=logarithm(path[-1]) / motion.seconds)
+
+
+def standing(recording: Recording, first: int, samples: int) -> Motion:
+    """Return a part of a recording whose root stays below the torso of its first sample."""
+    qpos = recording.qpos[first : first + samples + 1]
+    place, root = places(qpos), np.zeros((len(qpos), 3))
+    return on_root(recording.step, qpos, root, relative(place[0], place))
+
+
+def on_root(step: float, qpos, root, local) -> Motion:
+    """Put poses onto a root, given where the torso is (samples, 3) in the root's frame, seen from above."""
+    turn = local[:, 2] - rotations.yaw(qpos[:, 3:7])
+    return Motion(
+        step=step,
+        root=root,
+        positions=np.concatenate([local[:, :2], qpos[:, 2:3]], axis=-1),
+        quaternions=_continuous(rotations.turned(qpos[:, 3:7], turn)),
+        joints=qpos[:, 7:].copy(),
+        twist=np.zeros(3),
+    )
+
+
+def _place(pose: Pose) -> np.ndarray:
+    """Return where the torso is in the root's frame, seen from above, (3,)."""
+    return np.append(pose.position[:2], rotations.yaw(pose.quaternion))
+
+
+def _inverse(quaternion) -> np.ndarray:
+    return quaternion * (1.0, -1.0, -1.0, -1.0)
+
+
+def _continuous(quaternions) -> np.ndarray:
+    """Return the same orientations (samples, 4) with continuous signs."""
+    flips = (quaternions[1:] * quaternions[:-1]).sum(axis=-1) < 0.0
+    signs = np.concatenate([[1.0], np.cumprod(np.where(flips, -1.0, 1.0))])
+    return quaternions * (np.sign(quaternions[0, 0]) or 1.0) * signs[:, None]
+
+
+# Places on the ground: (..., 3) x, y and yaw.
+
+
+def relative(origin, place) -> np.ndarray:
+    """Return places relative to others."""
+    origin, place = np.asarray(origin, float), np.asarray(place, float)
+    offset = rotations.headed(place[..., :2] - origin[..., :2], origin[..., 2])
+    return np.concatenate([offset, place[..., 2:] - origin[..., 2:]], axis=-1)
+
+
+def along(twist, times) -> np.ndarray:
+    """Return the places (times, 3) to which a constant velocity in the moving frame leads from 0.
+
+    Args:
+        twist: (3,) forward, left, m/s, and turning, rad/s.
+        times: (times,) s.
+    """
+    angle = 0.5 * twist[2] * times
+    # A chord of the arc: its length is the arc's by sin(a) / a, its direction that of half the turn.
+    chord = times * np.sinc(angle / np.pi)
+    displacement = rotations.headed(np.stack([chord * twist[0], chord * twist[1]], axis=-1), -angle)
+    return np.concatenate([displacement, 2.0 * angle[:, None]], axis=-1)
+
+
+def logarithm(place) -> np.ndarray:
+    """Return the constant velocities (..., 3) that lead from 0 to places (..., 3) in a unit of time."""
+    half = 0.5 * place[..., 2]
+    displacement = rotations.headed(place[..., :2], half) / np.sinc(half / np.pi)[..., None]
+    return np.concatenate([displacement, place[..., 2:]], axis=-1)
+
+
+def after(first, second) -> np.ndarray:
+    """Return the places (..., 3) that `second` are relative to `first`."""
+    first, second = np.asarray(first, float), np.asarray(second, float)
+    moved = first[..., :2] + rotations.headed(second[..., :2], -first[..., 2])
+    return np.concatenate([moved, first[..., 2:] + second[..., 2:]], axis=-1)

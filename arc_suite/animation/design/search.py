@@ -1,0 +1,131 @@
+"""MAP-Elites (Mouret and Clune, "Illuminating search spaces by mapping elites", 2015): the best body of every cell.
+
+Bodies come in batches, and a batch depends on the seed, its number and the bodies before it alone. So a search does not
+depend on the number of processes, and one that was broken off resumes from the outcomes in its journal. New genes are
+those of an elite, moved at random and along the line to another elite (Vassiliades and Mouret, "Discovering the elite
+hypervolume by leveraging interspecies correlation", 2018).
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.animation.design.axes import Map
+from arc_suite.animation.design.genes import Genes, within
+from arc_suite.animation.design.trials import GOALS, Outcome, Trial, Walk
+from arc_suite.robots.spec import Body
+
+BATCH = 20
+RANDOM = 40  # bodies of random genes, with which a search begins
+ISOTROPIC, LINE = 0.05, 0.2  # standard deviations of the moves, shares of a gene's range and of the distance
+REDRAWN = 0.05  # probability that a gene is drawn anew, by which counts change too
+
+
+class Candidate(NamedTuple):
+    """A body that was evaluated.
+
+    Attributes:
+        genes: (n,) from 0 to 1.
+        cell: of the map; None for genes that make no body.
+        outcome: of the body.
+    """
+
+    genes: tuple[float, ...]
+    cell: tuple[int, ...] | None
+    outcome: Outcome
+
+
+class Batch(NamedTuple):
+    """Bodies that were evaluated together.
+
+    Attributes:
+        candidates: the bodies.
+    """
+
+    candidates: Sequence[Candidate]
+
+    @classmethod
+    def restored(cls, candidates: Sequence[Sequence]) -> "Batch":
+        """Return a batch from lists as JSON holds them."""
+        return cls([Candidate(tuple(genes), cell and tuple(cell), _outcome(*rest)) for genes, cell, rest in candidates])
+
+
+def _outcome(reason: str, first: Sequence | None, second: Sequence | None) -> Outcome:
+    return Outcome(reason, Walk(*first) if first else None, Walk(*second) if second else None)
+
+
+class Search:
+    """A search for the best body of every cell.
+
+    Attributes:
+        genes: their names.
+        candidates: all bodies, in order.
+        elites: by cell, the index of the best in `candidates`.
+    """
+
+    def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str):
+        """Start a search.
+
+        Args:
+            space: of genes.
+            cells: that are to be filled.
+            trial: by which bodies are evaluated.
+            seed: of the genes.
+            stem: of the names of bodies, `<stem>_<index>`.
+        """
+        self.genes = space.names
+        self._space, self._cells, self._trial, self._seed, self._stem = space, cells, trial, seed, stem
+        self.candidates: list[Candidate] = []
+        self.elites: dict[tuple[int, ...], int] = {}
+
+    def batch(self, evaluated: Callable[[Iterable[tuple]], Iterable[Outcome]]) -> Batch:
+        """Evaluate the next batch of bodies, add and return it.
+
+        Args:
+            evaluated: maps arguments of `trials.evaluate` to outcomes, in order.
+        """
+        genes = self._genes()
+        bodies = [self.body(numbers, len(self.candidates) + index) for index, numbers in enumerate(genes)]
+        cells = [None if isinstance(body, str) else self._cells.cell(body) for body in bodies]
+        outcomes = evaluated([(self._trial, body, self._value(cell)) for body, cell in zip(bodies, cells, strict=True)])
+        found = Batch([Candidate(*each) for each in zip(map(tuple, genes.tolist()), cells, outcomes, strict=True)])
+        self.add(found)
+        return found
+
+    def add(self, batch: Batch) -> None:
+        """Add evaluated bodies: one whose second evaluation exceeds that of its cell's elite takes its place."""
+        for one in batch.candidates:
+            walk = None if one.outcome.reason else one.outcome.second
+            if walk is not None and GOALS[self._trial.goal].value(walk) > self._value(one.cell):
+                self.elites[one.cell] = len(self.candidates)
+            self.candidates.append(one)
+
+    def middle(self) -> Body | str:
+        """Return the body in the middle of all ranges, or the reason why there is none."""
+        return self.body([0.5] * len(self._space.names), 0)
+
+    def body(self, genes: Sequence[float], index: int) -> Body | str:
+        """Return the body of genes, named by its index; where they make none, the reason."""
+        try:
+            return within(self._trial.budget, self._space, np.array(genes), f"{self._stem}_{index}")
+        except ValueError as error:
+            return f"no body: {error}"
+
+    def _genes(self) -> np.ndarray:
+        """Return the genes (BATCH, n) of the next batch, rounded as files hold them."""
+        random = np.random.default_rng((self._seed, len(self.candidates)))
+        drawn = random.uniform(size=(BATCH, len(self._space.names)))
+        parents = [self.candidates[index].genes for index in self.elites.values()]
+        if len(self.candidates) >= RANDOM and parents:
+            first, second = np.array(parents)[random.integers(len(parents), size=(2, BATCH))]
+            moved = first + ISOTROPIC * random.standard_normal(drawn.shape)
+            moved += LINE * random.standard_normal((BATCH, 1)) * (second - first)
+            drawn = np.where(random.uniform(size=drawn.shape) < REDRAWN, drawn, moved.clip(0.0, 1.0))
+        return drawn.round(6)
+
+    def _value(self, cell: tuple[int, ...] | None) -> float:
+        """Return the metric of a cell's elite as a number to be raised."""
+        if cell not in self.elites:
+            return -np.inf
+        return GOALS[self._trial.goal].value(self.candidates[self.elites[cell]].outcome.second)

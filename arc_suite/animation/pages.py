@@ -1,0 +1,108 @@
+"""Pages that play walks: one HTML file each, with nothing to fetch, for any browser.
+
+The bodies are drawn from their parts by three.js, which `make web` bundles with the viewer.
+"""
+
+import base64
+import html
+import json
+import string
+import zlib
+from collections.abc import Mapping
+from importlib import resources
+from typing import Any
+
+import numpy as np
+
+from arc_suite import versions
+from arc_suite.animation.parts import parts as described
+from arc_suite.animation.scenery import scenery
+from arc_suite.models.outline import outline
+from arc_suite.style.colours import of_terms
+from arc_suite.style.tracks import Track
+
+_DIGITS = 6  # behind the point: micrometres, microradians
+
+
+def built(name: str) -> bytes:
+    """Return a file that `make web` builds.
+
+    Raises:
+        ValueError: it has not been built.
+    """
+    file = resources.files("arc_suite.animation").joinpath("web", name)
+    if not file.is_file():
+        cure = "`make web` builds it" if versions.clone() else "install a wheel that `make dist` has built in a clone"
+        raise ValueError(f"no viewer for pages: {cure}, which needs Node")
+    return file.read_bytes()
+
+
+def viewer() -> str:
+    """Return the script of the viewer, three.js included; errors as `built`."""
+    return built("viewer.js").decode()
+
+
+def template(name: str) -> string.Template:
+    """Return the frame of a page."""
+    return string.Template(resources.files("arc_suite.animation").joinpath(name).read_text(encoding="utf-8"))
+
+
+def packed(value) -> str:
+    """Return JSON of a value, deflated, in base64."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(zlib.compress(text.encode(), 9)).decode()
+
+
+def page(tracks: Mapping[str, Track]) -> str:
+    """Return a page that plays tracks side by side, by their labels.
+
+    Raises:
+        ValueError: the viewer has not been built.
+    """
+    return template("page.html").substitute(
+        title=html.escape(", ".join(tracks)),
+        data=packed([_walk(label, track) for label, track in tracks.items()]),
+        viewer=viewer(),
+    )
+
+
+def _walk(label: str, track: Track) -> dict[str, Any]:
+    """What the viewer takes of a track, in MuJoCo's axes."""
+    parts, materials = described(track.body)
+    stance = track.parameters is not None
+    return {
+        "label": label,
+        "height": track.body.torso.standing_height,
+        "reach": float(abs(outline(track.body)).max()),
+        "step": track.time_step,
+        "parts": [plain(part._asdict() | {"shapes": [shape._asdict() for shape in part.shapes]}) for part in parts],
+        "materials": {name: plain(material._asdict()) for name, material in materials.items()},
+        "scenery": plain(scenery(track)),
+        "positions": plain(track.positions),
+        "quaternions": plain(track.quaternions),
+        "joints": plain(track.joint_angles),
+        "legs": list(track.legs),
+        "stance": track.stance.astype(int).tolist() if stance else None,
+        "schedule": track.schedule.astype(int).tolist() if stance else None,
+        "terms": {name: plain(track.weights[name] * values) for name, values in track.terms.items()},
+        "colours": of_terms(track.terms),
+        "totals": plain(track.rewards.cumsum()),
+    }
+
+
+def plain(value, digits: int | None = _DIGITS):
+    """Return a value of arrays, tuples and dictionaries as JSON has it.
+
+    Args:
+        value: of finite numbers, text, None and truth values.
+        digits: behind the point, to which numbers are rounded; None for all.
+    """
+    if isinstance(value, dict):
+        return {name: plain(item, digits) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item, digits) for item in value]
+    if isinstance(value, np.ndarray):
+        return (value.astype(float) if digits is None else value.astype(float).round(digits)).tolist()
+    if isinstance(value, float) and digits is not None:
+        return round(value, digits)
+    return value

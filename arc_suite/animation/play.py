@@ -1,0 +1,166 @@
+"""Pages to play in: MuJoCo steps a body in the browser, and a policy follows keys, sticks and touch.
+
+A page is one HTML file with nothing to fetch. `make web` builds its scripts, with three.js and MuJoCo's own
+WebAssembly; the law `steered` is a port to JavaScript of what Python computes, with its constants, and trained
+policies are the graphs of their ONNX files.
+"""
+
+import base64
+import html
+from collections.abc import Mapping, Sequence
+from importlib import metadata
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from arc_suite import models, policies
+from arc_suite.animation import pages
+from arc_suite.animation.parts import parts as described
+from arc_suite.cpg import Demonstrator
+from arc_suite.cpg.steering import Steered
+from arc_suite.envs.setup import Setup
+from arc_suite.models.outline import outline
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.policies import graphs, universal, zips
+from arc_suite.policies.network import Network
+from arc_suite.policies.universal import Universal
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import Task, clock
+from arc_suite.tasks.modified import Modified
+
+GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
+
+_TASK = "steer"  # whose command the player gives
+_BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that a page can observe
+
+
+def page(creatures: Sequence[Mapping[str, Any]]) -> str:
+    """Return a page to play in, given what `creature` returns for each body to choose from.
+
+    Raises:
+        ValueError: the scripts have not been built.
+    """
+    return pages.template("play.html").substitute(
+        title=html.escape(", ".join(creature["name"] for creature in creatures)),
+        licences=licences(),
+        data=pages.packed(creatures),
+        engine=base64.b64encode(pages.built("mujoco.wasm.zlib")).decode(),
+        script=pages.built("play.js").decode(),
+    )
+
+
+def licences() -> str:
+    """Return the licence of MuJoCo and its notices of third parties, from its wheel, as text of an HTML comment."""
+    files = sorted(file for file in metadata.files("mujoco") or () if file.parent.name == "licenses")
+    texts = [file.read_text(encoding="utf-8") for file in files]
+    return "\n\n".join(["This page contains MuJoCo and scripts of arc_suite.", *texts]).replace("-->", "-- >")
+
+
+def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict[str, Any]:
+    """Return a body with its grounds and policy, as a page takes them: values that JSON has.
+
+    Args:
+        body: any.
+        policy: cpg, for a demonstrator that follows the command; or the name of a trained policy, as for
+            `policies.policy`.
+        preset: of the demonstrator: steered, which None stands for, surefooted or reactive.
+
+    Raises:
+        ValueError: a policy or preset that a page cannot run, or that does not fit the body.
+        OSError: a policy's file cannot be read.
+    """
+    steer = Setup.of(body, _TASK).definition
+    if policy == "cpg":
+        task, driver = steer, _law(steer, preset or "steered")
+    else:
+        task, driver = _graph(body, policy, steer)
+    parts, materials = described(body)
+    return {
+        "name": body.name,
+        "height": body.torso.standing_height,
+        "reach": float(abs(outline(body)).max()),
+        "timestep": steer.scene.control_timestep / SUBSTEPS,
+        "substeps": SUBSTEPS,
+        "parts": [
+            pages.plain(part._asdict() | {"shapes": [shape._asdict() for shape in part.shapes]}) for part in parts
+        ],
+        "materials": {name: pages.plain(material._asdict()) for name, material in materials.items()},
+        "grounds": {name: _ground(body, arena) for name, arena in GROUNDS.items()},
+        "task": pages.plain(_task(task, steer), digits=None),
+        "policy": pages.plain(driver, digits=None),
+    }
+
+
+def _ground(body: Body, arena: str) -> dict[str, Any]:
+    """The MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
+    task, model = Setup.of(body, _TASK, {"arena": arena}).prepared()
+    root = models.assemble(body, task.scene.arena)
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
+        root.option.integrator = "Euler"
+    data = mujoco.MjData(model)
+    data.qpos[:] = task.scene.standing
+    mujoco.mj_forward(model, data)
+    return {"xml": root.to_xml_string(), "start": pages.plain(task.cleared(task.read(data)), digits=None)}
+
+
+def _task(task: Task, steer: Task) -> dict[str, Any]:
+    """What a page computes of a task: its frame, clock, units and health; see web/task.js.
+
+    Args:
+        task: of the policy.
+        steer: of the same body, whose units and health hold where the task has none.
+    """
+    inner = task.task if isinstance(task, Modified) else task
+    headed = "command" in inner.commands
+    context, health = (inner if headed else steer).context, steer.health  # type: ignore[attr-defined]  # of commands
+    scene, (force_unit,) = steer.scene, context.force_unit
+    return {
+        "headed": headed,
+        "torso": scene.layout.parts.start,
+        "parts": len(scene.body.part_names),
+        "step": scene.control_timestep,
+        "turn": clock.TWO_PI * task.parameters.gait_frequency * scene.control_timestep,
+        "units": context.units,
+        "leak": context.leak,
+        "force_unit": force_unit if headed else np.ones(6),
+        "weight": force_unit[5],
+        "lowest": health.lowest * context.height,
+        "lying": health.lying,
+        "least_upright": health.least_upright,
+    }
+
+
+def _law(task: Task, preset: str) -> dict[str, Any]:
+    law = Demonstrator(task, preset).law
+    if not isinstance(law, Steered):
+        raise ValueError(
+            f"preset {preset!r}: a page runs steered, surefooted or reactive, which follow a command by joint angles"
+        )
+    return {"kind": "law", "constants": law.constants()}
+
+
+def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
+    made = policies.policy(name, body, task=steer if name == universal.NAME else None)
+    if zips.parts(name):
+        made = policies.trained(name)
+    if isinstance(made, Universal):  # acts in the task that it was trained in
+        task = Setup.of(body, made.network.setup.task).definition
+        made, blocks = Universal(made.network, task), task.blocks
+    elif isinstance(made, Network):
+        blocks, task = made.blocks, made.setup.definition
+    else:
+        raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
+    if unknown := [block for block in blocks if block not in _BLOCKS]:
+        raise ValueError(f"policy {name}: observes {unknown[0]}, and a page has {', '.join(_BLOCKS)} alone")
+    if task.actions != "torque":
+        raise ValueError(f"policy {name}: its actions are a {task.actions} a joint, and a page takes torques")
+    graph = graphs.of(made)
+    nodes = [node._asdict() for node in graph.nodes]
+    constants = {constant: _constant(array) for constant, array in graph.constants.items()}
+    return task, {"kind": "graph", "constants": {"blocks": list(blocks), "nodes": nodes, "constants": constants}}
+
+
+def _constant(array: np.ndarray) -> dict[str, Any]:
+    kind, number = ("integer", "<i4") if array.dtype.kind == "i" else ("float", "<f4")
+    return {"kind": kind, "shape": array.shape, "data": base64.b64encode(array.astype(number).tobytes()).decode()}

@@ -1,0 +1,152 @@
+"""Files of a creature, as bytes: what the buttons of the page save."""
+
+import contextlib
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import imageio.v3 as imageio
+import numpy as np
+
+from arc_suite import models, style, versions
+from arc_suite.animation import clips as export
+from arc_suite.animation import pages, play
+from arc_suite.animation.studio import sketch as sketches
+from arc_suite.animation.studio.creature import Creature, load, policy
+from arc_suite.animation.studio.sketch import Sketch
+from arc_suite.envs.dm import Environment
+from arc_suite.policies import Individuals, alone
+from arc_suite.robots.spec_files import body_to_json
+from arc_suite.simulation import films
+from arc_suite.simulation.pictures import picture
+
+_PAGE_STEPS, _FILM_STEPS = 400, 100
+_SIZE = (640, 480)  # of pictures and films, pixels
+
+
+class File(NamedTuple):
+    """A file of a creature.
+
+    Attributes:
+        label: of its button.
+        extension: of its name.
+        content: makes it of a creature, the positions (nq,) in which it stands, and the command (3,), None for that of
+            the task.
+    """
+
+    label: str
+    extension: str
+    content: Callable[[Creature, np.ndarray, np.ndarray | None], bytes]
+
+
+def name(creature: Creature, file: File) -> str:
+    """Return the name under which a file is saved."""
+    return f"{creature.setup.body.name}{file.extension}"
+
+
+def spec(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return the spec as JSON."""
+    return body_to_json(creature.setup.body).encode()
+
+
+def mjcf(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return the model, on the ground of the task, as MuJoCo loads it."""
+    arena = creature.environment.task.definition.scene.arena
+    return models.assemble(creature.setup.body, arena).to_xml_string().encode()
+
+
+def glb(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return animation clips as binary glTF; see `export.clips`.
+
+    Raises:
+        ValueError: a clip cannot be made.
+    """
+    sketch = creature.sketch
+    clips = export.clips(creature.setup, export.DEFAULT, sketch.policy, sketches.preset(sketch))
+    return export.glb(
+        creature.setup.body, clips, generator=f"arc_suite {versions.installed('arc_suite') or ''}".strip()
+    )
+
+
+def page(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return a page that plays an episode.
+
+    Raises:
+        ValueError: the viewer of pages has not been built.
+    """
+    pages.viewer()  # finds out at once whether there is one
+    environment = load(creature.setup)
+    with contextlib.closing(environment):
+        act = _commanded(environment, creature.sketch, desired)
+        acting = Individuals(lambda: act, 1, len(creature.setup.body.joint_names))
+        track = style.record(environment, acting, 0, _PAGE_STEPS)
+    return pages.page({creature.setup.body.name: track}).encode()
+
+
+def playable(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return a page in which keys walk the creature about; see `export.play`.
+
+    Raises:
+        ValueError: the scripts of pages have not been built, or the policy does not run in a page.
+    """
+    sketch = creature.sketch
+    return play.page([play.creature(creature.setup.body, sketch.policy, sketches.preset(sketch))]).encode()
+
+
+def image(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return a picture of the creature where it stands, as PNG.
+
+    Raises:
+        RenderingUnavailable: no OpenGL here.
+    """
+    arena, data = creature.environment.task.definition.scene.arena, creature.environment.physics.data
+    width, height = _SIZE
+    view = picture(creature.setup.body, arena, qpos, height, width, "portrait", mocap_pos=data.mocap_pos.copy())
+    return imageio.imwrite("<bytes>", view, extension=".png")
+
+
+def film(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+    """Return a film of an episode, as MP4.
+
+    Raises:
+        RenderingUnavailable: no OpenGL here.
+    """
+    environment = load(creature.setup)
+    act = _commanded(environment, creature.sketch, desired)
+    footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
+    stride = films.steps_per_frame(footage.control_timestep)
+
+    def frames():
+        while footage.steps < _FILM_STEPS and not footage.ended:
+            for _ in range(stride):
+                footage.step()
+            yield footage.view()
+
+    with contextlib.closing(footage), tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mp4"
+        films.write_mp4(path, frames(), stride * footage.control_timestep)
+        return path.read_bytes()
+
+
+def _commanded(environment: Environment, sketch: Sketch, desired: np.ndarray | None):
+    """Return the policy of a sketch as a function of a `TimeStep`, which sets the command at the start of episodes."""
+    act = alone(policy(sketch, environment))
+
+    def acting(timestep):
+        if timestep.first() and environment.task.definition.commands.get("command") == 3:
+            environment.command("command", desired)
+        return act(timestep)
+
+    return acting
+
+
+FILES = (
+    File("Spec", ".json", spec),
+    File("MJCF", ".xml", mjcf),
+    File("Clips", ".glb", glb),
+    File("Page", ".html", page),
+    File("Page to play in", "_play.html", playable),
+    File("Picture", ".png", image),
+    File("Film", ".mp4", film),
+)

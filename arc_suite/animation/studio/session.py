@@ -1,0 +1,140 @@
+"""One creature in real time: other threads ask for another one, set its command, or have the loop do something."""
+
+import concurrent.futures
+import functools
+import queue
+import time
+import traceback
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from arc_suite.animation.studio.creature import Creature, opened
+from arc_suite.animation.studio.history import History
+from arc_suite.animation.studio.sketch import Sketch
+from arc_suite.envs.episodes import LONGEST, Episodes
+
+STATES = 30.0  # a second, at most, that are shown
+_WINDOW = 2.0  # s, over which the pace is a mean
+_KICK = 1.0  # change of the torso's velocity, sqrt(g h)
+
+
+class Session:
+    """The creature that walks, and the sketch that is asked for next.
+
+    A creature is made in a thread of its own while the one before walks on. All else happens in the loop of `run`.
+
+    Attributes:
+        creature: that walks.
+        episodes: of the creature.
+        history: of the episodes.
+        error: one line, why the latest sketch made no creature; empty if it did.
+        desired: (3,) command that visitors have set; None for that of the task.
+        paused: whether time stands still.
+        pace: simulated seconds a second, of late.
+        states: shown a second, of late.
+        open: whether `run` goes on.
+    """
+
+    def __init__(self, sketch: Sketch):
+        """Open the first creature; errors as `creature.opened`."""
+        self._calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._maker = concurrent.futures.ThreadPoolExecutor(1, "creature")
+        self._asked = self._tried = sketch
+        self.error, self.paused, self.open = "", False, True
+        self.pace, self.states = 1.0, 0.0
+        self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
+        self._replace(opened(sketch))
+
+    def ask(self, sketch: Sketch) -> None:
+        """Ask for another creature, from any thread; of several that wait, the latest is made."""
+        self._asked = sketch
+        self._maker.submit(self._make)
+
+    def do(self, call: Callable[[], None]) -> None:
+        """Have the loop call something between two control steps, from any thread."""
+        self._calls.put(call)
+
+    def command(self, desired: Sequence[float] | None) -> None:
+        """Set the command, now and for later creatures, from any thread; None leaves it to the task."""
+
+        def change():
+            self.desired = None if desired is None else np.array(desired)
+            self.episodes.command(self.desired)
+
+        self.do(change)
+
+    def kick(self, angle: float) -> None:
+        """Kick the torso in a direction of the world, rad, from any thread."""
+
+        def change():
+            environment = self.episodes.environment
+            gravity = -environment.physics.model.opt.gravity[2]
+            speed = _KICK * np.sqrt(gravity * environment.task.body.torso.standing_height)
+            environment.physics.data.qvel[:2] += speed * np.array((np.cos(angle), np.sin(angle)))
+
+        self.do(change)
+
+    def restart(self) -> None:
+        """Start the next episode, from any thread."""
+        self.do(lambda: self.episodes.restart())
+
+    def pause(self, paused: bool) -> None:
+        """Stop the time, or let it go on, from any thread."""
+        self.paused = paused
+
+    def close(self) -> None:
+        """End `run`, from any thread."""
+        self.open = False
+
+    def run(self, show: Callable[["Session", float], None]) -> None:
+        """Step in real time until the session is closed; a machine that is too slow shows slow motion.
+
+        Args:
+            show: called after control steps, `STATES` times a second at most, with the session and the share, 0 to 1,
+                of the latest control step that has passed.
+        """
+        begun = last = due = time.monotonic()
+        ahead, simulated, shown = 0.0, 0.0, 0
+        while self.open:
+            while not self._calls.empty():
+                self._calls.get()()
+            step, now = self.episodes.control_timestep, time.monotonic()
+            ahead += 0.0 if self.paused else min(now - last, LONGEST)
+            last = now
+            while ahead >= step:
+                self.episodes.step()
+                self.history.observe()
+                ahead, simulated = ahead - step, simulated + step
+            show(self, ahead / step)
+            shown += 1
+            if now - begun > _WINDOW:
+                self.pace, self.states = simulated / (now - begun), shown / (now - begun)
+                begun, simulated, shown = now, 0.0, 0
+            due = max(due + 1.0 / STATES, now := time.monotonic())
+            time.sleep(due - now)
+        self._maker.shutdown(cancel_futures=True)
+
+    def _make(self) -> None:
+        sketch = self._asked
+        if sketch == self._tried:
+            return
+        self._tried = sketch
+        try:
+            creature = opened(sketch)
+        except (ValueError, OSError) as error:
+            self.do(functools.partial(self._refuse, str(error)))
+        except Exception as error:  # a mistake of ours: the creature before walks on
+            traceback.print_exc()
+            self.do(functools.partial(self._refuse, f"{type(error).__name__}: {error}"))
+        else:
+            self.do(functools.partial(self._replace, creature))
+
+    def _refuse(self, line: str) -> None:
+        self.error = " ".join(line.split())
+
+    def _replace(self, creature: Creature) -> None:
+        self.creature, self.error = creature, ""
+        self.episodes = Episodes(creature.environment, creature.act)
+        self.episodes.command(self.desired)
+        self.history = History(self.episodes)

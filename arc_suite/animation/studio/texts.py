@@ -1,0 +1,70 @@
+"""Texts of the page, as HTML: the walk, what `check` says, lines to copy."""
+
+import math
+from xml.etree import ElementTree
+
+from arc_suite.animation.studio import sketch as sketches
+from arc_suite.animation.studio.creature import Creature
+from arc_suite.animation.studio.session import Session
+from arc_suite.animation.studio.sketch import Sketch
+
+_REAL = 0.97  # of real time, from which the pace is called so
+_SMALL = "font-size:0.85em"
+# Browsers have a clipboard on pages of this machine alone; on others the text is selected.
+_COPY = (
+    "const text = this.nextElementSibling; getSelection().selectAllChildren(text);"
+    "navigator.clipboard?.writeText(text.textContent)"
+)
+
+
+def status(session: Session) -> str:
+    """Return lines about the walk and the machine, as HTML; the first is the error, if there is one."""
+    creature, episodes, history = session.creature, session.episodes, session.history
+    speed = history.speeds()[-1] if len(history) else 0.0
+    cost = history.cost_of_transport()
+    pace = "paused" if session.paused else "real time" if session.pace > _REAL else f"{session.pace:.2f} of real time"
+    told = {
+        "walks": f"{creature.setup.body.name}, {creature.setup.kind.name}, {speed:.2f} m/s",
+        "cost of transport": "-" if math.isnan(cost) else f"{cost:.2f}",
+        "return": f"{episodes.earned:.0f} in {episodes.steps * episodes.control_timestep:.1f} s",
+        "pace": f"{pace}, {session.states:.0f} states a second",
+    }
+    lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in told.items()]
+    error = [_element("p", session.error, role="alert", style="color:#b3261e")] if session.error else []
+    return _html(_element("div", *error, _element("table", *lines, id="status"), style=f"{_SMALL};padding:0 1em"))
+
+
+def checked(creature: Creature) -> str:
+    """Return what `arc-suite check` says of the body, as HTML."""
+    texts = [flaw.text for flaw in creature.flaws] or [f"{creature.setup.body.name} stands and can take steps"]
+    return _html(_element("ul", *(_element("li", text) for text in texts), style=_SMALL))
+
+
+def copied(sketch: Sketch) -> str:
+    """Return the Python lines and the command line that make the same, with buttons that copy them, as HTML."""
+    texts = {"Python": sketches.python_lines(sketch), "command": sketches.command_line(sketch)}
+    parts = []
+    for name, text in texts.items():
+        parts.append(_element("button", f"Copy {name}", onclick=_COPY, style="min-height:24px"))
+        parts.append(_element("pre", text, style=f"white-space:pre-wrap;{_SMALL}"))
+    return _html(_element("div", *parts))
+
+
+def line(text: str) -> str:
+    """Return a line of text, as HTML."""
+    return _html(_element("p", text, style=_SMALL))
+
+
+def _element(tag: str, *inside: str | ElementTree.Element, **attributes: str) -> ElementTree.Element:
+    """An element with a text or with elements inside."""
+    element = ElementTree.Element(tag, attributes)
+    for each in inside:
+        if isinstance(each, str):
+            element.text = each
+        else:
+            element.append(each)
+    return element
+
+
+def _html(element: ElementTree.Element) -> str:
+    return ElementTree.tostring(element, encoding="unicode", method="html")

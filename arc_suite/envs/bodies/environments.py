@@ -1,0 +1,280 @@
+"""Environments of different bodies as one Gymnasium vector environment."""
+
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from arc_suite import checks, registry
+from arc_suite.envs import snapshots
+from arc_suite.envs.bodies.groups import Group, Member, Place, grouped, scatter
+from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.prepare import prepared
+from arc_suite.envs.together import Together
+from arc_suite.tasks import tokens
+from arc_suite.tasks.tokens import Description, Tokens
+
+
+class BodiesEnv(Together):
+    """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
+
+    Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without
+    dimension and 0 where a body has no leg or joint; see `tasks.tokens.Tokens.observed`. Actions are (num_envs, 12, 4)
+    in [-1, 1], positions of joints as with `actions="position"`; entries without a joint are ignored. `description`
+    holds what does not change.
+
+    An environment of seed s is bit-equal to an environment of its body and seed in a `VectorEnv` with
+    `actions="position"`: states, rewards, infos, and the tokens of the observation. Bodies whose models have one
+    layout share a batch in level tasks; others have a batch of their own, to the same effect. The ground is as
+    each body's own task makes it, and not observed.
+
+    Autoreset modes, infos, `rest`, `command`, `snapshot`, pickles, copies and threads are as in `VectorEnv`.
+
+    Attributes:
+        bodies: of each environment.
+        tasks: of each environment, for demonstrators.
+        step_limit: control steps after which every episode is over, may be infinite.
+        description: of each environment, (num_envs, ...) float32; see `tasks.tokens.Description`.
+        autoreset_mode: what happens to an environment whose episode has ended.
+    """
+
+    def __init__(
+        self,
+        task_name: str,
+        num_envs: int = 1,
+        bodies: Any = "random:0",
+        num_threads: int | None = None,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        max_episode_steps: int | None = None,
+        task_kwargs: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+        camera_id: int | str = "tracking",
+    ):
+        """Prepare the task of every body and allocate the environments.
+
+        Args:
+            task_name: as in `arc_suite.load`.
+            num_envs: number of environments; environment i has body i, and so on from the first after the last.
+            bodies: `family:first-last`, or another body that `arc_suite.load` takes, or a list of them.
+            num_threads: as in `VectorEnv`, of each batch.
+            autoreset_mode: as in `VectorEnv`.
+            max_episode_steps: as in `VectorEnv`.
+            task_kwargs: as in `VectorEnv`, the same for all bodies; without `actions`.
+            render_mode: as in `VectorEnv`.
+            width: of a picture, pixels.
+            height: of a picture, pixels.
+            camera_id: a camera's name or index, -1 for a free one.
+
+        Raises:
+            ValueError: an unknown name, a body with more than 12 legs or 4 joints a leg, or a value that does not fit.
+        """
+        self._lock, self._places, self._begun = Lock(), [], False
+        given = bodies if isinstance(bodies, list | tuple) else [bodies]
+        found = list(itertools.chain.from_iterable(map(registry.bodies_of, given)))
+        num_envs = checks.integer("num_envs", num_envs, 1)
+        if not found:
+            raise ValueError(f"bodies: expected at least one, got {bodies!r}")
+        if len(found) > num_envs:
+            raise ValueError(f"num_envs: expected at least one for each of {len(found)} bodies, got {num_envs}")
+        for body in found:
+            tokens.slots(body)
+        settings = {"actions": "position", **checks.mapping("task_kwargs", task_kwargs)}
+        checks.name(settings["actions"], ["position"], "actions of different bodies")
+        seed = settings.pop("random", None)
+        options = {
+            "num_threads": num_threads,
+            "autoreset_mode": autoreset_mode,
+            "max_episode_steps": max_episode_steps,
+            "task_kwargs": settings,
+            "render_mode": render_mode,
+            "width": width,
+            "height": height,
+            "camera_id": camera_id,
+        }
+        made = {body: Member(*prepared(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
+        which_body = [index % len(found) for index in range(num_envs)]
+        members = [made[body] for body in found]
+        self.num_envs, self.bodies = num_envs, tuple(found[which] for which in which_body)
+        self.tasks = tuple(members[which].task for which in which_body)
+        self._tokens = Tokens.of(self.tasks)
+        for indices in grouped([members[which] for which in which_body]):
+            group = Group([members[which_body[index]] for index in indices], task_name, **options)
+            self._places.append(Place(group, np.array(indices), self._tokens.part(indices)))
+        first = self._places[0].group
+        self.step_limit = float(max(np.max(place.group.step_limit) for place in self._places))
+        self.autoreset_mode, self.metadata, self.render_mode = first.autoreset_mode, first.metadata, render_mode
+        described = [tokens.described(member.task) for member in members]
+        columns = zip(*(described[which] for which in which_body), strict=True)
+        self.description = Description(*map(np.stack, columns))
+        sizes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
+        boxes: dict[str, gymnasium.Space] = {
+            name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()
+        }
+        self.single_observation_space = gymnasium.spaces.Dict(boxes)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS, tokens.JOINTS), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        if seed is not None:
+            seeds = self._seeds(seed)
+            for group, indices, _ in self._places:
+                group._seed([seeds[index] for index in indices], np.ones(len(indices), bool))
+
+    @one_thread_at_a_time
+    def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
+        """Start an episode in every environment, or in some; see `VectorEnv.reset`."""
+        self._check_open("reset")
+        mask = self._mask(checks.mapping("options", options).get("reset_mask"))
+        if not (self._begun or mask.all()):
+            raise ResetNeeded("cannot reset some environments: reset all of them first")
+        seeds = [None] * self.num_envs if seed is None else self._seeds(seed)
+        for group, indices, _ in self._places:
+            if mask[indices].any():
+                group.reset(seed=[seeds[index] for index in indices], options={"reset_mask": mask[indices]})
+        self._begun = True
+        return self._observed(), {}
+
+    @one_thread_at_a_time
+    def step(self, actions):
+        """Advance every environment by one control step, except those that start an episode; see `VectorEnv.step`.
+
+        Args:
+            actions: (num_envs, 12, 4), clipped to [-1, 1].
+
+        Raises:
+            ValueError: actions of another shape, or NaN in one; nothing has moved then.
+            ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("step")
+        if not self._begun:
+            raise ResetNeeded("cannot step: no episode has begun; call reset first")
+        actions, info = checked_action(actions, self.action_space.shape), {}
+        reward, (terminated, truncated) = np.zeros(self.num_envs), np.zeros((2, self.num_envs), bool)
+        for place in self._places:
+            group, indices, _ = place
+            _, reward[indices], terminated[indices], truncated[indices], own = group.step(
+                place.tokens.actions(actions[indices])
+            )
+            if "final_obs" in own:
+                own["final_obs"] = place.last(own["final_obs"])
+            scatter(info, own, indices, self.num_envs)
+        return self._observed(), reward, terminated, truncated, info
+
+    def own_observations(self) -> tuple[np.ndarray, ...]:
+        """Return the latest observation (size,) float32 of each environment as its own task has it.
+
+        `tasks[i].split` gives its blocks by name.
+        """
+        return self._of_each(lambda group: group._observation.copy())
+
+    def positions(self) -> np.ndarray:
+        """Return the positions (num_envs, 3) of the torsos in the world, m."""
+        return np.array(self._of_each(lambda group: group.batch.data.qpos[:, :3]))
+
+    def resampled(self) -> np.ndarray:
+        """Return in which environments (num_envs,) the latest step began another command; see `VectorEnv.resampled`."""
+        return np.array(self._of_each(lambda group: group.resampled()))
+
+    def command(self, name: str, value, mask=None) -> None:
+        """Set a command of the task in some environments; see `VectorEnv.command`."""
+        self._check_open("command")
+        mask, value = self._mask(mask, "mask"), checked_command(self.tasks[0], name, value, (self.num_envs,))
+        if not self._begun:
+            raise ResetNeeded(f"cannot set command {name!r}: no episode has begun; call reset first")
+        for group, indices, _ in self._places:
+            if mask[indices].any():
+                group.command(name, value[indices], mask[indices])
+
+    @one_thread_at_a_time
+    def rest(self, mask) -> None:
+        """Let environments, and no others, stand still until they are reset; see `VectorEnv.rest`."""
+        self._check_open("rest")
+        mask = self._mask(mask, "mask")
+        for group, indices, _ in self._places:
+            group._resting = mask[indices]
+
+    @one_thread_at_a_time
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return the state of all environments as arrays by name, from which `restore` goes on.
+
+        Raises:
+            ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("take a snapshot")
+        taken = enumerate(place.group.snapshot() for place in self._places)
+        return {f"{number}/{name}": array for number, arrays in taken for name, array in arrays.items()}
+
+    @one_thread_at_a_time
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on, bit-exact, from the snapshot of environments of the same bodies and task.
+
+        Raises:
+            ValueError: an array is missing or does not fit; none has been used.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("restore")
+        checked = []
+        for number, place in enumerate(self._places):
+            prefix = f"{number}/"
+            own = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+            checked.append(place.group._checked_snapshot(own))
+        for place, snapshot in zip(self._places, checked, strict=True):
+            snapshots.put(place.group, snapshot)
+        self._begun = True
+
+    @one_thread_at_a_time
+    def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
+        """Return pictures of the present states; see `VectorEnv.render`."""
+        self._check_open("render")
+        if self.render_mode is None:
+            return None
+        places = self._of_each(lambda group: [(group, place) for place in range(group.num_envs)])
+        chosen = [places[index] for index in self._indices(indices)]
+        return tuple(group.render([place])[0] for group, place in chosen)
+
+    @one_thread_at_a_time
+    def close(self, **kwargs) -> None:
+        """Free the simulations; once more does nothing."""
+        super().close(**kwargs)
+
+    def close_extras(self, **kwargs) -> None:
+        """Free the simulations; `close` calls it."""
+        for place in self._places:
+            place.group.close()
+
+    @property  # type: ignore[misc]  # of Gymnasium, which can be set and is of one environment
+    def np_random(self) -> tuple[np.random.Generator, ...]:
+        """Draw, for each environment, from the stream that its resets draw from."""
+        return self._of_each(lambda group: group.np_random)
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:
+        """The seed of each environment's stream of random numbers; -1 where none was given."""
+        return self._of_each(lambda group: group.np_random_seed)
+
+    def _of_each(self, values) -> tuple:
+        """For each environment, what a function returns of its group for it."""
+        found = [None] * self.num_envs
+        for group, indices, _ in self._places:
+            for index, value in zip(indices.tolist(), values(group), strict=True):
+                found[index] = value
+        return tuple(found)
+
+    def _observed(self) -> dict[str, np.ndarray]:
+        gathered = np.empty(self._tokens.places.shape, np.float32)
+        for group, indices, own in self._places:
+            gathered[indices] = own.gathered(group._observation)
+        return self._tokens.observed(gathered)
+
+
+def _of_tasks(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings of a task, without that of its driver."""
+    return {name: value for name, value in settings.items() if name != "on_divergence"}

@@ -1,0 +1,82 @@
+"""Batches of environments of different bodies: which share one, and what they return of their environments."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from arc_suite.envs.bodies import stacked
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.simulation.batch import layout
+from arc_suite.tasks import Task
+from arc_suite.tasks.tokens import Tokens
+
+
+class Member(NamedTuple):
+    """The task of an environment, and the model of its simulation."""
+
+    task: Task
+    model: mujoco.MjModel
+
+
+class Group(VectorEnv):
+    """Environments in one batch: of one body, or of bodies whose models have one layout and whose tasks can be stacked.
+
+    Each is bit-equal to an environment of its body in a `VectorEnv`.
+    """
+
+    def __init__(self, members: Sequence[Member], task_name: str, **options):
+        """Allocate an environment for each member; for the options see `VectorEnv`."""
+        self._members = members
+        super().__init__(None, task_name, len(members), **options)
+
+    def _prepared(self):
+        tasks, models = zip(*self._members, strict=True)
+        self._stacked = any(task is not tasks[0] for task in tasks)
+        if not self._stacked:
+            return tasks[0], list(tasks), models[0]
+        return stacked.stacked(tasks), list(tasks), list(models)
+
+    def _part(self, mask: np.ndarray) -> Task:
+        return stacked.part(self._task, np.flatnonzero(mask)) if self._stacked and not mask.all() else self._task
+
+
+class Place(NamedTuple):
+    """A group, with the indices of its environments among all, and the tokens of these."""
+
+    group: Group
+    indices: np.ndarray
+    tokens: Tokens
+
+    def last(self, vectors: np.ndarray) -> np.ndarray:
+        """Return the tokens of last observations of episodes, objects (environments,), None where none ended."""
+        found = np.full(len(vectors), None, object)
+        for index in [i for i, vector in enumerate(vectors) if vector is not None]:
+            own = self.tokens.part([index])
+            tokens = own.observed(own.gathered(vectors[index][None]))
+            found[index] = {name: array[0] for name, array in tokens.items()}
+        return found
+
+
+def grouped(members: Sequence[Member]) -> list[list[int]]:
+    """Indices of environments that share a batch."""
+    groups: dict[Any, list[int]] = {}
+    keys: dict[int, Any] = {}
+    for index, (task, model) in enumerate(members):
+        if id(task) not in keys:
+            kind = stacked.kind(task)
+            keys[id(task)] = id(task) if kind is None else (kind, layout(model))
+        groups.setdefault(keys[id(task)], []).append(index)
+    return list(groups.values())
+
+
+def scatter(info: dict, own: Mapping[str, Any], indices: np.ndarray, count: int) -> None:
+    """Put the info of some environments into that of all."""
+    for name, value in own.items():
+        if isinstance(value, dict):
+            scatter(info.setdefault(name, {}), value, indices, count)
+            continue
+        if name not in info:
+            info[name] = np.full(count, None, object) if value.dtype == object else np.zeros(count, value.dtype)
+        info[name][indices] = value

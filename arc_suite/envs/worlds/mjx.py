@@ -1,0 +1,268 @@
+"""Tasks as functions of JAX, on MuJoCo's MJX: thousands of worlds on a GPU, in the style of Brax and Playground.
+
+    env = mjx.load("queen", "walk")
+    state = jax.jit(jax.vmap(env.reset))(jax.random.split(jax.random.key(0), 4096))
+    state = jax.jit(jax.vmap(env.step))(state, actions)     # state.data .obs .reward .done .metrics .info
+
+Functions take one world and are pure. The wrappers and trainers of MuJoCo Playground take an `Env` as it is.
+Needs the extra `mjx`; docs/gpu.md tells more.
+"""
+
+import dataclasses
+import os
+import types
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from arc_suite import checks
+from arc_suite.envs.prepare import prepared
+from arc_suite.envs.worlds import starts
+from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.robots.spec import Body
+from arc_suite.simulation import device, pictures
+from arc_suite.tasks import terms
+
+_MOST_ENVS = 1 << 20
+# Fields of the simulation that a start sets; all others follow from them in a step.
+WRITTEN = ("time", "qpos", "qvel", "qacc_warmstart", "mocap_pos")
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass
+class State:
+    """The state of a world, or with leading axes of many.
+
+    Attributes:
+        data: of the simulation, an `mjx.Data`.
+        obs: (..., size) float32.
+        reward: (...) of the latest step.
+        done: (...) 1.0 where the episode is over, else 0.0.
+        metrics: of the latest step: the task's unweighted terms as `reward_<term>`; `diverged` and `overflow`, 0 or 1.
+        info: `memory` of the task and `first_memory` of the episode's start; `model`, the fields of the model that
+            are the episode's own; `truncation`, 1.0 where the task ended the episode without failure; and each live
+            command of the task by its name, NaN for what the task itself would do.
+    """
+
+    data: Any
+    obs: jax.Array
+    reward: jax.Array
+    done: jax.Array
+    metrics: dict[str, jax.Array]
+    info: dict[str, Any]
+
+    replace = dataclasses.replace
+
+
+def load(
+    domain_name: str | os.PathLike | Body,
+    task_name: str,
+    task_kwargs: Mapping[str, Any] | None = None,
+    impl: str | None = None,
+    num_starts: int = 4096,
+    first_seed: int = 0,
+    num_envs: int = 1,
+) -> "Env":
+    """Load a task as functions of JAX.
+
+    Args:
+        domain_name: a robot or another body; see `arc_suite.load`.
+        task_name: as in `arc_suite.load`.
+        task_kwargs: as in `arc_suite.load`, without `random`.
+        impl: "jax" or "warp"; None for warp on NVIDIA's GPUs where it is installed, else jax.
+        num_starts: episodes in the table of starts, at most 16,384.
+        first_seed: seed of the first of them; the others count on.
+        num_envs: worlds that will step together. Warp's tables have place for so many.
+
+    Raises:
+        ValueError: an unknown name, a value that does not fit, or a task that the implementation cannot simulate.
+        MissingExtra: a package is not installed.
+    """
+    return Env(domain_name, task_name, task_kwargs, impl, num_starts, first_seed, num_envs)
+
+
+class Env:
+    """A task; see `load`.
+
+    Attributes:
+        task: the task, a value of the contract.
+        impl: the implementation, "jax" or "warp".
+        num_starts: episodes in the table of starts.
+        first_seed: seed of the first of them.
+        num_envs: worlds that Warp's tables have place for.
+        episode_length: control steps of an episode, may be infinite. `step` does not count them: give the number to
+            the wrapper that ends episodes.
+        action_size: numbers of an action.
+        observation_size: numbers of an observation.
+        dt: s between two actions.
+        sim_dt: s of a substep.
+        n_substeps: of a control step.
+        mj_model: the model as compiled.
+    """
+
+    def __init__(self, domain_name, task_name, task_kwargs, impl, num_starts, first_seed, num_envs):
+        """Draw the starts and put the model on the device; see `load`."""
+        if "random" in checks.mapping("task_kwargs", task_kwargs):
+            raise ValueError("random: expected none, as `reset` takes a key, and `start` a seed")
+        self.impl, self.num_envs = device.implementation(impl), checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
+        self.num_starts, self.first_seed = num_starts, checks.seed(first_seed)
+        self._starts, self._terms = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed)
+        settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
+        self.task, self.mj_model = prepared(domain_name, task_name, settings)
+        if self.task.adapts:
+            why = "as its starts depend on the episode before"
+            raise ValueError(f"task {self.task.name}: expected no curriculum, {why}")
+        model = device.adapted(self.mj_model, self.impl)
+        self._mjx_model = device.put(model, self.impl)
+        self._data = device.made(model, self.impl, self.num_envs)
+        self.episode_length = self.task.step_limit
+        self.observation_size, self.action_size = self.task.size, self.mj_model.nu
+        self.dt, self.sim_dt, self.n_substeps = self.task.scene.control_timestep, self.mj_model.opt.timestep, SUBSTEPS
+
+    @property
+    def mjx_model(self):
+        """The model on the device."""
+        return self._mjx_model
+
+    @property
+    def unwrapped(self) -> "Env":
+        """Itself, as it is no wrapper."""
+        return self
+
+    def reset(self, rng) -> State:
+        """Return the start of an episode, one of the table, given a key of JAX."""
+        return self.start(np.uint32(self.first_seed) + jax.random.randint(rng, (), 0, self.num_starts).astype("uint32"))
+
+    def start(self, seed) -> State:
+        """Return the start of the episode that any environment of the suite has after `reset(seed=seed)`.
+
+        Args:
+            seed: () an integer from `first_seed` on; episodes repeat after `num_starts`.
+        """
+        index = (jnp.asarray(seed).astype("uint32") - np.uint32(self.first_seed)) % np.uint32(self.num_starts)
+        start = jax.tree.map(lambda table: jnp.asarray(table)[index], self._starts)
+        data = self._data.replace(qpos=start.qpos, qvel=start.qvel, mocap_pos=start.mocap_pos)
+        zero = jnp.zeros(())
+        info = {name: jnp.full(size, jnp.nan) for name, size in self.task.commands.items()}
+        info |= {"memory": start.memory, "first_memory": start.memory, "model": start.model, "truncation": zero}
+        names = (*(f"reward_{name}" for name in self._terms), "diverged", "overflow")
+        return State(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
+
+    def step(self, state: State, action) -> State:
+        """Return the state after a control step.
+
+        A world that diverges is done, with reward 0, and goes on from the model's default state, as in MuJoCo.
+
+        Args:
+            state: before.
+            action: (motors,), clipped to [-1, 1].
+        """
+        # Products in single precision, where the default of recent GPUs is less.
+        with jax.default_matmul_precision("highest"):
+            return self._step(state, jnp.clip(action, -1.0, 1.0))
+
+    def render(
+        self,
+        trajectory,
+        height: int = 240,
+        width: int = 320,
+        camera: int | str | None = None,
+        scene_option=None,
+        modify_scene_fns=None,
+        index: int | None = None,
+    ) -> list[np.ndarray]:
+        """Return pictures (height, width, 3) uint8, drawn on the host.
+
+        Args:
+            trajectory: a state or several.
+            height: pixels.
+            width: pixels.
+            camera: name or index of a camera; None for the one that tracks the body.
+            scene_option: None; wrappers hand it on.
+            modify_scene_fns: None; wrappers hand it on.
+            index: of a world in states of many; None for states of one.
+
+        Raises:
+            ValueError: no such camera, an impossible size, or options of a scene.
+            RenderingUnavailable: no OpenGL here.
+        """
+        if scene_option is not None or modify_scene_fns is not None:
+            raise ValueError(
+                "render: expected neither scene_option nor modify_scene_fns; see arc_suite.envs.worlds.mjx"
+            )
+        states = [trajectory] if isinstance(trajectory, State) else trajectory
+        camera = "tracking" if camera is None else camera
+        return [self._picture(state, index, height=height, width=width, camera_id=camera) for state in states]
+
+    def _picture(self, state: State, index: int | None, **options) -> np.ndarray:
+        scene, fields = self.task.scene, device.fields(state.data, ("mocap_pos", *self.task.reads))
+        alone = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], vars(fields))
+        memory = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], state.info["memory"])
+        markers = self.task.markers(memory, self.task.read(types.SimpleNamespace(**alone)))
+        pose = {"qpos": alone["qpos"], "mocap_pos": alone["mocap_pos"], "markers": markers}
+        return pictures.picture(scene.body, scene.arena, **pose, failed_legs=self.task.failed_legs(memory), **options)
+
+    def _step(self, state: State, action) -> State:
+        task, info, before = self.task, state.info, state.data
+        # Wrappers may put the data of the start in place, and leave the memory.
+        begins = before.time == 0.0
+        memory = jax.tree.map(lambda first, now: jnp.where(begins, first, now), info["first_memory"], info["memory"])
+        for name in task.commands:
+            memory = task.commanded(memory, name, info[name])
+        moved, inputs = task.before(memory, action)
+        data = before.replace(ctrl=inputs.ctrl)
+        if inputs.kick is not None:
+            data = data.replace(qvel=data.qvel + inputs.kick)
+        data = device.advanced(self._mjx_model.replace(**info["model"]), data, SUBSTEPS)
+        diverged, overflow = device.diverged(data), device.overflow(data)
+
+        readings = task.read(device.fields(data, task.reads))
+        after = task.after(moved, readings)
+        found = task.terms(after, readings)
+        observation = task.vector(task.observe(after, readings), jnp.float32)
+        terminated, truncated = task.ended(after, readings)
+        reward = terms.total(found, task.settings.weights)
+
+        # Sums of substeps round; the time after k control steps is k dt.
+        data = data.replace(time=(jnp.round(before.time / self.dt) + 1.0) * self.dt)
+        blank = self._data
+        data = data.replace(
+            qpos=jnp.where(diverged, blank.qpos, data.qpos),
+            qvel=jnp.where(diverged, blank.qvel, data.qvel),
+            qacc_warmstart=jnp.where(diverged, blank.qacc_warmstart, data.qacc_warmstart),
+        )
+        after = jax.tree.map(lambda new, old: jnp.where(diverged, old, new).astype(old.dtype), after, memory)
+        metrics = {f"reward_{name}": jnp.where(diverged, 0.0, term) for name, term in found.items()}
+        metrics |= {"diverged": diverged, "overflow": overflow}
+        return State(
+            data=data,
+            obs=jnp.where(diverged, 0.0, observation),
+            reward=_float(jnp.where(diverged, 0.0, reward)),
+            done=_float(terminated | truncated | diverged),
+            metrics=state.metrics | {name: _float(metric) for name, metric in metrics.items()},  # and those of wrappers
+            info={**info, "memory": after, "truncation": _float(truncated & ~(terminated | diverged))},
+        )
+
+
+def restarted(state: State, start: State, ended) -> State:
+    """Return the state of a world whose next step is the first of another episode, where one has ended.
+
+    Args:
+        state: after a step.
+        start: of the other episode.
+        ended: () whether it begins.
+    """
+
+    def chosen(new, old):
+        return jax.tree.map(lambda new, old: jnp.where(ended, new, old), new, old)
+
+    written = {name: chosen(getattr(start.data, name), getattr(state.data, name)) for name in WRITTEN}
+    data, info = state.data.replace(**written), chosen(start.info, state.info)
+    return state.replace(data=data, obs=chosen(start.obs, state.obs), info=info)
+
+
+def _float(value):
+    return jnp.asarray(value).astype(float)

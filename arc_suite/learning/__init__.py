@@ -1,0 +1,1 @@
+"""Learning: learners, studies and the benchmark, tuning, transfer between bodies; nothing of the core imports it."""

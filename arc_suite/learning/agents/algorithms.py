@@ -1,0 +1,232 @@
+"""Algorithms by name: hyperparameters of learners. Nothing here needs JAX."""
+
+import dataclasses
+import importlib
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from arc_suite import checks, versions
+from arc_suite.arenas import FLAT
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
+from arc_suite.envs.setup import Setup
+from arc_suite.learning.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
+
+SOURCES = ("nothing", "prior data", "a demonstrator", "a policy")
+
+
+class Algorithm(NamedTuple):
+    """An algorithm.
+
+    Attributes:
+        learner: full name of the module that learns; see `arc_suite.learning.agents`.
+        hyperparameters: a frozen dataclass.
+        summary: a line for people.
+        evaluate_every: environment steps between evaluations, by default.
+        steps: environment steps of a run, by default.
+        terrain_steps: the same in another arena than the flat one; None for as many.
+        extends: whether a run can be extended to more steps, as no schedule depends on them.
+        source: what it learns from, other than its own steps: one of `SOURCES`.
+        several: whether it can learn with several bodies.
+    """
+
+    learner: str
+    hyperparameters: Any
+    summary: str
+    evaluate_every: int = 10_000
+    steps: int = 1_000_000
+    terrain_steps: int | None = None
+    extends: bool = False
+    source: str = "nothing"
+    several: bool = False
+
+    @property
+    def module(self) -> ModuleType:
+        """The module that learns.
+
+        Raises:
+            ValueError: a package is not installed.
+        """
+        try:
+            return importlib.import_module(self.learner)
+        except ImportError as error:
+            if not self.learner.startswith("arc_suite."):
+                raise ValueError(f"learner {self.learner}: {error}") from None
+            raise versions.MissingExtra("training needs JAX", "agents", error) from None
+
+    def steps_of(self, setup: Setup | BodiesSetup) -> int:
+        """Return the environment steps of a run, by default.
+
+        Raises:
+            ValueError: a setting of the task that does not fit.
+        """
+        if self.terrain_steps is None or setup.definition.scene.arena == FLAT:
+            return self.steps
+        return self.terrain_steps
+
+    def with_hyperparameters(self, changes: Mapping[str, Any]) -> "Algorithm":
+        """Return the algorithm with some hyperparameters changed.
+
+        Raises:
+            ValueError: no such hyperparameter, or a value of another type.
+        """
+        fields = dataclasses.asdict(self.hyperparameters)
+        changes = {name: tuple(value) if isinstance(value, list) else value for name, value in changes.items()}
+        for name, value in changes.items():
+            kind = type(fields[checks.name(name, fields, "hyperparameter")])
+            kinds = (int, float) if kind is float else kind
+            if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
+                raise ValueError(
+                    f"hyperparameter {name}: expected {kind.__name__} like {fields[name]!r}, got {value!r}"
+                )
+        return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changes))
+
+
+_SAC = SoftActorCritic()
+_SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
+
+
+def _off_policy(hyperparameters: SoftActorCritic, summary: str, **defaults) -> Algorithm:
+    source = "nothing" if hyperparameters.prior == "none" else "prior data"
+    return Algorithm(
+        "arc_suite.learning.agents.off_policy", hyperparameters, summary, extends=True, source=source, **defaults
+    )
+
+
+# The paper's six, as in its published code, and others: docs/agents.md.
+ALGORITHMS = {
+    "sac": _off_policy(_SAC, "soft actor-critic"),
+    "speq": _off_policy(_SPEQ, "SAC with phases in which the critics alone learn"),
+    "sope_eo": _off_policy(dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"),
+    "sacfd": _off_policy(
+        dataclasses.replace(_SAC, prior="protected"),
+        "SAC with prior data in its buffer, never overwritten",
+    ),
+    "speq_o2o": _off_policy(
+        dataclasses.replace(_SPEQ, prior="symmetric_sampling"),
+        "SPEQ with a batch of prior data in every update",
+    ),
+    "sope": _off_policy(
+        dataclasses.replace(_SPEQ, prior="symmetric_sampling", early_stop="published"),
+        "SPEQ-O2O with phases that stop early",
+    ),
+    # Beyond the paper: DroQ (Hiraoka et al., "Dropout Q-functions for doubly efficient reinforcement learning", 2022).
+    "droq": _off_policy(
+        dataclasses.replace(_SAC, dropout=0.01, utd_ratio=20),
+        "SAC with 20 updates of critics with dropout in every step",
+    ),
+    # What each part gives: docs/algorithms.md.
+    "sac_parallel": _off_policy(
+        SoftActorCritic(
+            learning_rate=5e-4,
+            discount=0.97,
+            n_step=3,
+            tau=0.01,
+            num_envs=32,
+            utd_ratio=0.375,
+            start_steps=0,
+            reward_scale=0.1,
+            initial_std=0.3,
+            last_gain=0.01,
+            initial_temperature=0.003,
+            target_entropy=-0.6,
+            symmetry_augmentation=True,
+            normalize=True,
+            exclude_blocks=("contact_forces",),
+        ),
+        "SAC from nothing in 32 environments, with 3-step returns and a short horizon",
+        evaluate_every=20_000,
+        steps=100_000,
+    ),
+    # Noise falls over the length of a run: uneven ground takes a longer one.
+    "ppo": Algorithm(
+        "arc_suite.learning.agents.on_policy",
+        ProximalPolicy(),
+        "proximal policy optimisation",
+        evaluate_every=100_000,
+        terrain_steps=3_000_000,
+        several=True,
+    ),
+    # Small steps around a good policy: the noise of `ppo` would undo it.
+    "finetune": Algorithm(
+        "arc_suite.learning.agents.on_policy",
+        ProximalPolicy(
+            initial_std=0.1,
+            final_std=0.04,
+            initial_desired_kl=0.008,
+            final_desired_kl=0.004,
+            policy_rate=1e-5,
+            value_warm_up=320,
+        ),
+        "proximal policy optimisation from the policy of another run, --hp start=FOLDER",
+        evaluate_every=100_000,
+        steps=500_000,
+        source="a policy",
+        several=True,
+    ),
+    "dagger": Algorithm(
+        "arc_suite.learning.agents.dagger",
+        DAgger(),
+        "imitation of a demonstrator",
+        evaluate_every=25_600,
+        steps=25_600,
+        source="a demonstrator",
+        several=True,
+    ),
+    # One policy for many bodies: two environments of each of 128, small batches as a network of legs is large.
+    "dagger_bodies": Algorithm(
+        "arc_suite.learning.agents.dagger",
+        DAgger(num_envs=256, round=60, updates=500, last_updates=1100, batch=128, hidden=128),
+        "imitation of the demonstrators of many bodies, by one policy",
+        evaluate_every=46_080,
+        steps=46_080,
+        source="a demonstrator",
+        several=True,
+    ),
+    "finetune_bodies": Algorithm(
+        "arc_suite.learning.agents.on_policy",
+        ProximalPolicy(
+            num_envs=256,
+            horizon=24,
+            epochs=2,
+            minibatch=512,
+            symmetry_augmentation=False,
+            discount=0.96,
+            initial_std=0.08,
+            final_std=0.08,
+            initial_desired_kl=0.06,
+            final_desired_kl=0.03,
+            policy_rate=8e-5,
+            value_warm_up=96,
+            hidden=128,
+        ),
+        "proximal policy optimisation with many bodies from the policy of another run, --hp start=FOLDER",
+        evaluate_every=122_880,
+        steps=270_336,
+        source="a policy",
+        several=True,
+    ),
+    # Its steps are updates.
+    "bc": Algorithm(
+        "arc_suite.learning.agents.bc",
+        BehaviourCloning(),
+        "behaviour cloning of a dataset",
+        evaluate_every=2500,
+        steps=5000,
+        source="prior data",
+    ),
+}
+
+
+def algorithm(name: str) -> Algorithm:
+    """Return the algorithm of a name, or of `module:attribute`, an `Algorithm` on Python's path.
+
+    Raises:
+        ValueError: there is none.
+    """
+    if isinstance(name, str) and ":" in name:
+        found = checks.imported(name, "algorithm")
+        if not isinstance(found, Algorithm):
+            raise ValueError(f"algorithm {name!r}: expected an Algorithm, got {type(found).__name__}")
+        return found
+    return ALGORITHMS[checks.name(name, ALGORITHMS, "algorithm")]

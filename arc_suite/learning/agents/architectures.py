@@ -1,0 +1,210 @@
+"""Architectures of networks: what maps vectors of observations to actions and to values.
+
+An architecture is a frozen value. Learners draw its parameters, normalise its observations and apply it.
+"""
+
+from typing import Any, NamedTuple, Protocol, Self
+
+import jax.numpy as jnp
+import numpy as np
+
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.learning.agents import networks
+from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.policies.network import Layer
+from arc_suite.tasks import Task, tokens
+from arc_suite.tasks.tokens import JOINTS, LEGS
+
+ACTIVATION = "elu"
+
+
+class Architecture(Protocol):
+    """How networks see observations (..., size), and how they give actions (..., joints) and values (...).
+
+    Attributes:
+        size: of an observation.
+        joints: of an action.
+        inputs: numbers whose moments normalise observations.
+    """
+
+    size: int
+    joints: int
+    inputs: int
+
+    def drawn(self, random: np.random.Generator, hidden: int, last_gain: float = 1.0) -> Any:
+        """Draw the parameters of a network of actions."""
+
+    def drawn_values(self, random: np.random.Generator, hidden: int) -> Any:
+        """Draw the parameters of a network of values."""
+
+    def actions(self, parameters, observations):
+        """Return the actions (..., joints) for normalised observations (..., size)."""
+
+    def values(self, parameters, observations):
+        """Return the values (...) of normalised observations (..., size)."""
+
+    def seen(self, observations):
+        """Return the vectors (n, inputs) whose moments normalise observations (..., size)."""
+
+    def normalise(self, moments: Moments) -> Layer:
+        """Return the layer that normalises observations, from the moments of what was seen."""
+
+    def exported(self, parameters) -> tuple[Layer, ...]:
+        """Return a network of actions as layers of a policy file."""
+
+    def imported(self, layers: tuple[Layer, ...]) -> Any:
+        """Return the parameters of layers that `exported` gave.
+
+        Raises:
+            ValueError: other layers.
+        """
+
+
+class Perceptron(NamedTuple):
+    """Multilayer perceptrons of two hidden layers, for one body; see `Architecture`.
+
+    Normalised numbers of a block are scaled, so that the variances of every block have the same sum. Otherwise 150
+    contact forces would outweigh a clock of two numbers.
+
+    Attributes:
+        blocks: sizes of the observation's blocks, in order.
+    """
+
+    blocks: tuple[int, ...]
+    joints: int
+
+    size = property(lambda self: sum(self.blocks))
+    inputs = size
+
+    @classmethod
+    def of(cls, task: Task) -> Self:
+        """Return the architecture for a task."""
+        return cls(tuple(task.blocks.values()), len(task.scene.body.joint_names))
+
+    def drawn(self, random, hidden, last_gain=1.0):
+        """Draw the parameters of a network of actions."""
+        sizes = (self.size, hidden, hidden, self.joints)
+        return networks.mlp(random, sizes, "orthogonal", gain=2**0.5, last_gain=last_gain)
+
+    def drawn_values(self, random, hidden):
+        """Draw the parameters of a network of values."""
+        return networks.mlp(random, (self.size, hidden, hidden, 1), "orthogonal", gain=2**0.5)
+
+    def actions(self, parameters, observations):
+        """Return the actions (..., joints)."""
+        return networks.forward(parameters, observations * self.scale, ACTIVATION)
+
+    def values(self, parameters, observations):
+        """Return the values (...)."""
+        return networks.forward(parameters, observations * self.scale, ACTIVATION)[..., 0]
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(size,) factors of normalised numbers; their mean square is 1, so that gains of first weights hold."""
+        counts = [count for count in self.blocks if count]
+        squares = [self.size / (len(counts) * count) for count in counts]
+        return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
+
+    def seen(self, observations):
+        """Return the observations."""
+        return observations
+
+    def normalise(self, moments: Moments) -> Layer:
+        """Return the layer of the moments."""
+        return moments.layer()
+
+    def exported(self, parameters):
+        """Return the layers of a network of actions, its first weights scaled."""
+        first, *others = parameters
+        return networks.exported(({**first, "weight": first["weight"] * self.scale[:, None]}, *others), ACTIVATION)
+
+    def imported(self, layers):
+        """Return the parameters of layers."""
+        if [layer.kind for layer in layers] != ["linear", "elu", "linear", "elu", "linear"]:
+            raise ValueError("a policy of dagger, bc or ppo, with two hidden layers")
+        first, *others = (dict(zip(("weight", "bias"), layer.arrays, strict=True)) for layer in layers[::2])
+        return {**first, "weight": first["weight"] / self.scale[:, None]}, *others
+
+
+class PerLeg(NamedTuple):
+    """Networks of any body: one for all legs, which sees a leg, the torso, and the mean of what it finds of all legs.
+
+    Observations are those of `envs.flat_bodies`. A first network maps each leg, with torso, command and description,
+    to features. A second one maps the features of a leg and their mean over all legs to actions of its joints. Values
+    are means over legs.
+    """
+
+    inputs: int = tokens.LEG_INPUTS
+    size: int = sum(tokens.FLAT.values())
+    joints: int = LEGS * JOINTS
+
+    def drawn(self, random, hidden, last_gain=1.0):
+        """Draw the parameters of a network of actions."""
+        return self._drawn(random, hidden, JOINTS, last_gain)
+
+    def drawn_values(self, random, hidden):
+        """Draw the parameters of a network of values."""
+        return self._drawn(random, hidden, 1)
+
+    def actions(self, parameters, observations):
+        """Return the actions (..., 48), 0 where there is no joint."""
+        found, mask = _of_legs(parameters, observations)
+        return jnp.where(mask, found, 0.0).reshape(*found.shape[:-2], -1)
+
+    def values(self, parameters, observations):
+        """Return the values (...)."""
+        found, mask = _of_legs(parameters, observations)
+        legs = mask.any(axis=-1)
+        return jnp.where(legs, found[..., 0], 0.0).sum(axis=-1) / legs.sum(axis=-1)
+
+    def seen(self, observations):
+        """Return the inputs (n, 81) of all legs that there are."""
+        legs, mask = tokens.leg_inputs(observations)
+        return legs[mask.any(axis=-1)]
+
+    def normalise(self, moments: Moments) -> Layer:
+        """Return a layer of 664 numbers, the same for every leg; it leaves the number of joints as it is."""
+        mean, factor, limit = moments.layer().arrays
+        return Layer("normalise", (tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), limit))
+
+    def exported(self, parameters):
+        """Return the layer of a network of actions."""
+        *features, head, last = (
+            (np.asarray(each["weight"]), np.asarray(each["bias"])) for part in parameters for each in part
+        )
+        own, mean = np.split(head[0], 2)
+        return (Layer("legs", (*(array for each in features for array in each), own, mean, head[1], *last)),)
+
+    def imported(self, layers):
+        """Return the parameters of layers."""
+        if [layer.kind for layer in layers] != ["legs"]:
+            raise ValueError("a policy of different bodies")
+        *features, own, mean, bias, last, last_bias = layers[0].arrays
+        head = {"weight": np.concatenate([own, mean]), "bias": bias}, {"weight": last, "bias": last_bias}
+        names = ("weight", "bias")
+        return tuple(dict(zip(names, pair, strict=True)) for pair in (features[:2], features[2:])), head
+
+    def _drawn(self, random, hidden, outputs, last_gain=1.0):
+        gain = 2**0.5
+        features = networks.mlp(random, (self.inputs, hidden, hidden), "orthogonal", gain=gain, last_gain=gain)
+        head = networks.mlp(random, (2 * hidden, hidden, outputs), "orthogonal", gain=gain, last_gain=last_gain)
+        return features, head
+
+
+def of(environment: VectorEnv | FlatBodies) -> Architecture:
+    """Return the architecture that suits environments."""
+    if isinstance(environment, FlatBodies):
+        return PerLeg()
+    return Perceptron.of(environment.task.definition)
+
+
+def _of_legs(parameters, observations):
+    """Return the outputs (..., 12, outputs) of networks of legs, and the mask (..., 12, 4) of joints."""
+    features, head = parameters
+    legs, mask = tokens.leg_inputs(observations)
+    found = networks.hidden(features, legs, ACTIVATION)
+    there = mask.any(axis=-1)[..., None]
+    mean = jnp.where(there, found, 0.0).sum(axis=-2, keepdims=True) / there.sum(axis=-2, keepdims=True)
+    both = jnp.concatenate([found, jnp.broadcast_to(mean, found.shape)], axis=-1)
+    return networks.forward(head, both, ACTIVATION), mask

@@ -1,0 +1,104 @@
+"""Rollouts of a policy: the interface that learning needs, and rollouts in a vector environment."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+
+from arc_suite.learning.agents import architectures, learner
+from arc_suite.learning.agents import proximal_policy as ppo
+from arc_suite.learning.agents.architectures import Architecture
+from arc_suite.learning.agents.hyperparameters import ProximalPolicy
+from arc_suite.learning.agents.learner import Diverged, RunContext, generator
+from arc_suite.policies import network
+from arc_suite.policies.network import Layer
+from arc_suite.tasks import Task
+
+# Names of the arrays of a rollout.
+TRANSITIONS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")
+
+
+class Collector(Protocol):
+    """Environments in which a policy acts; they go on from horizon to horizon.
+
+    Attributes:
+        task: of the environments.
+        architecture: of networks for it.
+    """
+
+    task: Task
+    architecture: Architecture
+
+    def roll_out(self, policy, normalise: Layer, std: float, iteration: int, step: int) -> dict[str, Any]:
+        """Act in all environments for a horizon.
+
+        Args:
+            policy: network of normalised observations to mean actions.
+            normalise: layer that normalises observations.
+            std: standard deviation of actions.
+            iteration: number of the horizon, from which the noise follows.
+            step: environment steps before it.
+
+        Returns:
+            Arrays (horizon, num_envs, ...) of NumPy or JAX by the names of `TRANSITIONS`. A step that begins
+            another command counts as `ended`, and the observation before it as the next one; see
+            `VectorEnv.resampled`.
+
+        Raises:
+            Diverged: an action is not finite.
+        """
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the state of the environments as part of a checkpoint."""
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from the arrays of a checkpoint."""
+
+
+def ages(num_envs: int, step_limit: float) -> np.ndarray:
+    """Return the control steps (num_envs,) that environments count as taken at the start of learning."""
+    return np.arange(num_envs) * (int(step_limit) if math.isfinite(step_limit) else 0) // num_envs
+
+
+class Environments:
+    """Collects in a vector environment; see `Collector`."""
+
+    def __init__(self, hp: ProximalPolicy, context: RunContext):
+        """Begin the first episodes."""
+        self._hp, self._seed, self.environment = hp, context.seed, context.environment(hp.num_envs)
+        self.task, self.architecture = self.environment.task.definition, architectures.of(self.environment)
+        self.observation, _ = self.environment.reset()
+        steps = ages(hp.num_envs, self.task.step_limit)
+        self.environment.restore(self.environment.snapshot() | {"steps": steps})
+
+    def roll_out(self, policy, normalise: Layer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
+        """Act in all environments for a horizon."""
+        random = generator(self._seed, "noise", iteration)
+        rollout = {name: [] for name in TRANSITIONS}
+        for _ in range(self._hp.horizon):
+            normalised = network.forward([normalise], self.observation)
+            mean = np.asarray(ppo.mean_action(self.architecture, policy, normalised))
+            if not np.isfinite(mean).all():
+                raise Diverged("an action is not finite", step)
+            action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)
+            after, rewards, terminated, truncated, info = self.environment.step(action)
+            ended, resampled = terminated | truncated, self.environment.resampled()
+            next_observation = after.copy()
+            next_observation[resampled] = self.observation[resampled]
+            for index in np.flatnonzero(ended):
+                next_observation[index] = info["final_obs"][index]
+            ended = ended | resampled
+            values = self.observation, action, mean, rewards, terminated, ended, next_observation
+            for array, value in zip(rollout.values(), values, strict=True):
+                array.append(value)
+            self.observation = after
+        return {name: np.stack(arrays) for name, arrays in rollout.items()}
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the snapshot of the environments."""
+        return learner.environment_arrays(self.environment)
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from a snapshot."""
+        self.observation = learner.restore_environment(self.environment, arrays)

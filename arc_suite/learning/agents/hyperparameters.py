@@ -1,0 +1,244 @@
+"""Hyperparameters of the learners. Nothing here needs JAX."""
+
+import dataclasses
+from collections.abc import Mapping
+
+from arc_suite import checks
+
+
+@dataclasses.dataclass(frozen=True)
+class SoftActorCritic:
+    """Hyperparameters of soft actor-critic (Haarnoja et al., "Soft actor-critic algorithms and applications", 2018).
+
+    Defaults are those of SAC in the published code of the ARC-RL paper.
+
+    Attributes:
+        hidden: units of each of the two hidden layers, of policy and critics.
+        learning_rate: of Adam, for policy, critics and temperature.
+        discount: of a control step.
+        n_step: control steps of the rewards in a target, before the critics' value.
+        tau: step of the target networks towards the critics in each update.
+        batch: transitions of an update from each source of data.
+        buffer_size: latest online transitions that are kept.
+        dropout: share of units that the critics drop.
+        prior: use of prior data: "none"; "protected", in one buffer with online data, never overwritten; or
+            "symmetric_sampling", a second batch in every update.
+        num_envs: environments, which step together.
+        utd_ratio: updates of an environment step, a share where several environments step together; of several
+            updates of a step all but the last update the critics alone.
+        start_steps: actions are uniform while the buffer has at most this many transitions, never if it is 0;
+            updates do not wait.
+        reward_scale: factor of rewards.
+        initial_std: standard deviation of actions at the start, before the tanh.
+        last_gain: factor of the initial weights of the policy's last layers.
+        initial_temperature: weight of the entropy at the start.
+        target_entropy: of a joint, which the temperature follows.
+        symmetry_augmentation: whether every other transition of a batch is mirrored, for symmetric bodies.
+        normalize: whether running moments normalise observations.
+        exclude_blocks: names of blocks of the observation that networks do not see, where a task has them.
+        phase_every: environment steps between stabilisation phases.
+        phase_updates: the most updates of the critics alone in a phase; 0 for no phases.
+        early_stop: rule that ends a phase early: "none", "published" or "sign_safe"; see `stopping`.
+        held_out: share of the online transitions in the validation set of a phase.
+        scored_batches: the most batches of each source in a validation loss.
+        check_every: updates between two validation losses.
+        patience: updates without improvement that end a phase.
+        improvement: relative improvement that counts.
+    """
+
+    hidden: int = 256
+    learning_rate: float = 3e-4
+    discount: float = 0.99
+    n_step: int = 1
+    tau: float = 0.005
+    batch: int = 256
+    buffer_size: int = 1_000_000
+    dropout: float = 0.0
+    prior: str = "none"
+    num_envs: int = 1
+    utd_ratio: float = 1.0
+    start_steps: int = 5000
+    reward_scale: float = 1.0
+    initial_std: float = 1.0
+    last_gain: float = 1.0
+    initial_temperature: float = 1.0
+    target_entropy: float = -1.0
+    symmetry_augmentation: bool = False
+    normalize: bool = False
+    exclude_blocks: tuple[str, ...] = ()
+    phase_every: int = 10_000
+    phase_updates: int = 0
+    early_stop: str = "none"
+    held_out: float = 0.1
+    scored_batches: int = 16
+    check_every: int = 1000
+    patience: int = 10_000
+    improvement: float = 0.001
+
+    def __post_init__(self):
+        """Raise ValueError for a value out of its range."""
+        least = {"hidden": 1, "batch": 1, "buffer_size": 1, "num_envs": 1, "n_step": 1, "start_steps": 0}
+        least |= {"phase_every": 1, "phase_updates": 0, "scored_batches": 1, "check_every": 1, "patience": 1}
+        _check(self, least)
+        _check_shares(self, "learning_rate", "discount", "held_out", "improvement")
+        checks.number("tau", self.tau, 1e-6, 1.0)
+        checks.number("dropout", self.dropout, 0.0, 0.9)
+        for name in ("reward_scale", "initial_std", "initial_temperature"):
+            checks.number(name, getattr(self, name), 1e-6, 1e3)
+        checks.number("last_gain", self.last_gain, 0.0, 1e3)
+        checks.number("target_entropy", self.target_entropy, -100.0, 100.0)
+        checks.number("utd_ratio", self.utd_ratio, 0.0, 1e3)
+        whole = self.utd_ratio if self.utd_ratio > 1.0 else self.num_envs * self.utd_ratio
+        if not whole or whole != round(whole):
+            raise ValueError(
+                f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
+                f"it is above 1, got {self.utd_ratio!r}"
+            )
+        checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
+        checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
+        if not all(isinstance(name, str) for name in self.exclude_blocks):
+            raise ValueError(f"exclude_blocks: expected names of blocks, got {self.exclude_blocks!r}")
+        if self.buffer_size <= self.start_steps and self.prior != "protected":  # prior data in the same buffer count
+            raise ValueError(
+                f"buffer_size: expected more than start_steps, {self.start_steps}, after which the policy acts, "
+                f"got {self.buffer_size}"
+            )
+
+    @property
+    def updates_of_a_step(self) -> int:
+        """Updates after all environments have stepped once."""
+        return round(self.num_envs * self.utd_ratio)
+
+
+@dataclasses.dataclass(frozen=True)
+class DAgger:
+    """Hyperparameters of DAgger, imitation of a demonstrator.
+
+    Attributes:
+        preset: of the demonstrator; "" for the preset that suits the task.
+        num_envs: environments; the demonstrator acts in half of them.
+        noise: standard deviation of the noise on actions.
+        left_out: first control steps of an episode that are not learned from, as the demonstrator starts by a
+            clock that the network does not see.
+        round: control steps between fits.
+        updates: of a fit.
+        last_updates: of the last fit, over which the learning rate falls to 0.
+        batch: labels of an update.
+        hidden: units of each of the two hidden layers.
+        learning_rate: of Adam.
+    """
+
+    preset: str = ""
+    num_envs: int = 64
+    noise: float = 0.1
+    left_out: int = 25
+    round: int = 50
+    updates: int = 100
+    last_updates: int = 800
+    batch: int = 1024
+    hidden: int = 256
+    learning_rate: float = 1e-3
+
+    def __post_init__(self):
+        """Raise ValueError for a value out of its range."""
+        least = {"num_envs": 2, "left_out": 0, "round": 1, "updates": 1, "last_updates": 1, "batch": 1, "hidden": 1}
+        _check(self, least)
+        checks.number("noise", self.noise, 0.0, 10.0)
+        _check_shares(self, "learning_rate")
+
+
+@dataclasses.dataclass(frozen=True)
+class BehaviourCloning:
+    """Hyperparameters of behaviour cloning.
+
+    Attributes:
+        batch: transitions of an update.
+        hidden: units of each of the two hidden layers.
+        learning_rate: of Adam at the start; it falls to 0.
+    """
+
+    batch: int = 256
+    hidden: int = 256
+    learning_rate: float = 1e-3
+
+    def __post_init__(self):
+        """Raise ValueError for a value out of its range."""
+        _check(self, {"batch": 1, "hidden": 1})
+        _check_shares(self, "learning_rate")
+
+
+@dataclasses.dataclass(frozen=True)
+class ProximalPolicy:
+    """Hyperparameters of proximal policy optimisation (Schulman et al., 2017).
+
+    Attributes:
+        start: folder of a run, or a policy file, whose policy learning starts from; "" for none.
+        simulation: what simulates the environments: "mujoco", on a processor; or "mjx" or "warp", the
+            implementations of `arc_suite.envs.worlds.mjx`, where all of learning stays on JAX's device.
+        num_envs: environments.
+        horizon: control steps of each environment between updates.
+        symmetry_augmentation: whether a mirrored copy of each transition is learned from, for symmetric bodies.
+        epochs: passes over the transitions of a horizon.
+        minibatch: transitions of an update, mirrored ones counted.
+        discount: of a control step.
+        gae_lambda: decay of the generalised advantage estimate.
+        clip: range of the probability ratio around 1.
+        initial_std: standard deviation of actions at the start.
+        final_std: the same at the end; it falls geometrically.
+        initial_desired_kl: desired Kullback-Leibler divergence of an iteration's policy from the last, at the start.
+        final_desired_kl: the same at the end.
+        policy_rate: learning rate of the policy at the start; it follows the divergence.
+        value_rate: learning rate of the value function.
+        gradient_norm: the largest norm of a gradient; longer ones are scaled down.
+        normalize_until: share of the run during which the observation normaliser is updated; never if learning
+            starts from a policy.
+        value_warm_up: control steps of each environment during which only the value function learns; 0 unless
+            learning starts from a policy.
+        hidden: units of each of the two hidden layers.
+    """
+
+    start: str = ""
+    simulation: str = "mujoco"
+    num_envs: int = 64
+    horizon: int = 32
+    symmetry_augmentation: bool = True
+    epochs: int = 5
+    minibatch: int = 1024
+    discount: float = 0.97
+    gae_lambda: float = 0.95
+    clip: float = 0.2
+    initial_std: float = 0.37
+    final_std: float = 0.07
+    initial_desired_kl: float = 0.03
+    final_desired_kl: float = 0.01
+    policy_rate: float = 3e-4
+    value_rate: float = 5e-4
+    gradient_norm: float = 1.0
+    normalize_until: float = 0.7
+    value_warm_up: int = 0
+    hidden: int = 256
+
+    def __post_init__(self):
+        """Raise ValueError for a value out of its range."""
+        _check(self, {"num_envs": 1, "horizon": 1, "epochs": 1, "minibatch": 1, "hidden": 1, "value_warm_up": 0})
+        checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
+        _check_shares(self, "discount", "clip", "policy_rate", "value_rate")
+        for name in ("gae_lambda", "normalize_until"):
+            checks.number(name, getattr(self, name), 0.0, 1.0)
+        for name in ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm"):
+            checks.number(name, getattr(self, name), 1e-6, 1e3)
+        if self.minibatch > self.num_envs * self.horizon * (2 if self.symmetry_augmentation else 1):
+            raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")
+
+
+def _check(hp, least: Mapping[str, int]) -> None:
+    for name, low in least.items():
+        checks.integer(name, getattr(hp, name), low)
+
+
+def _check_shares(hp, *names: str) -> None:
+    """Check that 0 and 1 are no values, as with them nothing is learned or nothing else counts."""
+    for name in names:
+        value = getattr(hp, name)
+        if not 0.0 < checks.number(name, value) < 1.0:
+            raise ValueError(f"{name}: expected a number between 0 and 1, got {value!r}")

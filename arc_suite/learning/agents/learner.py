@@ -1,0 +1,118 @@
+"""The interface of learners: what `learn` is given and what it yields; see `arc_suite.learning.agents`."""
+
+import contextlib
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+
+from arc_suite import checks
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
+from arc_suite.envs.setup import Setup
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.policies import teachers
+from arc_suite.policies.network import Layer
+
+_SEEDS = 100_000  # of the environments of a run; those below are left for evaluation
+MOST_SEEDS = 40_000
+ENVIRONMENT = "environment/"  # prefix of the names in a checkpoint
+# Prefixes of what is not learned: commands of tasks may be NaN, and ground that nobody has seen is at -inf.
+NOT_LEARNED = (ENVIRONMENT, teachers.PREFIX)
+
+
+class Diverged(ValueError):
+    """A value of the learner is not finite."""
+
+    def __init__(self, what: str, step: int):
+        """Name the value and the environment step."""
+        super().__init__(f"the learner diverged: {what} at step {step}; the checkpoint before stays")
+
+
+class Damaged(ValueError):
+    """The checkpoint lacks something, or does not fit."""
+
+
+class RunContext(NamedTuple):
+    """The run that a learner learns in.
+
+    Attributes:
+        setup: body, or bodies, task and settings.
+        seed: of the run.
+        steps: environment steps of the run.
+        evaluate_every: environment steps between evaluations.
+        folder: of the run.
+        prior: id of a dataset of prior data; None for none.
+        threads: of the simulation; results do not depend on it.
+        checkpoint: arrays of the latest `Slice` to resume from; None for a new run.
+    """
+
+    setup: Setup | BodiesSetup
+    seed: int
+    steps: int
+    evaluate_every: int
+    folder: Path
+    prior: str | None = None
+    threads: int = 1
+    checkpoint: Mapping[str, np.ndarray] | None = None
+
+    @property
+    def first_seed(self) -> int:
+        """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
+        return _SEEDS * (1 + self.seed)
+
+    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv | FlatBodies:
+        """Return environments to learn in, seeded apart from evaluation and from other runs.
+
+        Their `reset()` begins the first episodes.
+        """
+        return self.setup.make_vec(num_envs, seed=self.first_seed, num_threads=self.threads, autoreset_mode=mode)
+
+    def next_evaluation(self, step: int) -> int:
+        """Return the environment step of the first evaluation after `step`."""
+        return min((step // self.evaluate_every + 1) * self.evaluate_every, self.steps)
+
+
+class Slice(NamedTuple):
+    """A slice of learning, seconds long.
+
+    Attributes:
+        step: environment steps so far.
+        metrics: by name, always the same names: a line of training.csv; None for no line.
+        policy: layers of the deterministic policy, from the flat observation to actions in [-1, 1].
+        checkpoint: everything that learning resumes from, arrays by name.
+    """
+
+    step: int
+    metrics: Mapping[str, float] | None
+    policy: Sequence[Layer]
+    checkpoint: dict[str, np.ndarray]
+
+
+@contextlib.contextmanager
+def restoring() -> Iterator[None]:
+    """Raise `Damaged` in place of the errors of a checkpoint that lacks something or does not fit."""
+    try:
+        yield
+    except (KeyError, ValueError) as error:
+        raise Damaged(checks.quoted(error)) from None
+
+
+def generator(seed: int, purpose: str, count: int) -> np.random.Generator:
+    """Return the random generator of one purpose of a run, such as its 1000th update."""
+    return np.random.default_rng((seed, zlib.crc32(purpose.encode()), count))
+
+
+def environment_arrays(environment: VectorEnv) -> dict[str, np.ndarray]:
+    """Return the snapshot of an environment as part of a checkpoint."""
+    return {f"{ENVIRONMENT}{name}": array for name, array in environment.snapshot().items()}
+
+
+def restore_environment(environment: VectorEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Restore an environment from `environment_arrays`, and return its observations (num_envs, size)."""
+    snapshot = {name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)}
+    environment.restore(snapshot)
+    return snapshot["observation"]

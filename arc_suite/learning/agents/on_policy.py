@@ -1,0 +1,171 @@
+"""Proximal policy optimisation in a vector environment, or in worlds on a GPU.
+
+With symmetry augmentation each transition of a symmetric body yields a second, mirrored one (`arc_suite.symmetry`).
+A time limit bootstraps: the episode is worth the value of its last observation. Environments start at different
+ages, so their time limits fall on different steps. A step that begins another command bootstraps from the observation
+before it (`VectorEnv.resampled`).
+"""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from arc_suite import policies
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
+from arc_suite.learning.agents import collecting, inputs, learner, networks
+from arc_suite.learning.agents import proximal_policy as ppo
+from arc_suite.learning.agents.architectures import Architecture
+from arc_suite.learning.agents.collecting import Collector
+from arc_suite.learning.agents.hyperparameters import ProximalPolicy
+from arc_suite.learning.agents.learner import RunContext, Slice, generator
+from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.policies import network, universal
+from arc_suite.policies.network import Layer
+
+
+def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
+    """Learn; see `arc_suite.learning.agents`.
+
+    Raises:
+        ValueError: no policy to start from, where the hyperparameters need one, or a policy of another robot or
+            task, or with other layers.
+        OSError: no such file.
+        Diverged: an action is not finite.
+    """
+    if hp.value_warm_up and not hp.start:
+        raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
+    seed, collector = context.seed, _collector(hp, context)
+    task, architecture = collector.task, collector.architecture
+    symmetry = inputs.symmetry(task) if hp.symmetry_augmentation else None
+    moments, policy = Moments.none(architecture.inputs), None
+    normalise = architecture.normalise(moments)
+    if hp.start and context.checkpoint is None:
+        normalise, policy = _read(hp, context, task, architecture)
+    state = ppo.begin(hp, architecture, generator(seed, "networks", 0), policy)
+    iterations = 0
+
+    if (saved := context.checkpoint) is not None:
+        with learner.restoring():
+            state = networks.restored("state", state, saved)
+            moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
+            normalise = networks.restored_layer("normaliser", normalise, saved)
+            iterations = int(saved["iterations"])
+            collector.restore(saved)
+
+    while True:
+        # Schedules over the length of the run.
+        step = iterations * hp.num_envs * hp.horizon
+        done = min(step / context.steps, 1.0)
+        std = hp.initial_std * (hp.final_std / hp.initial_std) ** done
+        desired_kl = hp.initial_desired_kl * (hp.final_desired_kl / hp.initial_desired_kl) ** done
+        with_policy = iterations * hp.horizon >= hp.value_warm_up
+
+        # Act for the horizon.
+        rollout = collector.roll_out(state.policy, normalise, std, iterations, step)
+
+        # Learn from it, in epochs of minibatches.
+        batch = batch_of(hp, architecture, rollout, state.values, normalise, symmetry)
+        count = len(batch.returns)
+        random = generator(seed, "orders", iterations)
+        orders = np.concatenate([random.permutation(count) for _ in range(hp.epochs)])
+        orders = orders.reshape(hp.epochs, count)[:, : count // hp.minibatch * hp.minibatch].reshape(-1, hp.minibatch)
+        schedules = np.float32(std), np.float32(desired_kl)
+        state, kl, value_loss = ppo.update(hp, architecture, state, batch, orders, schedules, with_policy)
+        iterations += 1
+
+        # Update the normaliser.
+        if not hp.start and done < hp.normalize_until:
+            moments = moments.after(architecture.seen(rollout["observations"]))
+            if symmetry is not None:
+                moments = moments.after(architecture.seen(symmetry.observation(rollout["observations"])))
+            normalise = architecture.normalise(moments)
+
+        metrics = {
+            "reward": float(rollout["rewards"].mean()),
+            "falls": float(rollout["terminated"].sum()),
+            "std": std,
+            "kl": float(kl),
+            "policy_rate": float(state.rate),
+            "value_loss": float(value_loss),
+        }
+        layers = normalise, *architecture.exported(state.policy), Layer("clip")
+        checkpoint = {
+            **networks.named("state", state),
+            **networks.named("moments", moments),
+            **networks.named("normaliser", normalise.arrays),
+            "iterations": np.array(iterations),
+            **collector.arrays(),
+        }
+        yield Slice(iterations * hp.num_envs * hp.horizon, metrics, layers, checkpoint)
+
+
+def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
+    if hp.simulation == "mujoco":
+        return collecting.Environments(hp, context)
+    from arc_suite.learning.agents import worlds  # needs the extra `mjx`
+
+    return worlds.Worlds(hp, context)
+
+
+def batch_of(
+    hp: ProximalPolicy,
+    architecture: Architecture,
+    rollout: Mapping[str, Any],
+    values,
+    normalise: Layer,
+    symmetry,
+) -> ppo.Batch:
+    """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
+    size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
+    observations = network.forward([normalise], rollout["observations"])
+    here = numpy.asarray(ppo.value(architecture, values, observations))
+    after = network.forward([normalise], rollout["next_observations"])
+    there = numpy.asarray(ppo.value(architecture, values, after))
+    rewards = (1.0 - hp.discount) * rollout["rewards"]
+    advantages = ppo.advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
+    returns = (advantages + here).ravel()
+    advantages = ((advantages - advantages.mean()) / (advantages.std() + 1e-8)).ravel()
+    observations = observations.reshape(-1, size)
+    actions, means = (rollout[name].reshape(len(returns), -1) for name in ("actions", "means"))
+    if symmetry is not None:
+        mirror, mirror_action = symmetry
+        mirrored = network.forward([normalise], mirror(rollout["observations"]).reshape(-1, size))
+        observations = numpy.concatenate([observations, mirrored])
+        # The mirrored action is as probable as the action was. Under the policy's own mean for the mirrored
+        # observation, where the policy is not symmetric, its probability would be almost 0 and its gradient huge.
+        actions, means = (numpy.concatenate([each, mirror_action(each)]) for each in (actions, means))
+        advantages, returns = numpy.tile(advantages, 2), numpy.tile(returns, 2)
+    arrays = (observations, actions, means, advantages, returns)
+    return ppo.Batch(*(jnp.asarray(array, jnp.float32) for array in arrays))
+
+
+def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Layer, tuple]:
+    """The normaliser and the network of the policy that learning starts from."""
+    found = _start(hp, context, task)
+    first, *layers, last = getattr(found, "layers", ()) or (Layer("none"), Layer("none"))
+    if (first.kind, last.kind) != ("normalise", "clip"):
+        raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
+    for name in {**found.blocks, **task.blocks}:
+        there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.blocks))
+        if there != here:
+            other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
+            raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
+    try:
+        policy = architecture.imported(tuple(layers))
+    except ValueError as error:
+        raise ValueError(f"{hp.start}: expected {error}") from None
+    shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
+    if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
+        raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
+    return first, policy
+
+
+def _start(hp: ProximalPolicy, context: RunContext, task):
+    """The policy that learning starts from."""
+    if isinstance(context.setup, BodiesSetup):
+        return universal.load(hp.start)
+    return policies.policy(Path(hp.start), context.setup.body, task=task)

@@ -1,0 +1,213 @@
+"""Soft actor-critic (Haarnoja et al., 2018) as pure functions of plain pytrees.
+
+One update has the order of the published code of the ARC-RL paper. The target uses the temperature of the update
+before and an action of the present policy. Then come the gradients of the critics' loss, and of the policy's loss
+with the critics of before; the steps of temperature, critics and policy; last the targets. The policy ascends the
+mean of the critics, not their minimum. Dropout, before the layer norm, also acts in targets and policy loss.
+
+Noise and dropout masks are inputs, so an update is a pure function.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+
+from arc_suite.learning.agents import networks
+from arc_suite.learning.agents.hyperparameters import SoftActorCritic
+from arc_suite.learning.agents.replay import Transitions
+from arc_suite.policies.network import Layer
+
+CRITICS = 2
+HIDDEN_LAYERS = 2
+LOG_STD = (-20.0, 2.0)  # bounds of the logarithm of the policy's standard deviation
+
+_TINY = 1e-6  # keeps the logarithm of the density finite where tanh saturates
+_LOG_TWO_PI = math.log(2.0 * math.pi)
+
+
+def core(hp: SoftActorCritic) -> SoftActorCritic:
+    """Return hyperparameters that differ only where updates do, so that compiled programs are shared."""
+    names = "hidden", "learning_rate", "discount", "tau", "dropout", "target_entropy"
+    return SoftActorCritic(**{name: getattr(hp, name) for name in names})
+
+
+class State(NamedTuple):
+    """What an update changes.
+
+    Attributes:
+        policy: `trunk`, the hidden layers; `mean` and `log_std`, layers of their own on top.
+        critics: networks of concatenated observation and action, to a value.
+        targets: like the critics.
+        log_alpha: logarithm of the temperature.
+        moments: of Adam by what it moves: policy, critics, log_alpha.
+    """
+
+    policy: Mapping[str, Any]
+    critics: tuple
+    targets: tuple
+    log_alpha: Any
+    moments: Mapping[str, Any]
+
+
+class Noise(NamedTuple):
+    """The random inputs of an update.
+
+    Attributes:
+        next_action: (batch, joints) standard normal, of the action in the target.
+        action: (batch, joints) standard normal, of the action in the policy's loss; None for critics alone.
+        kept: (uses, critics, hidden layers, batch, hidden) booleans, the units that dropout keeps; uses are
+            targets, critics' loss and policy's loss, if there is one; None without dropout.
+    """
+
+    next_action: Any
+    action: Any
+    kept: Any
+
+
+def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> State:
+    """Draw the networks for observations (size,) and actions (joints,)."""
+    hidden = [hp.hidden] * HIDDEN_LAYERS
+    *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True, last_gain=hp.last_gain)
+    log_std = networks.layer(networks.xavier(random, hp.hidden, joints, hp.last_gain))
+    log_std["bias"] += np.float32(math.log(hp.initial_std))
+    policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
+    critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
+    adam, log_alpha = optimiser(hp), np.array(math.log(hp.initial_temperature), np.float32)
+    moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
+    return jax.tree.map(jnp.array, State(policy, critics, critics, log_alpha, moments))
+
+
+def optimiser(hp: SoftActorCritic) -> optax.GradientTransformation:
+    """Return Adam, (0.9, 0.999), 1e-8."""
+    return optax.adam(hp.learning_rate)
+
+
+def noise(hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: int, with_policy: bool) -> Noise:
+    """Draw the random inputs of an update, with the policy's loss or of critics alone."""
+    next_action = random.standard_normal((batch, joints), np.float32)
+    action = random.standard_normal((batch, joints), np.float32) if with_policy else None
+    shape = (3 if with_policy else 2, CRITICS, HIDDEN_LAYERS, batch, hp.hidden)
+    return Noise(next_action, action, kept(random, shape, hp.dropout) if hp.dropout else None)
+
+
+def kept(random: np.random.Generator, shape: tuple[int, ...], dropout: float) -> np.ndarray:
+    """Draw independent booleans of a shape, each False with the probability `dropout`.
+
+    It draws the gaps between dropped units, which have a geometric distribution: for small `dropout` that takes a
+    fraction of the time.
+    """
+    mask = np.ones(math.prod(shape), bool)
+    expected, at = mask.size * dropout, -1
+    while at < mask.size:
+        gaps = random.geometric(dropout, int(expected + 4.0 * math.sqrt(expected)) + 8)
+        places = at + np.cumsum(gaps)
+        mask[places[places < mask.size]] = False
+        at = places[-1]
+    return mask.reshape(shape)
+
+
+def distribution(policy, observations):
+    """Return mean and logarithm of the standard deviation, (..., joints) each, of the normal under the tanh."""
+    x = networks.hidden(policy["trunk"], observations)
+    return networks.linear(policy["mean"], x), jnp.clip(networks.linear(policy["log_std"], x), *LOG_STD)
+
+
+def sample(mean, log_std, noise):
+    """Return actions (..., joints) for standard normal noise, and the logarithm of their density (...)."""
+    raw = mean + jnp.exp(log_std) * noise
+    small = jnp.exp(-2.0 * jnp.abs(raw))
+    slope = 4.0 * small / (1.0 + small) ** 2  # 1 - tanh(raw)^2, without its loss of digits where tanh saturates
+    density = -0.5 * noise * noise - log_std - 0.5 * _LOG_TWO_PI - jnp.log(slope + _TINY)
+    return jnp.tanh(raw), density.sum(axis=-1)
+
+
+def values(critics, observations, actions, kept=None, dropout: float = 0.0):
+    """Return the values of actions, (...) of each critic.
+
+    The first layer multiplies observations and actions apart, so the products with observations serve two losses
+    and need no gradient of the inputs.
+    """
+    size, results = observations.shape[-1], []
+    for index, (first, *others, last) in enumerate(critics):
+        split = first["weight"][:size], first["weight"][size:]
+        masks = None if kept is None else kept[index]
+        x = observations @ split[0] + actions @ split[1] + first["bias"]
+        if masks is not None:
+            x = networks.dropped(x, masks[0], dropout)
+        x = networks.activated(first, x, "relu")
+        x = networks.hidden(others, x, "relu", None if masks is None else masks[1:], dropout)
+        results.append(networks.linear(last, x)[..., 0])
+    return results
+
+
+def targets(hp: SoftActorCritic, state: State, batch: Transitions, noise: Noise, next_actions=None):
+    """Return the targets of the critics, (batch,); `next_actions` as in `update`."""
+    next_actions = distribution(state.policy, batch.next_observations) if next_actions is None else next_actions
+    action, density = sample(*next_actions, noise.next_action)
+    kept = None if noise.kept is None else noise.kept[0]
+    least = jnp.minimum(*values(state.targets, batch.next_observations, action, kept, hp.dropout))
+    return batch.rewards + hp.discount * batch.goes_on * (least - jnp.exp(state.log_alpha) * density)
+
+
+def critics_loss(hp: SoftActorCritic, critics, batch: Transitions, target, kept):
+    """Return the sum over the critics of the mean squared error, and the mean of their values."""
+    found = values(critics, batch.observations, batch.actions, kept, hp.dropout)
+    return sum(jnp.mean((value - target) ** 2) for value in found), sum(found).mean() / CRITICS
+
+
+def policy_loss(hp: SoftActorCritic, policy, state: State, observations, noise, kept):
+    """Return the mean of alpha log pi minus the mean of the critics, and the mean of log pi."""
+    action, density = sample(*distribution(policy, observations), noise)
+    value = sum(values(state.critics, observations, action, kept, hp.dropout)) / CRITICS
+    return jnp.mean(jnp.exp(state.log_alpha) * density - value), density.mean()
+
+
+def update(
+    hp: SoftActorCritic, state: State, batch: Transitions, noise: Noise, next_actions=None
+) -> tuple[State, dict]:
+    """Return the state after one update, and its metrics, scalars by name.
+
+    Args:
+        hp: hyperparameters.
+        state: before.
+        batch: transitions, with one leading axis.
+        noise: random inputs; without `action`, the critics alone learn.
+        next_actions: the policy's `distribution` at the next observations, if it is known; else None.
+    """
+    masks = (None, None, None) if noise.kept is None else noise.kept
+    target = targets(hp, state, batch, noise, next_actions)
+    critic_gradient = jax.value_and_grad(critics_loss, argnums=1, has_aux=True)
+    (critic_loss, value), gradient = critic_gradient(hp, state.critics, batch, target, masks[1])
+    critics, moments = _stepped(hp, "critics", state.critics, gradient, state.moments)
+    metrics = {"critic_loss": critic_loss, "q": value}
+    if noise.action is not None:
+        policy_gradient = jax.value_and_grad(policy_loss, argnums=1, has_aux=True)
+        (loss, density), gradient = policy_gradient(hp, state.policy, state, batch.observations, noise.action, masks[2])
+        target_entropy = hp.target_entropy * batch.actions.shape[-1]
+        log_alpha, moments = _stepped(hp, "log_alpha", state.log_alpha, -target_entropy - density, moments)
+        policy, moments = _stepped(hp, "policy", state.policy, gradient, moments)
+        state = state._replace(policy=policy, log_alpha=log_alpha)
+        metrics |= {"policy_loss": loss, "entropy": -density, "alpha": jnp.exp(log_alpha)}
+    averaged = jax.tree.map(lambda target, critic: (1.0 - hp.tau) * target + hp.tau * critic, state.targets, critics)
+    return state._replace(critics=critics, targets=averaged, moments=moments), metrics
+
+
+def held_out_loss(hp: SoftActorCritic, state: State, observations, noise, kept):
+    """Return the policy's loss on observations (batch, size), which ends phases."""
+    return policy_loss(hp, state.policy, state, observations, noise, kept)[0]
+
+
+def exported(state: State) -> tuple[Layer, ...]:
+    """Return the deterministic policy, the tanh of the mean, as layers of a policy file."""
+    return *networks.exported((*state.policy["trunk"], state.policy["mean"])), Layer("tanh")
+
+
+def _stepped(hp: SoftActorCritic, name: str, parameters, gradient, moments):
+    """Parameters after a step of Adam, and all moments."""
+    steps, moved = optimiser(hp).update(gradient, moments[name])
+    return optax.apply_updates(parameters, steps), {**moments, name: moved}

@@ -1,0 +1,146 @@
+"""Training: from a configuration to a folder with a policy, resumed bit-exactly after a kill at any moment."""
+
+import contextlib
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from tqdm import tqdm
+
+from arc_suite import checks, evaluation, files
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.learning.agents import priors, run_folder
+from arc_suite.learning.agents.configuration import PRIOR_SHA256, Configuration
+from arc_suite.learning.agents.learner import NOT_LEARNED, Damaged, Diverged, RunContext, Slice
+from arc_suite.learning.agents.run_folder import RunFolder
+from arc_suite.policies import checkpoints, network
+from arc_suite.policies.checkpoints import Agent
+from arc_suite.policies.network import Network
+
+
+def train(
+    configuration: Configuration,
+    folder: Path,
+    minutes: float | None = None,
+    threads: int = 1,
+    progress: Callable = tqdm,
+    on_metrics: Callable[[int, Mapping[str, float]], None] = lambda step, metrics: None,
+) -> bool:
+    """Train, resume, or extend a run to more steps if its algorithm can.
+
+    Args:
+        configuration: of the run.
+        folder: of the run.
+        minutes: of wall clock to stop after; None to train to the end.
+        threads: of the simulation; results do not depend on it.
+        progress: makes a progress bar as `tqdm` does.
+        on_metrics: called after each line of training.csv, and after each evaluation, with the environment step and
+            metrics by name; the metric of an evaluation is `return`.
+
+    Returns:
+        Whether the run is finished.
+
+    Raises:
+        ValueError: a part of the run or minutes that do not fit, the folder of another run, or a damaged one.
+        Diverged: a value of the learner is not finite; the checkpoint before stays.
+        OSError: the disk is full, or the like; the checkpoint before stays.
+    """
+    began = time.monotonic()
+    if minutes is not None:
+        checks.number("minutes", minutes, 0.0)
+    record, definition, setup = configuration.record(), configuration.definition, configuration.setup
+    if configuration.prior is not None:  # the data under an id may change
+        record[PRIOR_SHA256] = priors.digest(configuration.prior)
+    evaluation.check_ends(setup.definition.step_limit)
+    module = definition.module
+    growing = ("steps",) if definition.extends else ()
+    with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
+        state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
+        context = RunContext(
+            setup=setup,
+            seed=configuration.seed,
+            steps=configuration.steps,
+            evaluate_every=configuration.evaluate_every,
+            folder=Path(folder),
+            prior=configuration.prior,
+            threads=threads,
+            checkpoint=run_files.arrays,
+        )
+        slices = stack.enter_context(contextlib.closing(module.learn(definition.hyperparameters, context)))
+        vector = configuration.validation.make_vec(
+            evaluation.EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
+        )
+        environment = stack.enter_context(contextlib.closing(vector))
+        clocks, step = (time.monotonic(), time.process_time()), state["evaluated"]
+        bar = progress(total=context.steps, initial=step, desc=Path(folder).name, unit="step", unit_scale=True)
+        stack.enter_context(bar)
+        while state["evaluated"] < context.steps:
+            if minutes is not None and time.monotonic() - began > 60.0 * minutes:
+                return False
+            try:
+                found = next(slices)
+            except Damaged as error:
+                where = f"{run_files.path / run_folder.CHECKPOINT} is damaged"
+                raise ValueError(f"{where}: {error}; delete it to start the run over") from None
+            _check_finite(found)
+            bar.update(found.step - bar.n)
+            is_evaluated = found.step >= context.next_evaluation(state["evaluated"])
+            if found.metrics is not None:
+                run_files.append("training", {"step": found.step, **found.metrics})
+                on_metrics(found.step, found.metrics)
+                bar.set_postfix_str(_postfix(found.metrics, state), refresh=False)
+            if is_evaluated:
+                state["return"] = _evaluate(configuration, environment, run_files, found)
+                state["evaluated"] = found.step
+                on_metrics(found.step, {"return": state["return"]})
+            is_written = found.metrics is not None or is_evaluated
+            clocks = _write_times(run_files, state, clocks, found.step, is_written)
+            run_files.save(found.checkpoint, state)
+    return True
+
+
+def _check_finite(found: Slice) -> None:
+    for name, metric in (found.metrics or {}).items():
+        if not np.isfinite(metric):
+            raise Diverged(f"{name} is {metric}", found.step)
+    for name, array in found.checkpoint.items():
+        is_learned = array.dtype.kind == "f" and not name.startswith(NOT_LEARNED)
+        if is_learned and not np.isfinite(array).all():
+            raise Diverged(f"{name} is not finite", found.step)
+
+
+def _postfix(metrics: Mapping[str, float], state: Mapping[str, Any]) -> str:
+    """The return of the latest evaluation, and the first metrics of the learner."""
+    shown = {"return": state["return"]} if "return" in state else {}
+    shown |= dict(list(metrics.items())[:2])
+    return ", ".join(f"{name} {value:.4g}" for name, value in shown.items())
+
+
+def _write_times(run_files: RunFolder, state: dict[str, Any], latest: tuple, step: int, write: bool) -> tuple:
+    """Add up the seconds of all processes of a run, write a line of them, and return the clocks."""
+    now = time.monotonic(), time.process_time()
+    for name, was, is_now in zip(("wall", "cpu"), latest, now, strict=True):
+        state[name] += is_now - was
+    if write:
+        run_files.append(
+            "times", {"step": step} | {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
+        )
+    return now
+
+
+def _evaluate(configuration: Configuration, environment: VectorEnv, run_files: RunFolder, found: Slice) -> float:
+    """Evaluate a policy by the protocol, write it and its returns into the folder, and return their mean."""
+    policy = Network(tuple(found.policy), configuration.setup, dict(environment.task.blocks))
+    network.save(run_files.path / network.FILE, policy)
+    kept = files.folder(run_files.path / checkpoints.FOLDER / str(found.step))
+    network.save(kept / network.FILE, policy)
+    episodes = evaluation.episodes_in_batch(environment, policy)
+    for seed, episode in enumerate(episodes):
+        numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
+        run_files.append("evaluations", {"step": found.step, **numbers})
+    mean = float(np.mean([episode.total for episode in episodes]))
+    checkpoints.save(kept, Agent(configuration.algorithm, found.step, configuration.seed, mean))
+    return mean

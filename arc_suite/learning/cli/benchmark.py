@@ -1,0 +1,85 @@
+"""Run the benchmark: ten places, three tracks, a score.
+
+A score is (return - standing still) / (best demonstrator - standing still). The track `top` gives an algorithm a
+million steps, three on uneven ground and among pillars; `samples` gives it 100,000; `demonstrations` gives it 100,000,
+and 100 episodes of a demonstrator. The runs of an algorithm on a track are a study: killed at any moment, the same
+command resumes. Policies of other libraries are files ROBOT-TASK-SEED in a folder: .zip of stable-baselines3, .npz,
+.py with a function make(robot), or folders of runs. Without a track the command prints the table of all learners.
+
+  arc-suite benchmark samples --algorithm sac_parallel
+  arc-suite benchmark top --algorithm ppo --seeds 2 --jobs 8
+  arc-suite benchmark samples --algorithm sac --seeds 1 --places tick-walk,leaper-walk
+  arc-suite benchmark samples --policies my_zips --name my_sac
+  arc-suite benchmark --page docs/benchmark.md
+"""
+
+from pathlib import Path
+
+from absl import flags
+
+from arc_suite import checks, files
+from arc_suite.cli.program import marked_page, progress
+from arc_suite.envs.vector import usable_cores
+from arc_suite.learning.studies import benchmark, leaderboard, report, results, runner, tables
+from arc_suite.learning.studies.tracks import PLACES, SEEDS, TRACKS
+
+FLAGS = flags.FLAGS
+flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")
+flags.DEFINE_integer("seeds", SEEDS, "Seeds of each place.", 1, SEEDS)
+flags.DEFINE_list("places", ["-".join(each) for each in PLACES], "Places to run, ROBOT-TASK.")
+flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
+flags.DEFINE_string("policies", None, "Folder of policies to score in place of runs.")
+flags.DEFINE_string("name", None, "Of these policies in the table. [default: the name of the folder]")
+flags.DEFINE_string("runs", "runs", "Folder of the runs.")
+flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
+flags.DEFINE_string("page", None, "Page to write the table into, between the lines <!-- table --> and <!-- end -->.")
+
+
+def main(track: str | None = None) -> int:
+    """Run a track, and print or write the table; the exit status is 0 if no run has failed."""
+    places = [checks.name(each, ["-".join(each) for each in PLACES], "place") for each in FLAGS.places]
+    write = FLAGS.page and marked_page("page", FLAGS.page)
+    status = 0
+    if track is not None:
+        checks.name(track, TRACKS, "track")
+        status = scored(track) if FLAGS.policies else learned(track, places)
+    table = benchmark.text(Path(FLAGS.results))
+    (write or print)(table)
+    return status
+
+
+def learned(track: str, places: list[str]) -> int:
+    """Make the runs of the algorithm, and write their report and scores.
+
+    Raises:
+        ValueError: an algorithm that the track does not take.
+    """
+    study = tables.benchmark(track, FLAGS.algorithm)
+    name = f"{track}-{tables.folder_name(FLAGS.algorithm)}"
+    runs = [each for each in study.runs if _is_asked(each, places)]
+    folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
+    states = runner.make_and_show(runs, folder, published, FLAGS.jobs or usable_cores(), progress)
+    if found := results.results(study.runs, published):
+        print(report.write(name, study, published))
+        benchmark.write(published, benchmark.of_results(found))
+    return int(any(each.word == "failed" for each in states))
+
+
+def scored(track: str) -> int:
+    """Score the policies of a folder.
+
+    Raises:
+        ValueError: a name of other characters than letters, digits, `_`, `-` and `.`, or a folder that
+            `benchmark.of_policies` refuses.
+        OSError: a file cannot be read.
+    """
+    policies = Path(FLAGS.policies)
+    name = leaderboard.checked_name(FLAGS.name or policies.resolve().name)
+    scores = benchmark.of_policies(policies, progress)
+    benchmark.write(files.folder(Path(FLAGS.results, f"{track}-{name}")), scores)
+    return 0
+
+
+def _is_asked(run: tables.Run, places: list[str]) -> bool:
+    setup, seed = run.configuration.setup, run.configuration.seed
+    return seed < FLAGS.seeds and f"{setup.body.name}-{setup.kind.name}" in places

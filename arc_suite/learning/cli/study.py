@@ -1,0 +1,87 @@
+"""Make the runs of a study, or write its report.
+
+A study is a table of runs: robots, tasks, algorithms, seeds, steps. Each run is a process of one thread. Finished
+runs are skipped, and the others resume. Results of finished runs are copied into a folder that is small enough to be
+committed, and the report is made from that folder alone.
+
+  arc-suite study first-steps
+  arc-suite study first-steps --report
+  arc-suite study paper --jobs 8 --shard 3/16
+  arc-suite study paper --submit 16 --hours 24
+  arc-suite study my_studies:MINE
+"""
+
+from pathlib import Path
+
+from absl import flags
+
+from arc_suite import versions
+from arc_suite.cli.program import progress
+from arc_suite.envs.vector import usable_cores
+from arc_suite.learning.studies import publication, report, runner, tables
+
+FLAGS = flags.FLAGS
+flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)
+flags.DEFINE_string("shard", "0/1", "Share of the runs, i/n: every nth from the ith on; i counts from 0.")
+flags.DEFINE_integer("submit", None, "Submit so many jobs to a SLURM cluster, each with a share of the runs.", 1)
+flags.DEFINE_float(
+    "hours", 24.0, "Time limit of a job; it is queued again until its share is finished.", lower_bound=0.1
+)
+flags.DEFINE_string("partition", None, "Of the cluster. [default: the cluster's]")
+flags.DEFINE_bool("report", False, "Write the report in place of making runs.")
+flags.DEFINE_string("runs", None, "Folder of the runs. [default: runs/NAME]")
+flags.DEFINE_string("results", None, "Folder of the tables and the report. [default: studies/NAME]")
+
+
+def main(name: str | None = None) -> int:
+    """Make the runs, or write the report; the exit status is 0 if all runs are finished."""
+    if name is None:
+        raise ValueError(f"expected a study: {', '.join(tables.STUDIES)}, or module:attribute; see --help")
+    study = tables.study(name)
+    part, parts = shard(FLAGS.shard)
+    runs = study.runs[part::parts]
+    if not runs:
+        raise ValueError(f"--shard={FLAGS.shard}: no run, as the study has {len(study.runs)}")
+    folder = Path(FLAGS.runs or Path("runs", tables.folder_name(name)))
+    results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
+    if FLAGS.report:
+        publication.publish_all(runs, folder, results)
+        print(report.write(name, study, results))
+        return 0
+    if FLAGS.jobs is not None and FLAGS.submit is not None:
+        raise ValueError("--jobs, --submit: this machine, or a cluster; give one of them")
+    if FLAGS.submit is not None:
+        if parts > 1:
+            raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
+        return submit(name, min(FLAGS.submit, len(runs)), folder, results)
+    states = runner.make_and_show(runs, folder, results, FLAGS.jobs or usable_cores(), progress)
+    return int(any(each.word == "failed" for each in states))
+
+
+def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
+    """Submit the study to a cluster in so many jobs, and print them.
+
+    Raises:
+        ValueError: submitit is not installed.
+    """
+    try:
+        from arc_suite.learning.studies import cluster
+    except ImportError as error:
+        raise versions.MissingExtra("--submit needs submitit", "cluster", error) from None
+    arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
+    parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
+    for job in cluster.submit(arguments, jobs, FLAGS.hours, folder / "jobs", **parameters):
+        print(f"submitted {job.job_id}")
+    return 0
+
+
+def shard(text: str) -> tuple[int, int]:
+    """Return i and n of the text i/n.
+
+    Raises:
+        ValueError: it is no such text, or i is not below n.
+    """
+    part, _, parts = text.partition("/")
+    if not (part.isdecimal() and parts.isdecimal() and int(part) < int(parts)):
+        raise ValueError(f"--shard={text}: expected i/n with i from 0 to n - 1, such as 0/4")
+    return int(part), int(parts)

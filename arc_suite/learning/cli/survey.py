@@ -1,0 +1,100 @@
+"""Let random bodies walk and count those that do.
+
+Every seed is a body. A body walks if it does not fall, its torso touches the ground for less than 1 % of
+the time, it moves forward by more than one body length and faster than 0.02 sqrt(g h), and drifts sideways
+less than that.
+
+  arc-suite survey --first 0 --count 500
+  arc-suite survey --family varied --count 500
+  arc-suite survey --first 7000 --count 100 --legs 4 --picture failures.png
+"""
+
+import contextlib
+
+import imageio.v3 as imageio
+import numpy as np
+from absl import flags
+
+from arc_suite import checks, files, registry
+from arc_suite.cli.flags import MOST, define_task, task
+from arc_suite.cli.program import progress
+from arc_suite.envs.setup import Setup
+from arc_suite.learning import survey
+from arc_suite.models.families import FAMILIES
+from arc_suite.robots import generator
+from arc_suite.robots.spec import Body
+from arc_suite.simulation import films
+
+FLAGS = flags.FLAGS
+define_task()
+flags.DEFINE_string(
+    "family", "random", f"Of the bodies: {', '.join(FAMILIES)}, or module:name of one that another package has."
+)
+flags.DEFINE_integer("first", 0, "First seed.", lower_bound=0)
+flags.DEFINE_integer("count", 500, "Number of bodies.", 1, MOST)
+flags.DEFINE_integer("legs", None, "Number of legs, of the family random. [default: random]", *generator.LEGS)
+flags.DEFINE_integer(
+    "links", None, "Actuated links of each leg, of the family random. [default: random, 2 to 4]", *generator.LINKS
+)
+flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0)
+flags.DEFINE_float(
+    "froude",
+    None,
+    "Desired speed in units of sqrt(g h), h being the standing height; negative for backwards. [default: 0.25]",
+)
+flags.DEFINE_bool("in_phase", False, "Move all legs at once: a check that the survey tells bad from good.")
+flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
+flags.DEFINE_string("picture", None, "File to write a picture of up to twelve failures to.")
+
+
+def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
+    """Return the ends of up to twelve walks, each with its seed and failures: (height, width, 3) uint8."""
+    views = []
+    for outcome in outcomes[:12]:
+        environment, _ = survey.play(outcome.trial)
+        caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
+        view = environment.physics.render(300, 400, "portrait", quality="still")
+        views.append(films.captioned(view, caption))
+        environment.close()
+    columns = min(4, len(views))
+    views += [np.zeros_like(views[0])] * (-len(views) % columns)
+    return films.grid(views, columns)
+
+
+def member(seed: int) -> Body:
+    """Return the body of a seed.
+
+    Raises:
+        ValueError: an unknown family, or a number of legs or links for another than `random`.
+    """
+    if FLAGS.family == "random":
+        return generator.random_body(seed, FLAGS.legs, FLAGS.links)
+    for name in ("legs", "links"):
+        if FLAGS[name].value is not None:
+            raise ValueError(f"--{name}={FLAGS[name].value}: goes with the family random, not with {FLAGS.family}")
+    return registry.family_of(FLAGS.family)(seed)
+
+
+def main() -> None:
+    """Run the survey and print it."""
+    name, settings = task()
+    settings = {"time_limit": FLAGS.seconds} | settings
+    settings |= {"duty_factor": 0.6, "phase_offsets": 0.0} if FLAGS.in_phase else {}
+    trials = []
+    for seed in range(FLAGS.first, FLAGS.first + FLAGS.count):
+        setup = Setup.of(member(seed), name, settings)
+        trials.append(survey.Trial(setup, seed, FLAGS.froude))
+    with contextlib.ExitStack() as stack:
+        if FLAGS.picture:
+            checks.extension(FLAGS.picture, [".png"])
+        path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
+        outcomes = list(survey.survey(trials, FLAGS.processes, progress))
+        print(survey.table(outcomes))
+        print(survey.summary(outcomes))
+        failed = [outcome for outcome in outcomes if outcome.failures]
+        for outcome in failed:
+            print(
+                f"seed {outcome.trial.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
+            )
+        if path:
+            imageio.imwrite(path, picture(failed or outcomes))

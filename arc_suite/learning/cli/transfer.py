@@ -1,0 +1,54 @@
+"""Score a policy of many bodies on bodies that it has not seen, by family.
+
+A score is (return - standing still) / (demonstrator - standing still), each body with its own demonstrator: 0 is
+standing still, 1 the demonstrator. Each body plays 400 control steps. `walk` is the share of bodies that walk, by the
+rule of arc-suite survey. Families: random and varied, 50 bodies of seeds that no run trains with; the four robots with
+motors sized anew; 20 mutants of them; and 10 random bodies a quarter, and ten times, as large.
+
+  arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
+  arc-suite transfer --policy universal --task steer --families varied,robots -o steer.csv
+  arc-suite transfer --page docs/any_body.md
+
+With --page nothing is played: the tables of episodes in studies/bodies become the table of a page.
+"""
+
+from pathlib import Path
+
+from absl import flags
+
+from arc_suite import checks
+from arc_suite.cli.flags import define_task, task
+from arc_suite.cli.program import marked_page
+from arc_suite.envs.setup import Setup
+from arc_suite.learning import transfer
+from arc_suite.learning.studies import bodies
+from arc_suite.policies import universal
+
+FLAGS = flags.FLAGS
+define_task()
+flags.DEFINE_string("policy", "universal", "Folder of a run of many bodies, a policy file, or universal.")
+flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with.")
+flags.DEFINE_string("output", None, "File to write every episode to, as CSV.", short_name="o")
+
+flags.DEFINE_string("page", None, "Page to write a table into, between the lines <!-- table --> and <!-- end -->.")
+flags.DEFINE_string("results", "studies/bodies", "Folder of the tables of episodes for --page.")
+
+
+def main() -> None:
+    """Play, print the table and write the episodes; or write a page."""
+    if FLAGS.page:
+        marked_page("page", FLAGS.page)(bodies.text(Path(FLAGS.results)))
+        return
+    name, settings = task()
+    for family in FLAGS.families:
+        checks.name(family, transfer.FAMILIES, "family")
+    if FLAGS.output:
+        checks.extension(FLAGS.output, [".csv"])
+    network, every = universal.load(FLAGS.policy, Setup.of("queen", name, settings).definition), {}
+    print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.Result._fields))
+    for family in FLAGS.families:
+        played = transfer.of_family(family, network, name, settings)
+        print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in transfer.result(played)), flush=True)
+        every[family] = played
+    if FLAGS.output:
+        bodies.write(Path(FLAGS.output), every)

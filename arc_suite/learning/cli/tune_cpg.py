@@ -1,0 +1,132 @@
+"""Search the parameters of a robot's demonstrator with the highest return.
+
+It must walk no worse than `medium` does. The search is CMA-ES on the vector environment. Broken off
+at any moment, the same command goes on. At the end the best parameters are compared with the existing presets
+over many resets, and printed as a row for the table of presets.
+
+  arc-suite tune_cpg --robot queen --output out/tune/queen
+  arc-suite tune_cpg --robot queen --space torques --output out/tune/queen-torques
+"""
+
+import contextlib
+import pathlib
+
+from absl import flags
+
+from arc_suite import checks, evaluation, files, versions
+from arc_suite.cli.flags import MOST, define_task, task
+from arc_suite.cli.program import progress
+from arc_suite.cpg.prescribed import Preset
+from arc_suite.cpg.presets import PRESETS
+from arc_suite.envs.setup import Setup
+from arc_suite.journal import Journal
+from arc_suite.learning.tuning import Evaluator, Generation, Search
+from arc_suite.learning.tuning.evaluator import STYLE
+from arc_suite.learning.tuning.search import HARD
+from arc_suite.learning.tuning.space import SPACES
+from arc_suite.tasks.contract import STEPS
+
+FLAGS = flags.FLAGS
+define_task()
+flags.DEFINE_string("robot", "queen", f"One of {', '.join(PRESETS)}.")
+flags.DEFINE_string(
+    "space", "law", "law: parameters of the paper's law, around `medium`; torques: added to it, around `tuned`."
+)
+for name, least, most, what in (
+    ("generations", 1, MOST, "Generations of the search, more make a finished one go on"),
+    ("episodes", 1, MOST, "Episodes by which a candidate is evaluated"),
+    ("steps", 1, STEPS, "Control steps of these episodes"),
+    ("starts", 0, MOST, f"Starts; candidates are judged in the {HARD} hardest of them; 0 for none"),
+):
+    usual = " and ".join(f"{getattr(kind, name)} for {space}" for space, kind in SPACES.items())
+    flags.DEFINE_integer(name, None, f"{what}; {usual} if not given.", least, most)
+flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 1000)
+flags.DEFINE_integer("resets", 100, "Episodes over which the result may not fall.", 1, MOST)
+flags.DEFINE_string(
+    "output", "out/tune", "Folder of the journal, the plot and the result, made if need be.", short_name="o"
+)
+
+
+def given(name: str) -> int:
+    """Return the value of a flag, or the default of the space."""
+    value = FLAGS[name].value
+    return getattr(SPACES[FLAGS.space], name) if value is None else value
+
+
+def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
+    """Search behind a progress bar, or go on."""
+    settings = {name: FLAGS[name].value for name in ("space", "seed")}
+    settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
+    known = setup.to_dict() | settings | {"versions": versions.recorded()}
+    with contextlib.closing(Journal(folder / "journal.jsonl", known, Generation)) as journal:
+        try:
+            course = Search(setup, **settings)
+        except ImportError as error:
+            raise versions.MissingExtra("a search needs cma", "tune", error) from None
+        for generation in journal.generations:
+            course.step(generation.fitness)
+        done = len(journal.generations)
+        wanted = given("generations")
+        with progress(total=max(wanted, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
+            for _ in range(done, wanted):
+                journal.append(course.step())
+                bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}")
+                bar.update()
+    return course, journal
+
+
+def evaluate(setup: Setup, preset: Preset) -> dict:
+    """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
+    there = PRESETS[FLAGS.robot]
+    presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.space].preset, "medium")}
+    score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
+    return {
+        name: {"return": evaluation.summary(STEPS * score.rewards[row]), "falls": int(score.falls[row].sum())}
+        | {cost: float(values[row].mean()) for cost, values in score.style.items()}
+        for row, name in enumerate(presets)
+    }
+
+
+def violations(metrics: dict) -> list[str]:
+    """Return the constraints that the result violates, a text for each."""
+    found, medium = metrics["found"], metrics["medium"]
+    worse = [f"{name} {found[name]:.3f}, medium's {medium[name]:.3f}" for name in STYLE if found[name] > medium[name]]
+    return worse + [f"{found['falls']} falls"] * bool(found["falls"])
+
+
+def main() -> None:
+    """Search, evaluate, print and write."""
+    checks.name(FLAGS.robot, PRESETS, "robot")
+    setup = Setup.of(FLAGS.robot, *task())
+    checks.name(FLAGS.space, SPACES, "space")
+    if 0 < (FLAGS.starts or 0) < HARD:
+        raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
+    try:
+        from arc_suite.learning.tuning import plots
+    except ImportError as error:
+        raise versions.MissingExtra("the plot needs matplotlib", "tune", error) from None
+    folder = files.folder(FLAGS.output)
+    with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
+        course, journal = search(setup, folder)
+        preset = course.result()
+        plots.course(FLAGS.robot, course.reward, journal.generations, STEPS).savefig(picture)
+        metrics = evaluate(setup, preset)
+        file.update(
+            **setup.to_dict(),
+            space=FLAGS.space,
+            seed=FLAGS.seed,
+            generations=len(journal.generations),
+            resets=FLAGS.resets,
+            preset=preset,
+            metrics=metrics,
+            versions=versions.recorded(),
+        )
+    columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
+    header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
+    print(header, "-" * len(header), sep="\n")
+    for name, row in metrics.items():
+        total = f"{row['return'].mean:.1f} +- {row['return'].deviation:.1f}"
+        print(columns.format(name, total, row["falls"], *(f"{row[cost]:.3f}" for cost in STYLE)))
+    print(f"\n{preset}")
+    if broken := violations(metrics):
+        raise ValueError(f"the result breaks its constraints: {'; '.join(broken)}")

@@ -1,0 +1,214 @@
+"""The benchmark: scores of runs on its tracks, see `tracks`, and of policies of other libraries.
+
+studies/<track>-<learner>/scores.csv    a line for each run, by `write`
+
+The table of all learners is made from these files alone.
+"""
+
+import csv
+import difflib
+import itertools
+import os
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import checks, evaluation, files, policies, style
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
+from arc_suite.learning.studies import results
+from arc_suite.learning.studies.leaderboard import table
+from arc_suite.learning.studies.results import Result
+from arc_suite.learning.studies.tracks import PLACES, SEEDS, TRACKS, TURNING
+from arc_suite.policies import named, network, zips
+
+SCORES = "scores.csv"
+CLIP = (-0.5, 1.2)  # of the score of a run
+HALF = 0.5  # score up to which minutes of the processor are counted
+STYLE, STYLE_HEADS = ("gait_compliance", "heading_error"), ("gait compliance", "heading error, rad")
+NOT_RUN = "not run"
+MAKE = "make"  # function of a module that makes a policy
+ENDINGS = (zips.EXTENSION, network.EXTENSION, named.MODULE)
+# Robot, task and seed by the names that policies of a folder can have.
+NAMES = {
+    f"{robot}-{task}-{seed}{ending}": (robot, task, seed)
+    for (robot, task), seed, ending in itertools.product(PLACES, range(SEEDS), ("", *ENDINGS))
+}
+
+
+class Score(NamedTuple):
+    """Result of a run; a line of `SCORES`.
+
+    Attributes:
+        robot, task, seed: of the run.
+        result: mean return of the protocol's episodes.
+        score: of it, clipped to `CLIP`.
+        minutes: of the processor until an evaluation had the score `HALF`; infinite if none had, NaN if unknown.
+        gait_compliance: mean over the episodes.
+        heading_error: mean size over the episodes, rad; NaN for tasks of `TURNING`.
+    """
+
+    robot: str
+    task: str
+    seed: int
+    result: float
+    score: float
+    minutes: float
+    gait_compliance: float
+    heading_error: float
+
+
+def of_results(found: Iterable[Result]) -> list[Score]:
+    """Return the scores of the runs that are finished."""
+    return [_of_result(each) for each in found if each.steps[-1] >= each.run.configuration.steps]
+
+
+def _of_result(found: Result) -> Score:
+    setup = found.run.configuration.setup
+    scale = anchors.anchors(setup)
+    enough = np.flatnonzero(scale.score(found.returns.mean(axis=1)) >= HALF)
+    minutes = found.cpu[enough[0]] / 60.0 if enough.size else np.inf
+    return _score(setup, found.run.configuration.seed, found.final, minutes, found.style, scale)
+
+
+def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale) -> Score:
+    clipped = float(np.clip(scale.score(result), *CLIP))
+    compliance, error = (results.size(measured[each]) for each in STYLE)
+    if setup.kind.name in TURNING:
+        error = np.nan
+    return Score(setup.body.name, setup.kind.name, seed, float(result), clipped, float(minutes), compliance, error)
+
+
+def of_policies(folder: Path, progress: Callable) -> list[Score]:
+    """Play the protocol's episodes by the policies of a folder, and return their scores.
+
+    What has an ending of `ENDINGS` or a name of `NAMES` is a policy, and the folder of a run. Weights, statistics and
+    notes are none, nor are names that begin with `.` or `_`.
+
+    Args:
+        folder: of policies named `ROBOT-TASK-SEED`: a zip of stable-baselines3, a policy file (.npz), a module with a
+            function `MAKE`, see `policies.policy`, or the folder of a run.
+        progress: makes a progress bar as `tqdm` does.
+
+    Raises:
+        ValueError: no policy in the folder, another name, two policies of a place and seed, or one that does not fit.
+        OSError: a file cannot be read.
+    """
+    found = _by_name(folder)
+    return [
+        _of_policy(path, Setup.of(robot, task), seed)
+        for (robot, task, seed), path in progress(found.items(), desc=str(folder), unit="policy", leave=False)
+    ]
+
+
+def _by_name(folder: Path) -> dict[tuple[str, str, int], Path]:
+    """Return the policies of a folder by robot, task and seed, in the order of their names."""
+    found: dict[tuple[str, str, int], Path] = {}
+    with files.reading(folder):
+        paths = sorted(filter(_is_policy, folder.iterdir()))
+    for path in paths:
+        if path.name not in NAMES:
+            (near,) = difflib.get_close_matches(path.name, NAMES, n=1, cutoff=0.0)
+            expected = f"ROBOT-TASK-SEED of a place and a seed from 0 to {SEEDS - 1}"
+            raise ValueError(f"{path}: expected {expected}, such as {near}")
+        if other := found.get(NAMES[path.name]):
+            raise ValueError(f"{path}: expected one policy of this place and seed, got {other.name}, too")
+        found[NAMES[path.name]] = path
+    if not found:
+        raise ValueError(f"{folder}: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none")
+    return found
+
+
+def _is_policy(path: Path) -> bool:
+    return path.name[0] not in "._" and (
+        path.suffix in ENDINGS or path.name in NAMES or policies.is_file(os.fspath(path))
+    )
+
+
+def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
+    environment = setup.load()
+    name = f"{path}:{MAKE}" if path.suffix == named.MODULE else path
+    policy = policies.policy(name, setup.body, task=environment.task.definition)
+    tracks = [style.record(environment, policy, seed) for seed in range(evaluation.EPISODES)]
+    every = [style.measure(track) for track in tracks]
+    measured = {each: np.array([metrics[each].value for metrics in every]) for each in STYLE}
+    result = np.mean([track.rewards.sum() for track in tracks])
+    return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup))
+
+
+def write(folder: Path, scores: Sequence[Score]) -> None:
+    """Write the scores of a learner on a track into its folder.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with files.writing(folder / SCORES) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerows([Score._fields, *scores])
+
+
+def read(path: Path) -> list[Score]:
+    """Return the scores of a file.
+
+    Raises:
+        ValueError: a damaged file.
+        OSError: it cannot be read.
+    """
+    with path.open(newline="", encoding="utf-8") as file:
+        heads, *lines = csv.reader(file)
+    if tuple(heads) != Score._fields or any(len(line) != len(Score._fields) for line in lines):
+        raise ValueError(f"{path}: expected lines of {', '.join(Score._fields)}")
+    return [Score(robot, task, int(seed), *map(float, others)) for robot, task, seed, *others in lines]
+
+
+def text(studies: Path) -> str:
+    """Return the table of the benchmark in Markdown: all learners in a folder of studies, by track and score.
+
+    Raises:
+        ValueError: no scores, a damaged file of them, or a folder of a name that begins with no track.
+        OSError: a file cannot be read.
+    """
+    lines = []
+    for path in studies.glob(f"*/{SCORES}"):
+        track, _, learner = path.parent.name.partition("-")
+        order = tuple(TRACKS).index(checks.name(track, TRACKS, "track"))
+        if scores := read(path):
+            groups = _by_place(scores)
+            middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
+            lines.append((order, not all(groups), -middle, track, learner, *_cells(groups)))
+    if not lines:
+        raise ValueError(f"{studies}: holds no scores of the benchmark; run a track, or name their folder by --results")
+    places = [" ".join(each) for each in PLACES]
+    heads = ["track", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
+    return table(heads, [line[3:] for line in sorted(lines)])
+
+
+def _by_place(scores: Sequence[Score]) -> list[list[Score]]:
+    """Scores of each of `PLACES`, by seed; empty where there are none."""
+    groups = [[each for each in scores if (each.robot, each.task) == where] for where in PLACES]
+    return [sorted(group, key=lambda each: each.seed) for group in groups]
+
+
+def _even(groups: Sequence[Sequence[Score]]) -> list[Score]:
+    """Scores of each place that has any, of the same number of seeds, so that all places weigh the same."""
+    few = min(len(group) for group in groups if group)
+    return [each for group in groups for each in group[:few]]
+
+
+def _cells(groups: Sequence[Sequence[Score]]) -> list[str]:
+    """Cells of a learner; the total is that of all places alone, its interval that over two seeds or more."""
+    even, seeds = _even(groups), [len(group) for group in groups if group]
+    few, many = min(seeds), max(seeds)
+    total = f"{len(seeds)} of {len(PLACES)} places"
+    if all(groups):
+        middle, (low, high) = evaluation.iqm_and_interval([[each.score for each in group[:few]] for group in groups])
+        total = f"{middle:.3f}" + (f" [{low:.3f}, {high:.3f}]" if few > 1 else "")
+    minutes = float(np.median([each.minutes for each in even]))
+    shown = [
+        f"{few}" if few == many else f"{few} to {many}",
+        total,
+        f"{minutes:.1f}" if np.isfinite(minutes) else "-",
+        *(f"{results.size(np.array([getattr(each, name) for each in even])):.3f}" for name in STYLE),
+    ]
+    return shown + [f"{np.mean([each.score for each in group]):z.2f}" if group else NOT_RUN for group in groups]

@@ -1,0 +1,134 @@
+"""Results of studies: the published tables of their runs, and statistics over them."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import evaluation
+from arc_suite.evaluation import anchors
+from arc_suite.learning.agents import run_folder
+from arc_suite.learning.studies.tables import Run
+
+DEMONSTRATORS = "demonstrators.csv"
+STRIP = "strip.png"  # of a run: frames of its latest policy, see `style.strips`
+
+
+class Result(NamedTuple):
+    """Result of a run.
+
+    Attributes:
+        run: of the study.
+        steps: (evaluations,) environment steps.
+        returns: (evaluations, episodes)
+        progress: the task's progress in the latest evaluation by name, each (episodes,).
+        cpu: (evaluations,) s of the processor until then.
+        style: metrics of style of the latest policy by name, each (episodes,).
+        phases: (phases,) updates of each stabilisation phase; empty if they are not published.
+    """
+
+    run: Run
+    steps: np.ndarray
+    returns: np.ndarray
+    progress: dict[str, np.ndarray]
+    cpu: np.ndarray
+    style: dict[str, np.ndarray]
+    phases: np.ndarray
+
+    @property
+    def final(self) -> float:
+        """Mean return of the latest evaluation."""
+        return float(self.returns[-1].mean())
+
+
+def results(runs: Sequence[Run], published: Path) -> list[Result]:
+    """Return the results of those runs of a study that are published.
+
+    Raises:
+        ValueError: a damaged table.
+    """
+    return [_result(run, published / run.name) for run in runs if (published / run.name / "style.csv").exists()]
+
+
+def evaluated(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Return the steps (evaluations,) of the complete evaluations in a table."""
+    marks, counts = np.unique(evaluations.get("step", ()), return_counts=True)
+    return marks[counts == evaluation.EPISODES]
+
+
+def _result(run: Run, folder: Path) -> Result:
+    evaluations, times, style = (run_folder.table(folder, name) for name in ("evaluations", "times", "style"))
+    whole = evaluated(evaluations)
+    returns = np.array([evaluations["return"][evaluations["step"] == step] for step in whole])
+    last = evaluations["step"] == whole[-1]
+    progress = {
+        name: evaluations[name][last] for name in evaluations if name not in ("step", "seed", "return", "length")
+    }
+    cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
+    metrics = {name: style[name] for name in style if name not in ("step", "seed")}
+    phases = run_folder.table(folder, "phases").get("updates", np.empty(0))
+    return Result(run, whole.astype(int), returns, progress, cpu, metrics, phases)
+
+
+def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
+    """Return the returns of standing still and of demonstrators, (episodes,), by place (`Run.place`) and policy."""
+    path = published / DEMONSTRATORS
+    return anchors.read(path) if path.exists() else {}
+
+
+def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
+    """Return results by place and kind, each with all its seeds."""
+    groups: dict[str, dict[str, list[Result]]] = {}
+    for each in found:
+        groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
+    return groups
+
+
+def scores(seeds: Sequence[Result]) -> np.ndarray:
+    """Return the mean return of each seed, (seeds,)."""
+    return np.array([each.final for each in seeds])
+
+
+def size(values: np.ndarray) -> float:
+    """Return the mean size of the values that are finite; NaN where none are."""
+    sizes = np.abs(values[np.isfinite(values)])
+    return float(sizes.mean()) if sizes.size else np.nan
+
+
+def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
+    """Return environment steps and s of the processor up to a mean return of `threshold`.
+
+    Returns:
+        Means over the seeds; infinite if a seed has not reached it.
+    """
+    found = []
+    for each in seeds:
+        enough = np.flatnonzero(each.returns.mean(axis=1) >= threshold)
+        found.append((each.steps[enough[0]], each.cpu[enough[0]]) if enough.size else (np.inf, np.inf))
+    steps, seconds = np.mean(found, axis=0)
+    return float(steps), float(seconds)
+
+
+def improvement(groups: dict[str, dict[str, list[Result]]], x: str, y: str) -> tuple[float, tuple[float, float]] | None:
+    """Return the probability that a run of kind x earns more than one of y, with its interval.
+
+    Places in which both have several seeds are strata. Both are compared at the latest step that all their runs have
+    reached. None without such a place.
+    """
+    pairs = [(kinds[x], kinds[y]) for kinds in groups.values() if x in kinds and y in kinds]
+    cut = [[_until_step(side, both) for side in both] for both in pairs if min(map(len, both)) > 1]
+    cut = [both for both in cut if all(side for side in both)]
+    if not cut:
+        return None
+    strata = [[scores(side) for side in both] for both in cut]
+    return evaluation.probability_of_improvement([each[0] for each in strata], [each[1] for each in strata])
+
+
+def _until_step(side: Sequence[Result], both: Sequence[Sequence[Result]]) -> list[Result]:
+    """Results cut back to the latest step at which all have been evaluated."""
+    common = set.intersection(*(set(each.steps.tolist()) for seeds in both for each in seeds))
+    if not common:
+        return []
+    ends = [int(np.flatnonzero(each.steps == max(common))[0]) + 1 for each in side]
+    return [each._replace(returns=each.returns[:end]) for each, end in zip(side, ends, strict=True)]

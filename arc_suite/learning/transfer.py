@@ -1,0 +1,221 @@
+"""How a policy of many bodies does on bodies that it has not seen, by family.
+
+Each body plays one episode by the policy, by its own demonstrator, and standing still, from the same start. A raw
+return says nothing across bodies, as costs are sums over feet and joints: scores are shares of the way from standing
+still, 0, to the body's own demonstrator, 1.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from tqdm import tqdm
+
+from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.envs.bodies.flat_bodies import FlatBodies
+from arc_suite.evaluation import protocol
+from arc_suite.learning import survey
+from arc_suite.models.families import varied_body
+from arc_suite.policies import Policy, Script
+from arc_suite.policies.network import Network
+from arc_suite.policies.teachers import Teacher
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec import Body
+
+TEST = 200_000  # first seed of the bodies of a family that test a policy; nobody trains or validates with them
+STEPS = 400  # control steps of an episode
+_WORST = 0.1  # share of the bodies whose mean is told too
+
+
+class Family(NamedTuple):
+    """Bodies that test a policy.
+
+    Attributes:
+        made: the body of an index from 0 on.
+        count: number of bodies.
+    """
+
+    made: Callable[[int], Body]
+    count: int  # type: ignore[assignment]  # hides the method of tuples
+
+
+def _robot(index: int) -> Body:
+    """A robot of the suite with motors sized anew."""
+    body = generator.scaled(tuple(ROBOTS.values())[index % len(ROBOTS)], 1.0)
+    return body.replace(torso=body.torso.replace(standing_height=None))
+
+
+def _mutant(index: int) -> Body:
+    body = generator.mutated(_robot(index), index, 0.2)
+    return body.replace(torso=body.torso.replace(standing_height=None))
+
+
+FAMILIES = {
+    "random": Family(lambda index: generator.random_body(TEST + index), 50),
+    "varied": Family(lambda index: varied_body(TEST + index), 50),
+    "robots": Family(_robot, 4),
+    "mutants": Family(_mutant, 20),
+    "many_legs": Family(lambda index: generator.random_body(TEST + index, legs=9 + index % 4), 20),
+    "four_links": Family(lambda index: generator.random_body(TEST + index, links=4), 20),
+    "small": Family(lambda index: generator.scaled(generator.random_body(TEST + index), 0.25), 10),
+    "large": Family(lambda index: generator.scaled(generator.random_body(TEST + index), 10.0), 10),
+}
+
+
+class Episode(NamedTuple):
+    """One episode of a body.
+
+    Attributes:
+        total: its return.
+        walked: whether the body walked by the rule of `evaluation.survey`: no fall, speed, straightness, torso off the
+            ground.
+        tracking: how well it followed the command, 1 at best; NaN in tasks without this metric.
+    """
+
+    total: float
+    walked: bool
+    tracking: float
+
+
+class Trial(NamedTuple):
+    """The episodes of one body.
+
+    Attributes:
+        body: name of the body.
+        policy: its episode by the policy.
+        demonstrator: by its own demonstrator.
+        zero: standing still.
+    """
+
+    body: str
+    policy: Episode
+    demonstrator: Episode
+    zero: Episode
+
+    @property
+    def score(self) -> float:
+        """(policy - standing still) / (demonstrator - standing still); NaN where that one earns no more."""
+        gain = self.demonstrator.total - self.zero.total
+        return (self.policy.total - self.zero.total) / gain if gain > 0.0 else math.nan
+
+
+class Result(NamedTuple):
+    """The results of a family.
+
+    Attributes:
+        count: of the bodies.
+        walk: share of the bodies that walk.
+        demonstrated: share of the bodies that their demonstrators walk.
+        score: gain of the policy over standing still, as a share of the demonstrators': sums over bodies.
+        worst: the same of the tenth of the bodies with the lowest scores.
+        share: mean of the policy's return as a share of the demonstrator's.
+        tracking: mean tracking as a share of the demonstrators' mean; NaN in tasks without this metric.
+    """
+
+    count: int  # type: ignore[assignment]  # hides the method of tuples
+    walk: float
+    demonstrated: float
+    score: float
+    worst: float
+    share: float
+    tracking: float
+
+
+def trials(network: Network, bodies: Iterable[Body], task: str, settings: Mapping | None = None) -> list[Trial]:
+    """Play the episodes of bodies, body i from seed i.
+
+    Args:
+        network: a policy of many bodies.
+        bodies: to play with.
+        task: name of the task.
+        settings: of the task.
+
+    Raises:
+        ValueError: a task or a body that does not fit.
+    """
+    bodies = list(bodies)
+    environment = FlatBodies(
+        BodiesEnv(
+            task,
+            len(bodies),
+            bodies,
+            num_threads=1,
+            autoreset_mode=AutoresetMode.DISABLED,
+            max_episode_steps=STEPS,
+            task_kwargs=settings,
+        )
+    )
+    try:
+        zero = Script(lambda seed: (), *environment.action_space.shape)
+        played = [_episodes(environment, policy) for policy in (network, Teacher(environment), zero)]
+    finally:
+        environment.close()
+    return [Trial(*each) for each in zip([body.name for body in bodies], *played, strict=True)]
+
+
+def of_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Trial]:
+    """Play the episodes of a family of `FAMILIES`; see `trials`."""
+    family = FAMILIES[name]
+    bodies = [family.made(index) for index in range(family.count)]
+    return trials(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
+
+
+def result(played: list[Trial]) -> Result:
+    """Return the results of trials; bodies whose demonstrators gain nothing count in no score."""
+    scored = sorted((trial for trial in played if not math.isnan(trial.score)), key=lambda trial: trial.score)
+    worst = scored[: max(1, round(_WORST * len(scored)))]
+    tracking = [[episode.tracking for episode in (trial.policy, trial.demonstrator)] for trial in played]
+    policy, demonstrator = np.mean(tracking, axis=0)
+    return Result(
+        count=len(played),
+        walk=float(np.mean([trial.policy.walked for trial in played])),
+        demonstrated=float(np.mean([trial.demonstrator.walked for trial in played])),
+        score=_gain(scored),
+        worst=_gain(worst),
+        share=float(np.mean([trial.policy.total / trial.demonstrator.total for trial in played])),
+        tracking=float(policy / demonstrator),
+    )
+
+
+def _gain(played: list[Trial]) -> float:
+    """The policy's gain over standing still as a share of the demonstrators'; NaN without trials.
+
+    Sums, as the gain of a single demonstrator may be small.
+    """
+    gains = [[trial.policy.total - trial.zero.total, trial.demonstrator.total - trial.zero.total] for trial in played]
+    return float(np.divide(*np.sum(gains, axis=0))) if gains else math.nan
+
+
+def _episodes(environment: FlatBodies, policy: Policy) -> list[Episode]:
+    """Play an episode in every environment, from the seed of its index, and judge the walks."""
+    bodies, count = environment.unwrapped, environment.num_envs
+    touching, fell = np.zeros(count), np.zeros(count, bool)
+    starts, ends = np.zeros((count, 2)), np.zeros((count, 2))
+
+    def watch(playing, terminated):
+        positions = bodies.positions()[:, :2]
+        if not playing.any():
+            starts[:] = positions
+        ends[playing] = positions[playing]
+        touching[playing & _torso_touches(bodies)] += 1.0
+        fell[terminated] = True
+
+    played, found = protocol.episodes_in_batch(environment, policy, range(count), watch), []
+    for index, (episode, task) in enumerate(zip(played, bodies.tasks, strict=True)):
+        failures = survey.failures(
+            task.scene.body,
+            ends[index] - starts[index],
+            STEPS * task.scene.control_timestep,
+            touching[index] / episode.length,
+            "fall" if fell[index] else "time",
+        )
+        found.append(Episode(episode.total, not failures, episode.progress.get("tracking", math.nan)))
+    return found
+
+
+def _torso_touches(environment: BodiesEnv) -> np.ndarray:
+    """Whether something pushes the torso (num_envs,)."""
+    own = zip(environment.tasks, environment.own_observations(), strict=True)
+    return np.array([task.split(vector)["contact_forces"][:6].any() for task, vector in own])

@@ -1,0 +1,147 @@
+"""Searches by CMA-ES (Hansen, "The CMA evolution strategy: a tutorial", 2016) over the parameters of a demonstrator.
+
+A candidate's fitness is its mean reward over a few seeded episodes, which are new in each
+generation and the same for all of its candidates, less two penalties: for a style that is worse
+than that of the preset `medium`, in the same episodes, and for tipping over in hard starts, those
+of many that throw this preset about most.
+"""
+
+import contextlib
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite.cpg.prescribed import Preset
+from arc_suite.cpg.presets import PRESETS
+from arc_suite.envs.setup import Setup
+from arc_suite.learning.tuning.evaluator import STYLE, Evaluator, Score
+from arc_suite.learning.tuning.space import SPACES
+
+SPREAD = 0.5  # of the first generation, in scales of the parameters
+HARD = 8  # starts that candidates are tried in
+
+_EXCESS = 1.5  # reward that a cost of style twice as large takes
+_MARGIN = 0.03  # by which style is to be better, as few episodes estimate it
+_TIPPING = 1.0  # reward that falling in all hard starts takes
+
+_START_STEPS = 40  # control steps of these, after which a robot stands or lies
+_SEEDS = 100_000  # of a search; those below are left to evaluate its result
+
+
+class Generation(NamedTuple):
+    """What a generation came to.
+
+    Attributes:
+        fitness: of its candidates.
+        reward: mean over the episodes of the fittest.
+        tipping: of the fittest in the hard starts; see `Score`.
+        style: the fittest's costs of style as shares of medium's, in the order of `evaluator.STYLE`.
+    """
+
+    fitness: list[float]
+    reward: float
+    tipping: float
+    style: list[float]
+
+
+class Search:
+    """A search about a robot's preset, by generations.
+
+    It is determined by its arguments and the fitness of its generations, so that one that was
+    broken off resumes from the fitness of its past generations.
+
+    Attributes:
+        reward: mean reward of `medium`.
+        candidates: how many a generation has.
+    """
+
+    def __init__(
+        self,
+        setup: Setup,
+        seed: int,
+        episodes: int,
+        steps: int,
+        starts: int,
+        space: str = "law",
+    ):
+        """Evaluate `medium` and the possible starting points; the search starts from the best.
+
+        Args:
+            setup: a robot that has presets, in a task.
+            seed: of the search and its episodes.
+            episodes: by which a candidate is evaluated.
+            steps: control steps of each.
+            starts: to choose the hard ones from, at least `HARD`; 0 for none.
+            space: of the searched parameters, a name of `space.SPACES`.
+
+        Raises:
+            ImportError: no package `cma`.
+            ValueError: a task without the terms of style.
+        """
+        import cma  # of the extra "tune"
+
+        tuning, kind = PRESETS[setup.body.name], SPACES[space]
+        self._medium = tuning["medium"]
+        self._space, self._episodes = kind.space(setup.body, tuning[kind.preset]), episodes
+        self._first = _SEEDS * (1 + seed)
+        self._starts = range(self._first, self._first + starts)
+        origins = self._space.origins()
+        presets = [self._medium, *map(self._space.preset, origins)]
+        score = _evaluated(setup, presets, range(self._first, self._first + episodes), steps, kind.skipped)
+        self.reward, *by_origin = score.rewards.mean(axis=-1).tolist()
+        self._origin = origins[np.argmax(by_origin)]
+        self._scale = np.array([number.scale for number in self._space.ranges()])
+        options = {"randn": np.random.RandomState(seed).randn, "seed": np.nan, "verbose": -9}
+        options |= {} if kind.candidates is None else {"popsize": kind.candidates}
+        self._strategy = cma.CMAEvolutionStrategy(np.zeros_like(self._origin), SPREAD, options)
+        self.candidates = self._strategy.popsize
+        self._evaluator = Evaluator(setup, self.candidates + 1, episodes, steps, kind.skipped)
+        self._evaluator_of_starts = None
+        if starts:
+            tipping = _evaluated(setup, [self._medium], self._starts, _START_STEPS).tipping[0]
+            self._hard = [self._starts[index] for index in np.argsort(tipping, stable=True)[-HARD:]]
+            self._evaluator_of_starts = Evaluator(setup, self.candidates, HARD, _START_STEPS)
+        self._generations = 0
+
+    def step(self, fitness: list[float] | None = None) -> Generation | None:
+        """Go on by a generation.
+
+        Args:
+            fitness: of its candidates, if they have been evaluated before.
+
+        Returns:
+            What it came to; None with `fitness`.
+        """
+        solutions = self._strategy.ask()
+        generation = None
+        if fitness is None:
+            generation = self._generation([self._space.preset(self._vector(solution)) for solution in solutions])
+            fitness = generation.fitness
+        self._strategy.tell(solutions, [-value for value in fitness])
+        self._generations += 1
+        return generation
+
+    def result(self) -> Preset:
+        """Return what the search believes to be best: the mean of its distribution, rounded."""
+        return self._space.preset(self._space.rounded(self._vector(self._strategy.mean)))
+
+    def _vector(self, solution) -> np.ndarray:
+        return self._origin + self._scale * solution
+
+    def _generation(self, presets) -> Generation:
+        first = self._starts.stop + self._generations * self._episodes
+        score = self._evaluator([*presets, self._medium], range(first, first + self._episodes))
+        tipping = np.zeros(len(presets))
+        if self._evaluator_of_starts:
+            tipping = self._evaluator_of_starts(presets, self._hard).tipping.mean(axis=-1)
+        rewards = score.rewards[:-1].mean(axis=-1)
+        costs = np.stack([score.style[name].mean(axis=-1) for name in STYLE], axis=-1)
+        style = costs[:-1] / costs[-1]
+        fitness = rewards - _EXCESS * (style - (1.0 - _MARGIN)).clip(0.0).sum(axis=-1) - _TIPPING * tipping
+        best = fitness.argmax()
+        return Generation(fitness.tolist(), float(rewards[best]), float(tipping[best]), style[best].tolist())
+
+
+def _evaluated(setup: Setup, presets, seeds, steps: int, skipped: int = 0) -> Score:
+    with contextlib.closing(Evaluator(setup, len(presets), len(seeds), steps, skipped)) as evaluator:
+        return evaluator(presets, seeds)

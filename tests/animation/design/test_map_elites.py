@@ -1,0 +1,91 @@
+"""MAP-Elites fills its cells with better and better bodies, and depends on nothing but its seed."""
+
+import json
+
+import numpy as np
+
+from arc_suite.animation.design.axes import Map
+from arc_suite.animation.design.genes import Budget, Made
+from arc_suite.animation.design.search import BATCH, RANDOM, Batch, Search
+from arc_suite.animation.design.trials import Outcome, Round, Trial, Walk
+
+ROUND = Round({}, (0,), 10)
+TRIAL = Trial("walk", "transport", Budget(12.0, 1.5), ROUND, ROUND)
+
+
+def fake(body):
+    """A walk whose cost of transport follows from proportions alone: thin, high torsos are cheap."""
+    length, width, thickness = body.torso.solids[0].size
+    cost = 1.0 + (thickness + width) / length + 0.3 / body.torso.standing_height
+    return Walk(1.0, 1.0, 1.0, cost, 5.0, 0.0)
+
+
+def evaluated(jobs):
+    found = []
+    for _, body, elite in jobs:
+        walk = fake(body)
+        found.append(Outcome("", walk, walk if -walk.cost_of_transport > elite else None))
+    return found
+
+
+def search(seed=3, goes=10):
+    course = Search(Made(), Map.of(["legs", "links"]), TRIAL, seed, "body")
+    return course, [course.batch(evaluated) for _ in range(goes)]
+
+
+def costs(course):
+    return [course.candidates[index].outcome.second.cost_of_transport for index in course.elites.values()]
+
+
+def test_a_search_is_a_function_of_its_seed():
+    (first, _), (second, _), (other, _) = search(), search(), search(4)
+    assert first.candidates == second.candidates and first.elites == second.elites
+    assert first.candidates != other.candidates
+    assert len(first.candidates) == 10 * BATCH
+
+
+def test_a_search_restored_from_json_goes_on_as_if_nothing_had_happened():
+    straight, batches = search()
+    again = Search(Made(), Map.of(["legs", "links"]), TRIAL, 3, "body")
+    for batch in batches[:6]:
+        again.add(Batch.restored(**json.loads(json.dumps(batch._asdict()))))
+    for _ in range(4):
+        again.batch(evaluated)
+    assert again.candidates == straight.candidates and again.elites == straight.elites
+
+
+def test_elites_are_the_best_of_their_cells():
+    course, _ = search()
+    for cell, index in course.elites.items():
+        inside = [one for one in course.candidates if one.cell == cell]
+        best = min(one.outcome.first.cost_of_transport for one in inside)
+        assert course.candidates[index].outcome.second.cost_of_transport == best
+    assert set(course.elites) == {one.cell for one in course.candidates}
+
+
+def test_a_search_beats_as_many_random_bodies():
+    course, _ = search(goes=15)
+    random = Search(Made(), Map.of(["legs", "links"]), TRIAL, 3, "body")
+    drawn = np.random.default_rng(0).uniform(size=(len(course.candidates), len(random.genes)))
+    assert min(costs(course)) < 0.97 * min(fake(random.body(genes, 0)).cost_of_transport for genes in drawn)
+    assert len(course.candidates) > RANDOM
+
+
+def test_one_that_is_excluded_the_second_time_takes_no_cell():
+    course = Search(Made(), Map.of(["legs"]), TRIAL, 0, "body")
+    course.batch(lambda jobs: [Outcome("evaluated again: fell", fake(body), fake(body)) for _, body, _ in jobs])
+    assert not course.elites and len(course.candidates) == BATCH
+
+
+def test_an_elite_is_challenged_by_the_second_metric():
+    """A body of a better first walk and a worse second one leaves the elite where it is."""
+    course = Search(Made(), Map.of(["legs"]), TRIAL, 0, "body")
+    course.batch(evaluated)
+    before = dict(course.elites)
+
+    def lucky(jobs):
+        worse = Walk(1.0, 1.0, 1.0, 9.0, 5.0, 0.0)
+        return [Outcome("", worse._replace(cost_of_transport=0.1), worse) for _ in jobs]
+
+    course.batch(lucky)
+    assert {cell: course.elites[cell] for cell in before} == before

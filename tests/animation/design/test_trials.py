@@ -1,0 +1,65 @@
+"""Trials of bodies: what a walk is worth, and what excludes a body."""
+
+import math
+
+import pytest
+
+from arc_suite.animation.design.genes import Budget
+from arc_suite.animation.design.trials import GOALS, Trial, Walk, evaluate, excluded, walk
+from arc_suite.robots.generator import generate
+
+BUDGET = Budget(12.0, 1.5)
+GOOD = Walk(0.5, 0.9, math.nan, 1.5, 6.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("goal", "walked", "reason"),
+    [
+        ("transport", GOOD, ""),
+        ("transport", GOOD._replace(falls=0.5), "fell"),
+        ("transport", GOOD._replace(achieved=0.69), "slow: 0.69 of the command"),
+        ("transport", GOOD._replace(power=20.5), "power: 20.5 W/kg"),
+        ("speed", GOOD._replace(achieved=0.1), ""),
+        ("tracking", GOOD, "no finite metric"),
+        ("robustness", GOOD._replace(tracking=0.4, falls=1.0), ""),
+    ],
+)
+def test_guards(goal, walked, reason):
+    assert excluded(GOALS[goal], BUDGET._replace(power=20.0), walked) == reason
+
+
+def test_goals_are_raised_or_lowered():
+    assert GOALS["transport"].value(GOOD) == -1.5 and GOALS["speed"].value(GOOD) == 0.5
+
+
+def test_the_second_evaluation_is_longer_on_other_seeds_and_ground():
+    trial = Trial.of("stairs", {"rise": 0.1, "terrain_seed": 4}, "progress", BUDGET, 100)
+    assert trial.first == ({"rise": 0.1, "terrain_seed": 4}, (0,), 100)
+    assert trial.second == ({"rise": 0.1, "terrain_seed": 5}, (1,), 200)
+    assert Trial.of("walk", {}, "speed", BUDGET, 100).second.settings == {}
+    assert Trial.of("rough", {}, "progress", BUDGET, 100).second.settings == {"terrain_seed": 1}
+
+
+def test_a_body_walks_and_challenges_an_elite():
+    trial, body = Trial.of("walk", {}, "transport", BUDGET, 100), generate(6, 3)
+    challenger = evaluate(trial, body, -math.inf)
+    assert challenger.reason == "" and challenger.second.falls == 0.0
+    assert 0.7 < challenger.first.achieved < 1.3 and 0.5 < challenger.first.cost_of_transport < 6.0
+    speed = challenger.first.speed
+    assert math.isclose(challenger.first.power, 9.81 * speed * challenger.first.cost_of_transport, rel_tol=0.05)
+    assert str(evaluate(trial, body, 0.0)) == str(challenger._replace(second=None))  # NaN is not equal to itself
+
+
+def test_no_body_and_unsound_bodies_are_not_let_walk():
+    trial, body = Trial.of("walk", {}, "transport", BUDGET, 100), generate(6, 3)
+    assert evaluate(trial, "no body: too large", 0.0) == ("no body: too large", None, None)
+    high = body.replace(torso=body.torso.replace(standing_height=0.7))
+    assert evaluate(trial, high, 0.0).reason.startswith("unsound: feet hang")
+
+
+def test_tracking_counts_steps_after_a_fall_as_nothing():
+    trial = Trial.of("shoved", {"kicks": 30.0}, "robustness", BUDGET, 150)
+    found = walk(generate(4, 3), "shoved", trial.first, GOALS["robustness"])
+    calm = walk(generate(4, 3), "shoved", trial.first._replace(settings={"kicks": 0.0}), GOALS["robustness"])
+    assert found.falls == 1.0 and calm.falls == 0.0
+    assert found.tracking < 0.8 * calm.tracking

@@ -1,0 +1,194 @@
+"""The page in Chromium: sliders moved, creature changed, command followed, files saved: `make check-studio`."""
+
+import re
+import threading
+import time
+
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite.animation.studio.session import Session
+from arc_suite.animation.studio.sketch import FILE, Sketch
+from arc_suite.robots import generator
+from arc_suite.robots.spec_files import body_from_json, body_to_json
+
+viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
+from arc_suite.animation.studio import page as pages  # noqa: E402
+
+_PATIENCE = 240.0  # s: a browser that draws without a graphics card is slow
+
+HIGH = generator.generate(6, 2)
+HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
+
+
+class Served:
+    """A session and its page in a thread, with a browser's tab on it."""
+
+    def __init__(self):
+        self.session = Session(Sketch(legs=8, links=2))
+        self.addresses: list[str] = []
+        arguments = (self.session, "127.0.0.1", 8180, self.addresses.append)
+        self.thread = threading.Thread(target=pages.serve, args=arguments)
+        self.thread.start()
+        self.until(lambda: self.addresses)
+
+    def until(self, condition):
+        end = time.monotonic() + _PATIENCE
+        while not condition():
+            assert time.monotonic() < end and self.thread.is_alive()
+            time.sleep(0.05)
+
+    def close(self):
+        self.session.close()
+        self.thread.join()
+
+
+@pytest.fixture(scope="module")
+def served():
+    made = Served()
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def tab(browser, served):
+    context = browser.new_context(viewport={"width": 900, "height": 620}, accept_downloads=True)
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    tab, wrong, asked = context.new_page(), [], []
+    tab.set_default_timeout(1000.0 * _PATIENCE)
+    tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    tab.on("pageerror", lambda error: wrong.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(served.addresses[0])
+    tab.wait_for_selector("#status")
+    tab.get_by_text("Fan of the legs").wait_for()
+    yield tab
+    assert wrong == []
+    assert {url for url in asked if not url.startswith((served.addresses[0], "data:", "blob:"))} == set()
+    context.close()
+
+
+def field(tab, label):
+    """The line of a widget, by its label."""
+    return tab.locator(f"xpath=//label[text()='{label}']/ancestor::div[contains(@class, 'Flex-root')][1]")
+
+
+def press(tab, label, key, times=1):
+    thumb = field(tab, label).get_by_role("slider")
+    for _ in range(times):
+        thumb.press(key)
+
+
+def choose(tab, label, option):
+    field(tab, label).get_by_role("combobox").click()
+    tab.get_by_role("option", name=option, exact=True).click()
+
+
+def open_tab(tab, name):
+    tab.get_by_role("tab", name=name, exact=True).click()
+
+
+def saved(tab, label):
+    open_tab(tab, "Files")
+    with tab.expect_download() as download:
+        tab.get_by_role("button", name=f"Save {label}", exact=True).click()
+    return download.value.suggested_filename, download.value.path().read_bytes()
+
+
+def test_it_listens_on_this_machine_alone_and_never_asks_for_a_public_address(served):
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+", served.addresses[0])
+    assert pages._Server.request_share_url is not viser.ViserServer.request_share_url
+
+
+def test_an_address_of_another_machine_is_refused():
+    for host in ("192.0.2.1", "no-such-machine.invalid"):
+        with pytest.raises(ValueError, match=f"^host {host}: cannot listen there: [^\n]+$"):
+            pages.serve(None, host, 8180, print)
+
+
+def test_a_slider_changes_the_creature(served, tab):
+    press(tab, "Legs", "ArrowLeft", 2)
+    served.until(lambda: served.session.creature.setup.body == generator.generate(6, 2))
+    tab.get_by_text("walker_6x2 stands and can take steps").wait_for()
+    press(tab, "lower", "ArrowRight", 4)
+    served.until(lambda: served.session.creature.setup.body.name == "walker_6x2_shaped")
+    served.until(lambda: dict(served.session.creature.sketch.lengths)["lower"] == pytest.approx(1.2))
+    choose(tab, "Palette", "moss")
+    served.until(lambda: served.session.creature.setup.body.palette == "moss")
+    choose(tab, "Palette", "own")
+
+
+def test_a_bad_combination_stands_in_the_page_and_the_creature_walks_on(served, tab):
+    before = served.session.creature
+    choose(tab, "Layout", "pairs")
+    press(tab, "Legs", "ArrowLeft")
+    tab.get_by_role("alert").get_by_text("layout: expected radial for an odd number of legs").wait_for()
+    assert served.session.creature.setup.body.name == before.setup.body.name
+    choose(tab, "Layout", "own")
+    served.until(lambda: served.session.creature.sketch.legs == 5 and not served.session.error)
+
+
+def test_the_command_is_followed(served, tab):
+    open_tab(tab, "Command")
+    press(tab, "Turn", "End")
+    press(tab, "Forward", "Home")
+    served.until(lambda: np.allclose(served.session.desired, (-1.0, 0.0, 1.0)))
+    tab.evaluate("document.activeElement.blur()")  # keys go to the page, and not to a widget
+    tab.keyboard.press("i")
+    served.until(lambda: np.allclose(served.session.desired, (-0.75, 0.0, 1.0)))
+    served.until(lambda: served.session.episodes.timestep.observation["command"][0] == -0.75)
+
+
+def test_tasks_and_grounds(served, tab):
+    open_tab(tab, "Task")
+    choose(tab, "Ground", "bumps")
+    served.until(lambda: served.session.creature.setup.task_kwargs.get("arena") == "bumps")
+    choose(tab, "Task", "navigate")
+    served.until(lambda: served.session.creature.setup.task == "navigate")
+    choose(tab, "Task", "steer")
+    choose(tab, "Ground", "flat")
+    served.until(lambda: served.session.creature.setup.task_kwargs == {})
+
+
+def test_an_uploaded_body_and_the_value_that_fits(served, tab, tmp_path):
+    path = tmp_path / "high.json"
+    path.write_text(body_to_json(HIGH))
+    open_tab(tab, "Body")
+    with tab.expect_file_chooser() as chooser:
+        tab.get_by_role("button", name="Open a spec file").click()
+    chooser.value.set_files(path)
+    served.until(lambda: served.session.creature.setup.body == HIGH)
+    assert served.session.creature.sketch.source == FILE
+    tab.get_by_text("feet hang 0.1 m above the floor: standing_height 0.4 fits").wait_for()
+    tab.get_by_role("button", name="Apply: standing_height 0.4 fits").click()
+    served.until(lambda: served.session.creature.setup.body.torso.standing_height == 0.4)
+    tab.get_by_text("walker_6x2 stands and can take steps").wait_for()
+
+
+def test_files_are_saved(served, tab):
+    name, content = saved(tab, "Spec")
+    assert name == "walker_6x2.json" and body_from_json(content) == served.session.creature.setup.body
+    name, content = saved(tab, "MJCF")
+    assert name == "walker_6x2.xml" and mujoco.MjModel.from_xml_string(content.decode()).nu == 12
+    name, content = saved(tab, "Picture")
+    assert name == "walker_6x2.png" and content.startswith(b"\x89PNG")
+
+
+def test_lines_are_copied(served, tab):
+    open_tab(tab, "Files")
+    tab.get_by_role("button", name="Copy command").click()
+    line = tab.evaluate("navigator.clipboard.readText()")
+    assert line == "arc-suite view --spec walker_6x2.json --task steer"
+
+
+def test_another_visitor_sees_the_same_creature(served, tab):
+    served.session.pause(True)
+    other = tab.context.new_page()
+    other.set_default_timeout(1000.0 * _PATIENCE)
+    other.goto(served.addresses[0])
+    other.get_by_text("walker_6x2 stands and can take steps").wait_for()
+    other.close()
+    served.session.pause(False)
+    steps = served.session.episodes.steps
+    served.until(lambda: served.session.episodes.steps > steps)

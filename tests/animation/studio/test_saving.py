@@ -1,0 +1,97 @@
+"""Files that the buttons save; no viser."""
+
+import json
+import re
+
+import imageio.v3 as imageio
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite.animation import pages
+from arc_suite.animation.studio import saving
+from arc_suite.animation.studio.creature import opened
+from arc_suite.animation.studio.sketch import Sketch
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec_files import body_from_json
+
+FILES = {file.label: file for file in saving.FILES}
+AHEAD = np.array((1.0, 0.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def creature():
+    made = opened(Sketch(source="tick", width=1.1))
+    made.environment.reset()
+    return made
+
+
+def content(creature, label, desired=None):
+    return FILES[label].content(creature, creature.environment.physics.data.qpos.copy(), desired)
+
+
+def test_names(creature):
+    names = {saving.name(creature, file) for file in saving.FILES}
+    ends = (".json", ".xml", ".glb", ".html", "_play.html", ".png", ".mp4")
+    assert names == {f"tick_shaped{end}" for end in ends}
+
+
+def test_spec_and_model(creature):
+    assert body_from_json(content(creature, "Spec")) == creature.setup.body
+    model = mujoco.MjModel.from_xml_string(content(creature, "MJCF").decode())
+    assert model.nu == len(ROBOTS["tick"].joint_names)
+
+
+def test_the_model_stands_on_the_ground_of_the_task():
+    made = opened(Sketch(source="tick", ground="bumps"))
+    assert mujoco.MjModel.from_xml_string(content(made, "MJCF").decode()).nhfield == 1
+
+
+def test_a_picture(creature):
+    view = imageio.imread(content(creature, "Picture"))
+    assert view.shape == (480, 640, 3) and np.ptp(view) > 100
+
+
+def test_a_page_plays_the_walk_under_the_command(creature, monkeypatch):
+    monkeypatch.setattr(pages, "viewer", lambda: "")
+    monkeypatch.setattr(saving, "_PAGE_STEPS", 40)
+    tracks = []
+    monkeypatch.setattr(saving.pages, "page", lambda given: tracks.append(given) or "<html>")
+    assert content(creature, "Page", AHEAD) == b"<html>"
+    (track,) = tracks[0].values()
+    assert track.body == creature.setup.body and len(track.times) == 40
+    forward, start = track.quaternions[-1], track.positions[[0, -1]]
+    heading = np.array((1 - 2 * forward[3] ** 2, 2 * forward[0] * forward[3]))
+    assert (start[1] - start[0])[:2] @ heading > 0.1
+
+
+def test_a_page_to_play_in_has_the_body_and_its_law(creature, monkeypatch):
+    made = []
+    monkeypatch.setattr(saving.play, "page", lambda given: made.extend(given) or "<html>")
+    assert content(creature, "Page to play in") == b"<html>"
+    (walker,) = made
+    assert walker["name"] == "tick_shaped" and walker["policy"]["kind"] == "law"
+
+
+def test_without_a_viewer_there_is_no_page(creature, monkeypatch):
+    def viewer():
+        raise ValueError("no viewer for pages: `make web` builds it, which needs Node")
+
+    monkeypatch.setattr(saving.pages, "viewer", viewer)
+    with pytest.raises(ValueError, match="make web"):
+        content(creature, "Page")
+
+
+@pytest.mark.slow
+def test_a_film(creature, monkeypatch):
+    monkeypatch.setattr(saving, "_FILM_STEPS", 6)
+    film = content(creature, "Film", AHEAD)
+    assert film[4:8] == b"ftyp" and len(film) > 1000
+
+
+@pytest.mark.long
+def test_clips(creature):
+    made = content(creature, "Clips")
+    (length,) = np.frombuffer(made[12:16], "<u4")
+    names = {each["name"] for each in json.loads(made[20 : 20 + length])["animations"]}
+    assert made.startswith(b"glTF") and any(re.match("walk", name) for name in names)

@@ -1,0 +1,188 @@
+"""The loop: a creature in real time, another one after it, commands; no viser."""
+
+import contextlib
+import threading
+import time
+
+import numpy as np
+import pytest
+
+from arc_suite import style
+from arc_suite.animation.studio import session as sessions
+from arc_suite.animation.studio import texts
+from arc_suite.animation.studio.creature import load, opened, policy
+from arc_suite.animation.studio.history import History
+from arc_suite.animation.studio.session import Session
+from arc_suite.animation.studio.sketch import Sketch
+from arc_suite.envs.episodes import Episodes
+from arc_suite.style import metrics
+
+
+class Shown:
+    """The states that a session shows; it takes no longer than a test waits."""
+
+    def __init__(self, session):
+        self.session, self.states = session, []
+
+    def __call__(self, session, share):
+        episodes = session.episodes
+        self.states.append((session.creature.setup.body.name, episodes.steps, share, episodes.qpos(share)))
+
+    def until(self, condition, seconds=60.0):
+        end = time.monotonic() + seconds
+        while not condition():
+            assert time.monotonic() < end, "the session did not come so far"
+            time.sleep(0.01)
+
+    def steps(self, count):
+        """Wait for so many control steps of the creature that walks."""
+        target = self.session.episodes.steps + count
+        self.until(lambda: self.session.episodes.steps >= target)
+
+
+@contextlib.contextmanager
+def running(sketch=Sketch(legs=6, links=2)):  # noqa: B008
+    session = Session(sketch)
+    shown = Shown(session)
+    thread = threading.Thread(target=session.run, args=(shown,))
+    thread.start()
+    try:
+        yield session, shown
+    finally:
+        session.close()
+        thread.join()
+
+
+@pytest.mark.slow
+def test_it_walks_as_the_command_says():
+    with running() as (session, shown):
+        shown.steps(60)
+        speed, asked = session.history.speeds()[-1], session.history.desired()[-1]
+        assert asked > 0.1 and speed > 0.5 * asked
+        session.command((0.0, 0.0, 0.0))
+        shown.steps(60)
+        assert session.history.speeds()[-1] < 0.1 * asked and session.history.desired()[-1] == 0.0
+        assert session.history.contacts()[1][-1].all()  # at a stop all feet are scheduled on the ground
+        session.command(None)
+        shown.until(lambda: session.episodes.desired is None)
+
+
+def test_another_creature_walks_under_the_same_command():
+    with running() as (session, shown):
+        session.command((0.5, 0.0, 0.5))
+        session.ask(Sketch(legs=4, links=3))
+        shown.until(lambda: session.creature.sketch.legs == 4)
+        shown.steps(2)
+        np.testing.assert_array_equal(session.episodes.timestep.observation["command"][:3], (0.5, 0.0, 0.5))
+        assert shown.states[-1][0] == "walker_4x3" and len(shown.states[-1][3]) == 7 + 12
+
+
+@pytest.mark.slow
+def test_of_several_sketches_the_last_is_made():
+    with running() as (session, shown):
+        for legs in (4, 5, 7, 8, 10):
+            session.ask(Sketch(legs=legs, links=2))
+        shown.until(lambda: session.creature.sketch.legs == 10)
+        shown.steps(2)
+        assert session.creature.sketch.legs == 10
+
+
+def test_a_bad_combination_is_told_and_the_creature_walks_on():
+    with running() as (session, shown):
+        before = session.creature
+        session.ask(Sketch(legs=5, layout="pairs"))
+        shown.until(lambda: session.error)
+        assert session.error == "layout: expected radial for an odd number of legs, got 'pairs' for 5"
+        shown.steps(3)
+        assert session.creature is before
+        session.ask(Sketch(legs=5, links=2))
+        shown.until(lambda: session.creature is not before)
+        assert session.error == ""
+
+
+def test_texts_of_the_page():
+    """Whatever an error quotes is text, and no markup."""
+    with running() as (session, shown):
+        shown.steps(2)
+        session.ask(Sketch(settings='{"<img src=x>": 1}'))
+        shown.until(lambda: session.error)
+        told = texts.status(session)
+        assert 'role="alert"' in told and "&lt;img src=x&gt;" in told and "<img" not in told
+        assert "walker_6x2, steer" in told and "real time" in told
+        assert "walker_6x2 stands and can take steps" in texts.checked(session.creature)
+        assert "arc-suite view --legs 6 --links 2 --task steer" in texts.copied(session.creature.sketch)
+
+
+def test_a_mistake_of_ours_is_told_too(monkeypatch, capsys):
+    def opened(sketch):
+        raise RuntimeError("no such\nluck")
+
+    with running() as (session, shown):
+        monkeypatch.setattr(sessions, "opened", opened)
+        session.ask(Sketch(legs=4))
+        shown.until(lambda: session.error)
+        assert session.error == "RuntimeError: no such luck"
+        shown.steps(2)
+    assert "Traceback" in capsys.readouterr().err
+
+
+def test_time_can_stand_still_and_episodes_start_anew():
+    with running() as (session, shown):
+        shown.steps(10)
+        session.pause(True)
+        time.sleep(0.2)
+        steps, count = session.episodes.steps, len(shown.states)
+        shown.until(lambda: len(shown.states) > count + 5)
+        assert session.episodes.steps == steps
+        session.restart()
+        shown.until(lambda: session.episodes.steps == 0)
+        session.pause(False)
+        shown.steps(3)
+
+
+def test_a_kick_throws_the_torso():
+    with running(Sketch(legs=6, links=2, policy="zero")) as (session, shown):
+        shown.steps(20)
+        session.pause(True)
+        time.sleep(0.2)
+        session.kick(0.0)
+        velocity = session.episodes.environment.physics.data.qvel
+        speed = np.sqrt(9.81 * session.creature.setup.body.torso.standing_height)
+        shown.until(lambda: velocity[0] > 0.8 * speed)
+
+
+def test_states_lie_between_control_steps():
+    with running() as (session, shown):
+        shown.steps(20)
+    assert {share for *_, share, _ in shown.states} - {0.0, 1.0}
+    assert all(0.0 <= share < 1.0 for *_, share, _ in shown.states)
+
+
+def test_history_of_a_walk():
+    with running() as (session, shown):
+        shown.steps(40)
+        session.pause(True)
+        time.sleep(0.2)
+        history = session.history
+        assert len(history) == session.episodes.steps == len(history.times)
+        total = sum(terms.sum() for terms in history.terms().values())
+        assert total == pytest.approx(session.episodes.earned)
+        stance, schedule = history.contacts()
+        assert stance.shape == schedule.shape == (len(history), 6) and 0.0 < stance.mean() < 1.0
+
+
+def test_the_cost_of_transport_is_that_of_reports():
+    sketch = Sketch(legs=6, links=2, task="walk")
+    creature = opened(sketch)
+    episodes = Episodes(creature.environment, creature.act)
+    history = History(episodes)
+    for _ in range(100):
+        episodes.step()
+        history.observe()
+    environment = load(creature.setup)
+    track = style.record(environment, policy(sketch, environment), 0, 100)
+    np.testing.assert_allclose(episodes.environment.physics.data.qpos[:3], track.positions[-1])
+    assert history.cost_of_transport() == pytest.approx(metrics.cost_of_transport(track), rel=0.1)
+    np.testing.assert_allclose(sum(history.terms().values()), track.rewards)
+    np.testing.assert_array_equal(history.contacts()[0], track.stance)
+    np.testing.assert_array_equal(history.contacts()[1], track.schedule)

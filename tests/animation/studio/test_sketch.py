@@ -1,0 +1,151 @@
+"""What the widgets say: the body, task and policy that it makes, and lines that make the same; no viser."""
+
+import dataclasses
+import shlex
+
+import programs
+import pytest
+
+from arc_suite.animation.studio import sketch as sketches
+from arc_suite.animation.studio.creature import opened
+from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
+from arc_suite.models.soundness import flaws
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots.spec_files import body_to_json, load_body
+
+HIGH = generator.generate(6, 3)
+HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
+
+SKETCHES = {
+    "legs": Sketch(legs=6, links=2),
+    "layout": Sketch(legs=6, layout="radial", gait="wave"),
+    "shaped": Sketch(scale=2.0, fan=5.0, lengths=(("lower", 1.3), ("upper", 1.0)), speed=0.8),
+    "robot": Sketch(source="queen", ground="bumps", kicks=0.5, task="walk", preset="tuned"),
+    "shaped robot": Sketch(source="tick", width=1.2, palette="moss"),
+    "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
+    "random": Sketch(source=RANDOM, seed=7, policy="zero", palette="7"),
+    "file": Sketch(source=FILE, file=body_to_json(HIGH)),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "body"),
+    [
+        ("legs", generator.generate(6, 2)),
+        ("layout", generator.generate(6, 3, "radial")),
+        ("robot", ROBOTS["queen"]),
+        ("example", load_body("spider")),
+        ("random", generator.random_body(7).replace(palette=7)),
+        ("file", HIGH),
+    ],
+)
+def test_the_body(name, body):
+    assert sketches.body(SKETCHES[name]) == body
+
+
+def test_settings_of_the_task():
+    assert sketches.setup(SKETCHES["legs"]).task_kwargs == {}
+    assert sketches.setup(SKETCHES["robot"]).task_kwargs == {"arena": "bumps", "kicks": 0.5}
+    assert sketches.setup(SKETCHES["layout"]).task_kwargs == {"gait": "wave"}
+    own = sketches.setup(dataclasses.replace(SKETCHES["shaped"], speed=1.0)).definition.parameters.target_velocity
+    (speed,) = sketches.setup(SKETCHES["shaped"]).task_kwargs.values()
+    assert speed == pytest.approx(0.8 * own, rel=1e-3)
+
+
+def test_a_task_with_a_ground_of_its_own_ignores_the_ground():
+    sketch = dataclasses.replace(SKETCHES["example"], ground="bumps")
+    assert sketches.setup(sketch).task_kwargs == {"difficulty": 0.5}
+
+
+def test_settings_of_the_field_come_before_those_of_sliders():
+    sketch = Sketch(kicks=0.5, settings='{"kicks": 1.0, "friction": 0.5}')
+    assert sketches.setup(sketch).task_kwargs == {"kicks": 1.0, "friction": 0.5}
+
+
+def test_factors_of_links_that_the_body_lacks_are_ignored():
+    sketch = Sketch(legs=6, links=2, lengths=(("middle", 1.5), ("lower", 1.0)))
+    assert sketches.body(sketch) == generator.generate(6, 2)
+
+
+@pytest.mark.parametrize("sketch", SKETCHES.values(), ids=SKETCHES)
+def test_python_lines_make_the_same(sketch, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / sketches.file_name(sketches.source_body(sketch))).write_text(body_to_json(sketches.source_body(sketch)))
+    made = {}
+    exec(sketches.python_lines(sketch), made)
+    assert made["body"] == sketches.body(sketch)
+    assert made["environment"].task_kwargs == sketches.setup(sketch).task_kwargs
+    policy = made["policy"]
+    assert policy.act(made["environment"].reset().observation, 0.0).shape[-1:] == (len(made["body"].joint_names),)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sketch", [SKETCHES["legs"], SKETCHES["shaped"], SKETCHES["robot"]], ids=lambda s: s.source)
+def test_the_command_line_is_understood(sketch, tmp_path):
+    """The window of `view` needs a display; `evaluate` takes the same flags."""
+    body = sketches.body(sketch)
+    (tmp_path / sketches.file_name(body)).write_text(body_to_json(body))
+    program, view, *flags = shlex.split(sketches.command_line(sketch))
+    assert (program, view) == ("arc-suite", "view")
+    done = programs.arc_suite("evaluate", *flags, "--episodes=1", "--set=time_limit=0.5", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert body.name in done.stdout
+
+
+def test_command_lines():
+    assert sketches.command_line(SKETCHES["legs"]) == "arc-suite view --legs 6 --links 2 --task steer"
+    assert sketches.command_line(SKETCHES["layout"]).startswith("arc-suite view --spec walker_6x3.json --task steer")
+    assert sketches.command_line(SKETCHES["robot"]) == (
+        "arc-suite view --robot queen --task walk --set=arena=bumps --set=kicks=0.5 --preset tuned"
+    )
+    assert "--spec spider" in sketches.command_line(SKETCHES["example"])
+    assert "--spec tick_shaped.json" in sketches.command_line(SKETCHES["shaped robot"])
+    assert sketches.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task steer --policy zero")
+
+
+@pytest.mark.parametrize("name", ["legs", "robot", "example"])
+def test_a_creature_walks(name):
+    creature = opened(SKETCHES[name])
+    timestep = creature.environment.reset()
+    for _ in range(5):
+        timestep = creature.environment.step(creature.act(timestep))
+    assert not timestep.last() and creature.environment.task.definition.step_limit == float("inf")
+
+
+def test_what_check_says_can_be_applied():
+    """The body that mends the flaw comes as a file, and what the creature does stays."""
+    sketch = dataclasses.replace(SKETCHES["file"], gait="ripple", kicks=0.2, scale=1.5)
+    creature = opened(dataclasses.replace(sketch, scale=1.0))
+    (flaw,) = creature.flaws
+    assert flaw.text == "feet hang 0.1 m above the floor: standing_height 0.4 fits"
+    mended = sketches.cured(sketch, flaw.cure)
+    assert (mended.source, mended.gait, mended.kicks, mended.scale) == (FILE, "ripple", 0.2, 1.0)
+    assert sketches.body(mended).torso.standing_height == 0.4 and flaws(sketches.body(mended)) == []
+
+
+@pytest.mark.parametrize(
+    ("sketch", "message"),
+    [
+        (Sketch(legs=5, layout="pairs"), "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
+        (
+            Sketch(gait="trot"),
+            "gait 'trot' does not fit walker_8x3 with its 8 legs (fit: tripod, tetrapod, ripple, wave)",
+        ),
+        (Sketch(settings="friction=1"), 'settings: expected a JSON object, such as {"friction": 0.5}: Expecting value'),
+        (Sketch(settings="[1]"), "settings: expected a mapping of names to values, got [1]"),
+        (Sketch(settings='{"random": 1}'), "setting 'random': expected none, as every episode has a seed, got 1"),
+        (Sketch(settings='{"arena": "os:path"}'), None),
+        (Sketch(settings='{"arena": "antigravity:x"}'), "arena 'antigravity:x': files import nothing"),
+        (Sketch(palette="mos"), "Body(walker_8x3).palette: expected one of moss, "),
+        (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
+        (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
+        (Sketch(task="walk", preset="balanced"), "unknown preset 'balanced'"),
+        (Sketch(preset="sighted"), "observation: expected a block scan, as the task rough has"),
+        (Sketch(policy="ppo"), "policy ppo: none for walker_8x3-steer"),
+    ],
+)
+def test_a_bad_combination_is_one_line(sketch, message):
+    with pytest.raises(ValueError) as error:
+        opened(sketch)
+    assert "\n" not in str(error.value)
+    assert message is None or str(error.value).startswith(message)

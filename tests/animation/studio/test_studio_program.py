@@ -1,0 +1,51 @@
+"""The program: what its flags say, and one line where viser is missing."""
+
+import subprocess
+import sys
+
+import programs
+
+from arc_suite.animation.studio.sketch import FILE, OWN, Sketch
+from arc_suite.robots import generator
+from arc_suite.robots.spec_files import body_to_json
+
+# In an interpreter of its own: programs define flags of the same names.
+SKETCHES = """
+from absl import flags
+from arc_suite.cli import studio
+from arc_suite.animation.studio.sketch import *
+for arguments in {arguments}:
+    for name in flags.FLAGS:
+        flags.FLAGS[name].unparse()
+    flags.FLAGS(["studio", *arguments])
+    print(repr(studio._sketch()))
+"""
+
+
+def test_flags(tmp_path):
+    body = generator.generate(5, 2)
+    (tmp_path / "own.json").write_text(body_to_json(body))
+    arguments = {
+        (): Sketch(source="queen", task="walk"),
+        ("--legs=6", "--links=2", "--task=steer", "--preset=surefooted"): Sketch(legs=6, links=2, preset="surefooted"),
+        ("--legs=4", "--length=lower=1.5", "--palette=7"): Sketch(
+            legs=4, lengths=(("lower", 1.5),), palette="7", task="walk"
+        ),
+        ("--spec=spider", "--set=arena=bumps", "--set=kicks=0.5", "--set=friction=0.7"): Sketch(
+            source="spider", task="walk", ground="bumps", kicks=0.5, settings='{"friction": 0.7}'
+        ),
+        ("--spec=own.json", "--policy=zero"): Sketch(
+            source=FILE, file=body_to_json(body), task="walk", policy="zero", preset=OWN
+        ),
+    }
+    code = SKETCHES.format(arguments=[list(each) for each in arguments])
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert [eval(line) for line in done.stdout.splitlines()] == list(arguments.values())
+
+
+def test_without_viser_a_line_says_how_to_get_it(tmp_path):
+    done = programs.without("viser", tmp_path, "studio", "--robot=tick")
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("arc-suite studio: the studio needs viser: pip install")
+    assert programs.install("studio") in done.stderr

@@ -1,0 +1,227 @@
+"""Pages to play in: the ports of law, task and networks against Python, and what is in a page."""
+
+import base64
+import json
+import math
+import pathlib
+import re
+import zlib
+
+import networks
+import nodes
+import numpy as np
+import programs
+import pytest
+
+from arc_suite.animation import pages, play
+from arc_suite.envs.setup import Setup
+from arc_suite.policies import alone, network, policy, universal
+from arc_suite.robots import ROBOTS, generator
+
+BODIES = {body.name: body for body in (*ROBOTS.values(), *map(generator.random_body, range(10)))}
+STEPS = 200  # 10 s for the robots
+
+# Walks with turns, steps to either side and stops, each held as long.
+SCRIPT = [(1.0, 0.0, 0.0), (0.6, 0.0, 0.4), (0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, -1.0)]
+SCRIPT += [(0.5, -0.25, -0.25), (0.0, 0.0, 0.0)]
+
+
+@pytest.fixture(scope="module")
+def script(tmp_path_factory):
+    path = pathlib.Path(__file__).parents[1] / "engines" / "closed_loop.js"
+    return nodes.bundled(path, tmp_path_factory.mktemp("node"))
+
+
+def commands(steps):
+    held = math.ceil(steps / len(SCRIPT))
+    return [SCRIPT[step // held] for step in range(steps)]
+
+
+def played(setup, driver, given):
+    """The start of an episode of Python, and for each step its state after it, its action and what was observed."""
+    environment, act = setup.load(seed=3), alone(driver)
+    timestep, data = environment.reset(), environment.physics.data
+    desired = timestep.observation.get("command", np.zeros(6))[:3]
+    start = {"qpos": data.qpos.tolist(), "qvel": data.qvel.tolist(), "desired": desired.tolist()}
+    positions, actions, observations = [], [], []
+    for command in given:
+        if environment.task.definition.commands:
+            environment.command("command", command)
+        observations.append(timestep.observation)
+        timestep = environment.step(act(timestep))
+        assert not timestep.last()
+        positions.append(data.qpos.copy())
+        actions.append(data.ctrl.copy())
+    return start, np.array(positions), np.array(actions), observations
+
+
+def assert_walks_agree(script, body, steps, preset="steered"):
+    """A body under commands goes where it goes in Python, and so do the actions: in closed loop, each by its own."""
+    setup, given = Setup.of(body, "steer", {"time_limit": 1e6}), commands(steps)
+    start, positions, actions, _ = played(setup, policy("cpg", body, preset, task=setup.definition), given)
+    episode = {"creature": play.creature(body, "cpg", preset), "ground": "level", "commands": given, **start}
+    (found,) = nodes.run(script, [episode])
+    np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=1e-9)
+    assert np.ptp(positions[:, :2], axis=0).max() > 0.2 * body.torso.standing_height  # it does walk
+
+
+@pytest.mark.slow
+@nodes.needs_node
+@pytest.mark.parametrize(("name", "preset"), [("tick", "steered"), ("random_4", "surefooted")])
+def test_a_short_walk_is_that_of_python(script, name, preset):
+    assert_walks_agree(script, BODIES[name], 64, preset)
+
+
+@pytest.mark.release
+@nodes.needs_node
+@pytest.mark.parametrize("name", BODIES)
+def test_walks_of_ten_seconds_are_those_of_python(script, name):
+    assert_walks_agree(script, BODIES[name], STEPS)
+
+
+def assert_networks_agree(script, setup, driver, name):
+    """In states that Python went through, a network observes and does the same."""
+    given = commands(16) if setup.definition.commands else [(0.0, 0.0, 0.0)] * 16  # else they turn the course
+    start, positions, actions, observations = played(setup, driver, given)
+    creature = play.creature(setup.body, name)
+    episode = {"creature": creature, "ground": "level", "commands": given, "replayed": actions.tolist(), **start}
+    (found,) = nodes.run(script, [episode])
+    np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=1e-9)
+    for block in creature["policy"]["constants"]["blocks"]:
+        ported = [observation[block] for observation in found["observations"]]
+        np.testing.assert_allclose(ported, [observation[block] for observation in observations], rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=1e-5)  # float32: sums differ by processor
+
+
+@pytest.mark.slow
+@nodes.needs_node
+def test_a_packaged_policy_is_that_of_python(script):
+    excluded = {"exclude_blocks": ["contact_forces"]}
+    assert_networks_agree(script, Setup.of("queen", "walk", excluded), policy("ppo", ROBOTS["queen"]), "ppo")
+
+
+@pytest.mark.slow
+@nodes.needs_node
+def test_layers_of_all_kinds_and_all_blocks_are_those_of_python(script, tmp_path):
+    made = networks.made("tick", "steer")
+    assert {layer.kind for layer in made.layers} == set(network.KINDS) - {"legs"}
+    assert set(made.blocks) == {"posture", "velocities", "contact_forces", "gait_clock", "command"}
+    network.save(tmp_path / "policy.npz", made)
+    assert_networks_agree(script, made.setup, made, str(tmp_path))
+
+
+@pytest.mark.slow
+@nodes.needs_node
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_a_policy_of_any_body_is_that_of_python(script, tmp_path, task):
+    body = BODIES["random_4"]
+    made, setup = universal.load("universal", Setup.of(body, task).definition), Setup.of(body, task)
+    network.save(tmp_path / "policy.npz", made)
+    name = "universal" if task == "steer" else str(tmp_path)
+    assert_networks_agree(script, setup, policy(name, body, task=setup.definition), name)
+
+
+@pytest.mark.slow
+@nodes.needs_node
+def test_heights_on_bumps_are_those_of_python(script):
+    """Contacts with height fields differ between versions of MuJoCo; heights over them do not."""
+    arena = Setup.of("tick", "steer", {"arena": "bumps"}).definition.scene.arena
+    creature = play.creature(ROBOTS["tick"])
+    places = np.random.default_rng(0).uniform((-20.0, -5.0), (20.0, 5.0), (40, 2))  # beyond the edges, too
+    episodes = [
+        {
+            "creature": creature,
+            "ground": "bumps",
+            "qpos": [*place, 1.0, *creature["grounds"]["bumps"]["start"][3:]],
+            "qvel": [],
+            "desired": [0.0, 0.0, 0.0],
+            "commands": [[0.0, 0.0, 0.0]],
+        }
+        for place in places
+    ]
+    heights = [path["observations"][0]["posture"][0] for path in nodes.run(script, episodes)]
+    np.testing.assert_allclose(heights, 1.0 - arena.height(*places.T), rtol=0.0, atol=1e-12)
+    assert np.ptp(heights) > 0.02
+
+
+@pytest.mark.slow
+@nodes.needs_node
+@pytest.mark.parametrize("ground", play.GROUNDS)
+def test_bodies_walk_from_their_start(script, ground):
+    """Ahead as fast as the command says or nearly so, on either ground, and upside down is a fall."""
+    body, steps = ROBOTS["tick"], 100
+    creature = play.creature(body)
+    walk = {"qpos": creature["grounds"][ground]["start"], "qvel": [], "desired": [0.0, 0.0, 0.0]}
+    walk |= {"creature": creature, "ground": ground, "commands": [[1.0, 0.0, 0.0]] * steps}
+    over = walk | {"qpos": [0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, *walk["qpos"][7:]], "commands": [[0.0, 0.0, 0.0]] * 20}
+    walked, lain = nodes.run(script, [walk, over])
+    task = creature["task"]
+    assert walked["positions"][-1][0] > 0.6 * steps * task["step"] * task["units"][0]
+    assert not any(walked["falls"]) and lain["falls"][-1]
+
+
+def test_what_a_page_holds_of_a_body(monkeypatch):
+    """Names of bodies come from files of others: they are text."""
+    monkeypatch.setattr(pages, "built", lambda name: f"built {name}".encode())
+    creature = play.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
+    page = play.page([creature])
+    assert "<title>&lt;leaper&gt;</title>" in page
+    (data,) = re.findall(r'<script id="data" type="text/plain">([^<]*)</script>', page)
+    assert json.loads(zlib.decompress(base64.b64decode(data))) == [creature]
+    assert page == play.page([creature])
+    assert all('integrator="Euler"' in ground["xml"] for ground in creature["grounds"].values())
+
+
+def test_a_page_begins_with_the_licences(monkeypatch):
+    monkeypatch.setattr(pages, "built", lambda name: b"[" + name.encode() + b"]")
+    page = play.page([play.creature(ROBOTS["leaper"])])
+    assert page.index('<meta charset="utf-8">') < 200  # where browsers look for it
+    order = ["Apache License", "Third-party licenses", "Qhull", "-->", "[play.js]", "<body>", 'id="engine"']
+    places = [page.index(text) for text in order]
+    assert places == sorted(places)
+
+
+@pytest.mark.slow
+@nodes.needs_viewer
+def test_the_program_writes_a_page(tmp_path):
+    done = programs.arc_suite("play", "--robot=queen", "-o", "queen.html", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert re.fullmatch(r"wrote queen.html, 4\.\d MB\n", done.stdout)
+    page = (tmp_path / "queen.html").read_text()
+    head = page[: page.index("<style>")]
+    assert "Apache License" in head and "Third-party licenses" in head
+    assert "Permission is hereby granted, free of charge" in head  # three.js's
+
+
+@pytest.mark.parametrize(
+    ("flags", "message"),
+    [
+        ((), "no file to write; say --output=FILE.html"),
+        (("-o", "a.htm"), "unknown extension '.htm'; did you mean '.html'? (there are: .html)"),
+        (("-o", "a.html", "--policy=zero"), "policy zero: a page runs cpg, ppo, universal, or one trained network"),
+        (
+            ("-o", "a.html", "--preset=sighted"),
+            "preset 'sighted': a page runs steered, surefooted or reactive, which follow a command by joint angles",
+        ),
+        (("-o", "a.html", "--policy=none/there.npz"), "cannot read none/there.npz: no such file"),
+    ],
+)
+def test_errors_are_one_line(tmp_path, flags, message):
+    done = programs.arc_suite("play", "--robot=tick", *flags, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (1, f"arc-suite play: {message}\n")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("task", "settings", "message"),
+    [
+        ("rough", {}, "observes scan, and a page has"),
+        ("steer", {"actions": "position"}, "its actions are a position a joint, and a page takes torques"),
+    ],
+)
+def test_networks_that_a_page_cannot_run(tmp_path, task, settings, message):
+    made = networks.made("tick", task)
+    network.save(tmp_path / "policy.npz", made._replace(setup=Setup.of("tick", task, settings)))
+    with pytest.raises(ValueError, match=message):
+        play.creature(ROBOTS["tick"], str(tmp_path))

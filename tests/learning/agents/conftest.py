@@ -1,0 +1,91 @@
+"""What tests of agents share: a small dataset of prior data, and learners on a stage of their own."""
+
+import importlib.util
+import os
+
+os.environ.setdefault("NPROC", "1")  # one thread, as the program does; read when JAX is imported
+os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false")
+
+import inspect
+
+import pytest
+
+from arc_suite import data
+from arc_suite.envs.setup import Setup
+from arc_suite.learning.agents import algorithms
+from arc_suite.learning.agents.learner import RunContext
+
+SMALL = {"hidden": 16, "batch": 8, "start_steps": 20}
+SHORT = {"time_limit": 2.0}  # s: episodes of 40 steps
+PHASES = {"phase_every": 100, "phase_updates": 60, "check_every": 20, "patience": 40, "scored_batches": 1}
+FEW = {"num_envs": 10, "utd_ratio": 0.2}
+
+
+def small(name, **changes):
+    """Hyperparameters of small networks, batches and phases, and of few environments."""
+    hp = algorithms.algorithm(name).hyperparameters
+    return SMALL | (PHASES if hp.phase_updates else {}) | (FEW if hp.num_envs > 1 else {}) | changes
+
+
+class Learning:
+    """A learner's generator; the attributes are the local variables of `learn` after the latest slice."""
+
+    def __init__(self, slices):
+        self.slices, self.latest = slices, None
+
+    def advance(self):
+        """Learn a slice, and return it."""
+        self.latest = next(self.slices)
+        return self.latest
+
+    def until(self, step):
+        """Learn up to an environment step, phases included, and return the latest slice."""
+        while self.latest is None or self.latest.step < step:
+            self.advance()
+        return self.latest
+
+    def __getattr__(self, name):
+        return inspect.getgeneratorlocals(self.slices)[name]
+
+
+def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_every=1, **context):
+    """Begin to learn; slices end after every step unless told otherwise."""
+    definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters)
+    fields = {"seed": 0, "steps": steps, "evaluate_every": evaluate_every, "folder": folder} | context
+    return Learning(definition.module.learn(definition.hyperparameters, RunContext(setup, **fields)))
+
+
+@pytest.fixture(autouse=True)
+def single_precision():
+    """As the program has it, whatever other tests of this process have set."""
+    if importlib.util.find_spec("jax") is None:
+        yield
+        return
+    import jax
+
+    with jax.enable_x64(False):
+        yield
+
+
+@pytest.fixture(scope="session")
+def prior(tmp_path_factory):
+    """Id of a dataset of Tick, 30 episodes of 40 steps."""
+    patch = pytest.MonkeyPatch()
+    patch.setenv("MINARI_DATASETS_PATH", str(tmp_path_factory.mktemp("datasets")))
+    settings = data.Settings(Setup.of("tick", "walk", SHORT), "cpg", ("medium",))
+    data.collect(settings.dataset_id(), settings, 30, num_envs=15, threads=1)
+    yield settings.dataset_id()
+    patch.undo()
+
+
+@pytest.fixture
+def learner(tmp_path, prior):
+    """A function that begins to learn by an algorithm, with changed hyperparameters."""
+
+    def begin(name, hyperparameters, **context):
+        needs = algorithms.algorithm(name).hyperparameters.prior != "none"
+        context = {"folder": tmp_path / "run", "prior": prior if needs else None} | context
+        context = {"setup": Setup.of("tick", "walk", SHORT)} | context
+        return learning(name, hyperparameters, **context)
+
+    return begin

@@ -1,0 +1,141 @@
+"""One policy for many bodies: imitation, proximal policy optimisation from it, and its network of legs."""
+
+import numpy as np
+import pytest
+from conftest import learning
+from numpy.testing import assert_allclose, assert_array_equal
+
+pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+
+import jax
+
+from arc_suite.envs.bodies.bodies_setup import BodiesSetup
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import anchors
+from arc_suite.learning.agents.architectures import PerLeg
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.training import train
+from arc_suite.policies import network, policy
+from arc_suite.tasks import tokens
+
+SETUP = BodiesSetup.of("random:0-1", "steer", {"time_limit": 0.5})
+SMALL = {"num_envs": 4, "round": 8, "left_out": 2, "updates": 20, "last_updates": 40, "batch": 32, "hidden": 8}
+PPO = {"num_envs": 4, "horizon": 6, "minibatch": 8, "hidden": 8, "value_warm_up": 6}
+
+
+@pytest.fixture(scope="module")
+def vectors():
+    """Observations of two bodies."""
+    return SETUP.make_vec(2, seed=0).reset(seed=0)[0]
+
+
+def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
+    architecture = PerLeg()
+    parameters = architecture.drawn(np.random.default_rng(0), 16)
+    layer = architecture.normalise(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
+    normalised = network.forward([layer], vectors)
+    expected = np.asarray(architecture.actions(parameters, normalised))
+    layers = architecture.exported(parameters)
+    assert_allclose(network.forward(layers, normalised), expected, atol=1e-5)
+    again = architecture.imported(layers)
+    assert_array_equal(np.asarray(architecture.actions(again, normalised)), expected)
+    assert not expected[~SETUP.make_vec(2).unwrapped.description.mask.reshape(2, -1)].any()
+    with pytest.raises(ValueError, match="^a policy of different bodies$"):
+        architecture.imported((network.Layer("clip"),))
+
+
+def test_the_order_of_legs_does_not_matter(vectors):
+    """Actions follow the legs, and values stay."""
+    architecture = PerLeg()
+    random = np.random.default_rng(0)
+    of_actions, of_values = architecture.drawn(random, 16), architecture.drawn_values(random, 16)
+    legs = int(tokens.leg_inputs(vectors[:1])[1].any(axis=-1).sum())
+    order = np.arange(tokens.LEGS)
+    order[:legs] = order[:legs][::-1]
+    ends = np.cumsum(list(tokens.FLAT.values()))[:-1]
+    parts = [part.reshape(-1) for part in np.split(vectors[0], ends)]
+    for place in (0, 3):
+        parts[place] = parts[place].reshape(tokens.LEGS, -1)[order].ravel()
+    other = np.concatenate(parts)
+    both = np.stack([vectors[0], other])
+    actions, turned = np.asarray(architecture.actions(of_actions, both)).reshape(2, 12, 4)
+    assert_allclose(turned, actions[order], atol=1e-5)
+    values = np.asarray(architecture.values(of_values, both))
+    assert values[0] == pytest.approx(values[1], abs=1e-5)
+
+
+def test_normalised_observations_keep_the_number_of_joints(vectors):
+    architecture = PerLeg()
+    seen = architecture.seen(vectors)
+    layer = architecture.normalise(Moments.none(architecture.inputs).after(seen))
+    inputs, mask = tokens.leg_inputs(network.forward([layer], vectors))
+    assert_array_equal(mask, tokens.leg_inputs(vectors)[1])
+    there = inputs[mask.any(axis=-1)]
+    scaled = np.delete(there, np.arange(20, 24), axis=-1)
+    assert abs(scaled.mean(axis=0)).max() < 0.1
+    assert scaled.std(axis=0).max() < 1.05
+    assert_array_equal(there[:, 20:24].sum(axis=-1), 1.0)
+
+
+@pytest.mark.parametrize("algorithm", ["dagger_bodies", "finetune_bodies"])
+def test_it_resumes_bit_exactly(algorithm, tmp_path):
+    """Episodes of ten steps begin and end meanwhile; demonstrators have a memory."""
+    changes = SMALL
+    if algorithm == "finetune_bodies":
+        start = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
+        assert train(start, tmp_path / "start")
+        changes = PPO | {"start": str(tmp_path / "start")}
+
+    def begun(checkpoint=None):
+        return learning(algorithm, changes, tmp_path, SETUP, 96, 96, checkpoint=checkpoint)
+
+    whole, first = begun(), begun()
+    arrays = {name: array.copy() for name, array in first.advance().checkpoint.items()}
+    second = begun(arrays)
+    for other in (first, second):
+        for name, array in whole.until(96).checkpoint.items():
+            assert_array_equal(other.until(96).checkpoint[name], array, err_msg=name)
+    finite = jax.tree.map(np.isfinite, whole.latest.policy[1].arrays)
+    assert all(each.all() for each in finite)
+
+
+def test_a_run_makes_a_policy_of_any_body(tmp_path):
+    run = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
+    assert run.name == "random.0-1-steer-dagger_bodies-0"
+    assert train(run, tmp_path / "run")
+    assert Configuration.from_dict(run.to_dict()) == run
+    made = network.load(tmp_path / "run")
+    assert made.setup == SETUP
+    environment = Setup.of("leaper", "steer", {"time_limit": 0.5}).load()
+    acting = policy(tmp_path / "run", "leaper", task=environment.task.definition)
+    blocks = {name: block[None] for name, block in environment.reset().observation.items()}
+    assert acting.act(blocks).shape == (1, 12)
+
+
+def test_anchors_are_means_over_bodies_of_validation():
+    scale = anchors.anchors(BodiesSetup.of("random:0-1", "walk", {"time_limit": 1.0}).validation(2))
+    assert scale.preset == "of each body" and scale.demonstrator > scale.zero > 0.0
+
+
+def test_what_learns_with_one_body_alone_is_one_line():
+    those = "ppo, finetune, dagger, dagger_bodies, finetune_bodies"
+    expected = f"^algorithm sac: learns with one body, got random:0-1; with several: {those}$"
+    with pytest.raises(ValueError, match=expected):
+        Configuration.of(SETUP, "sac")
+
+
+def test_a_start_of_other_layers_is_one_line(tmp_path):
+    run = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
+    assert train(run, tmp_path / "start")
+    begun = learning("finetune_bodies", PPO | {"start": str(tmp_path / "start"), "hidden": 16}, tmp_path, SETUP)
+    with pytest.raises(ValueError, match=r"start: expected 16 hidden units, got 8$"):
+        begun.advance()
+
+
+def test_a_start_of_one_body_is_one_line(tmp_path):
+    run = Configuration.of(Setup.of("leaper", "steer"), "dagger", SMALL, steps=64, evaluate_every=64)
+    assert train(run, tmp_path / "one")
+    begun = learning("finetune_bodies", PPO | {"start": str(tmp_path / "one")}, tmp_path, SETUP)
+    with pytest.raises(ValueError, match=r"one: expected one of many bodies, got one of leaper$"):
+        begun.advance()

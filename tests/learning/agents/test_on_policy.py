@@ -1,0 +1,311 @@
+"""Proximal policy optimisation."""
+
+import dataclasses
+import shutil
+
+import numpy as np
+import pytest
+from conftest import learning
+from numpy.testing import assert_allclose, assert_array_equal
+
+pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+
+import jax
+
+from arc_suite.envs.setup import Setup
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.learning.agents import on_policy, run_folder
+from arc_suite.learning.agents import proximal_policy as ppo
+from arc_suite.learning.agents.architectures import Perceptron
+from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.hyperparameters import ProximalPolicy
+from arc_suite.learning.agents.training import train
+from arc_suite.policies import network
+from arc_suite.robots import generator
+from arc_suite.tasks import command
+
+CHANGES = {"num_envs": 4, "horizon": 8, "minibatch": 16, "epochs": 2, "hidden": 16}
+SIZES = Perceptron((6,), 3)
+SMALL = ProximalPolicy(**CHANGES)
+
+
+@pytest.fixture
+def begun(tmp_path):
+    """A function that begins to learn."""
+
+    def begin(robot="leaper", task="walk", changes=(), steps=320, **context):
+        context = {"setup": Setup.of(robot, task, context.pop("settings", None)), "seed": 3} | context
+        return learning("ppo", CHANGES | dict(changes), tmp_path, steps=steps, evaluate_every=steps, **context)
+
+    return begin
+
+
+def rolled_out(agent):
+    """Transitions of a horizon from the latest slice on, and the batch that they make."""
+    rollout = agent.collector.roll_out(agent.state.policy, agent.normalise, 0.3, 0, 0)
+    return rollout, on_policy.batch_of(
+        agent.hp, agent.collector.architecture, rollout, agent.state.values, agent.normalise, agent.symmetry
+    )
+
+
+def weights(tree):
+    return np.concatenate([np.ravel(leaf) for leaf in jax.tree.leaves(tree)])
+
+
+@pytest.fixture
+def imitated(tmp_path):
+    """The folder of a short run of DAgger."""
+    changes = {"num_envs": 4, "round": 10, "left_out": 0, "hidden": 16, "batch": 64}
+    setup = Setup.of("leaper", "walk", {"time_limit": 0.5})
+    assert train(Configuration.of(setup, "dagger", changes, steps=80, evaluate_every=80), tmp_path / "imitated")
+    return tmp_path / "imitated"
+
+
+def test_advantages_are_discounted_sums_of_surprises_within_an_episode():
+    hp = ProximalPolicy(discount=0.9, gae_lambda=0.8)
+    random = np.random.default_rng(0)
+    rewards, values, next_values = random.normal(size=(3, 12, 5))
+    terminated = random.uniform(size=(12, 5)) < 0.15
+    ended = terminated | (random.uniform(size=(12, 5)) < 0.15)
+    assert (ended & ~terminated).any() and terminated.any()
+    found = ppo.advantages(hp, rewards, values, next_values, terminated, ended)
+    for step in range(12):
+        for place in range(5):
+            total, factor = 0.0, 1.0
+            for later in range(step, 12):
+                worth = 0.0 if terminated[later, place] else next_values[later, place]
+                total += factor * (rewards[later, place] + 0.9 * worth - values[later, place])
+                factor *= 0.9 * 0.8
+                if ended[later, place]:
+                    break
+            assert found[step, place] == pytest.approx(total, abs=1e-12)
+
+
+def batch(random, count=64, size=6, joints=3):
+    arrays = random.normal(size=(count, size)), random.normal(size=(count, joints)), np.zeros((count, joints))
+    return ppo.Batch(*(array.astype(np.float32) for array in (*arrays, random.normal(size=count), np.ones(count))))
+
+
+def test_the_policy_moves_towards_what_earned_more_and_values_towards_returns():
+    hp, random = dataclasses.replace(SMALL, policy_rate=1e-3), np.random.default_rng(0)
+    state = ppo.begin(hp, SIZES, random)
+    given = batch(random)
+    given = given._replace(means=np.asarray(ppo.mean_action(SIZES, state.policy, given.observations)))
+    before = np.asarray(ppo.value(SIZES, state.values, given.observations))
+    orders = np.tile(np.arange(64), (30, 1))
+    after, divergence, _ = ppo.update(hp, SIZES, state, given, orders, (np.float32(0.5), np.float32(0.01)), True)
+    moved = np.asarray(ppo.mean_action(SIZES, after.policy, given.observations)) - given.means
+    gained = (moved * (given.actions - given.means)).sum(axis=-1) * given.advantages
+    assert gained.mean() > 0.0
+    acted = moved[: hp.num_envs * hp.horizon]  # what follows are images
+    assert divergence == pytest.approx((acted**2).sum(axis=-1).mean() / (2 * 0.5**2), rel=1e-3)
+    values = np.asarray(ppo.value(SIZES, after.values, given.observations))
+    assert abs(values - 1.0).mean() < 0.8 * abs(before - 1.0).mean()
+
+
+def test_nothing_is_gained_beyond_the_clip():
+    """Where all ratios are beyond the clip on the side that pays, the policy has no gradient."""
+    hp, random = dataclasses.replace(SMALL, clip=0.2), np.random.default_rng(0)
+    state = ppo.begin(hp, SIZES, random)
+    given = batch(random)
+    means = np.asarray(ppo.mean_action(SIZES, state.policy, given.observations))
+    given = given._replace(means=means + 1.0, actions=means, advantages=np.ones(64, np.float32))
+    before = weights(state.policy)
+    orders, numbers = np.arange(64)[None], (np.float32(0.5), np.float32(0.01))
+    after, *_ = ppo.update(hp, SIZES, state, given, orders, numbers, True)
+    assert_array_equal(weights(after.policy), before)
+
+
+@pytest.mark.parametrize(("wanted", "factor"), [(1e-9, 1 / 1.5), (1e9, 1.5)])
+def test_the_rate_follows_the_divergence(wanted, factor):
+    random = np.random.default_rng(0)
+    state, given = ppo.begin(SMALL, SIZES, random), batch(random)
+    orders, numbers = np.arange(64)[None], (np.float32(0.5), np.float32(wanted))
+    after, *_ = ppo.update(SMALL, SIZES, state, given, orders, numbers, True)
+    assert after.rate == pytest.approx(SMALL.policy_rate * factor)
+
+
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_it_resumes_bit_exactly(begun, task):
+    whole, first = begun("tick", task), begun("tick", task)
+    arrays = {name: array.copy() for name, array in first.until(128).checkpoint.items()}
+    second = begun("tick", task, checkpoint=arrays)
+    for name, array in whole.until(320).checkpoint.items():
+        assert_array_equal(second.until(320).checkpoint[name], array, err_msg=name)
+
+
+def test_a_new_command_cuts_the_returns(begun, monkeypatch):
+    """The step that begins it bootstraps from the observation before."""
+    monkeypatch.setattr(command, "SHORTEST", 3)
+    monkeypatch.setattr(command, "LONGEST", 6)
+    agent = begun("tick", "steer", {"horizon": 24})
+    agent.advance()
+    rollout, _ = rolled_out(agent)
+    split = agent.collector.environment.task.split
+    here, there = (split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations"))
+    assert_array_equal(there, here)
+    new = (here[1:] != here[:-1]).any(axis=-1)
+    assert rollout["ended"][:-1][new].all()
+    drawn = new & ~rollout["terminated"][:-1]
+    assert drawn.sum() > 8
+    before, after = (rollout[name][:-1] for name in ("observations", "next_observations"))
+    assert_array_equal(before[drawn], after[drawn])
+    # A stop may follow a stop, and is another command, too.
+    moving = ~new & here[:-1].any(axis=-1)
+    assert not rollout["ended"][:-1][moving].any()
+    assert (before[moving] != after[moving]).any(axis=-1).all()
+
+
+def test_blocks_of_the_observation_weigh_alike():
+    architecture = Perceptron.of(Setup.of("tick", "steer").definition)
+    squares = architecture.scale.astype(float) ** 2
+    assert len(squares) == architecture.size and squares.mean() == pytest.approx(1.0)
+    ends = np.cumsum(architecture.blocks)
+    sums = [part.sum() for part in np.split(squares, ends[:-1])]
+    assert_allclose(sums, architecture.size / len(architecture.blocks), rtol=1e-5)
+    assert_array_equal(Perceptron((6,), 3).scale, np.ones(6))
+    assert_array_equal(Perceptron((6, 0), 3).scale, np.ones(6))
+
+
+def test_a_network_is_exported_and_imported_as_it_acts():
+    architecture = Perceptron((2, 150, 6), 3)
+    random = np.random.default_rng(0)
+    parameters = architecture.drawn(random, 16)
+    x = random.normal(size=(5, 158)).astype(np.float32)
+    layers = architecture.exported(parameters)
+    acted = network.forward(layers, x)
+    assert_allclose(acted, ppo.mean_action(architecture, parameters, x), atol=1e-5)
+    assert_allclose(ppo.mean_action(architecture, architecture.imported(layers), x), acted, atol=1e-5)
+
+
+def test_every_transition_has_a_mirrored_one(begun):
+    agent = begun()
+    agent.until(64)
+    rollout, given = rolled_out(agent)
+    assert len(given.returns) == 2 * 32
+    for name in ("advantages", "returns"):
+        both = np.asarray(getattr(given, name))
+        assert_array_equal(both[:32], both[32:])
+    for name in ("actions", "means"):
+        both = np.asarray(getattr(given, name))
+        assert_array_equal(agent.symmetry.action(both[:32]), both[32:])
+    mirrored = agent.symmetry.observation(rollout["observations"].reshape(32, -1))
+    assert_array_equal(network.forward([agent.normalise], mirrored), given.observations[32:])
+    # The normaliser has seen as much of the left as of the right.
+    assert_allclose(agent.symmetry.observation(agent.moments.mean), agent.moments.mean, atol=1e-9)
+
+
+def test_a_body_without_symmetry_has_no_mirrored_transitions(begun):
+    agent = begun(generator.random_body(10))
+    agent.advance()
+    assert len(rolled_out(agent)[1].returns) == 32
+
+
+def test_time_limits_fall_on_different_steps_and_bootstrap(begun):
+    agent = begun(settings={"time_limit": 0.4, "healthy_range": (-10.0, 10.0)}, steps=64)
+    seen = []
+    step = VectorEnv.step
+
+    def recording(self, actions):
+        result = step(self, actions)
+        seen.append(result[2] | result[3])
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(VectorEnv, "step", recording)
+        agent.advance()
+    assert [np.flatnonzero(ended).tolist() for ended in np.array(seen).T] == [[7], [5], [3], [1]]
+    rollout, given = rolled_out(agent)
+    assert not rollout["terminated"].any()
+    # After the last step of an episode comes its own last observation, not the next one's first.
+    last = rollout["next_observations"][1, 3]
+    assert rollout["ended"][1, 3] and not np.array_equal(last, rollout["observations"][2, 3])
+    split = agent.collector.environment.task.split
+    assert_allclose(split(rollout["observations"][2, 3])["gait_clock"], (0.0, 1.0))
+    assert split(last)["gait_clock"][0] > 0.1
+    value = np.asarray(
+        ppo.value(agent.collector.architecture, agent.state.values, network.forward([agent.normalise], last[None]))
+    )[0]
+    expected = (1.0 - agent.hp.discount) * rollout["rewards"][1, 3] + agent.hp.discount * value
+    assert np.asarray(given.returns)[:32].reshape(8, 4)[1, 3] == pytest.approx(expected, rel=1e-5)
+
+
+def test_schedules(begun):
+    """The standard deviation falls, and the normaliser stays from a part of the run on."""
+    agent = begun(changes={"normalize_until": 0.5})
+    assert agent.advance().metrics["std"] == SMALL.initial_std
+    before = agent.until(192).policy[0].arrays[0]
+    assert_array_equal(agent.until(320).policy[0].arrays[0], before)
+    ratio = SMALL.final_std / SMALL.initial_std
+    assert agent.latest.metrics["std"] == pytest.approx(SMALL.initial_std * ratio**0.9)
+
+
+def test_it_starts_from_a_policy_with_a_warm_up_of_the_values(begun, imitated):
+    agent, start = begun(changes={"start": str(imitated), "value_warm_up": 16}), network.load(imitated)
+    observations = np.random.default_rng(0).normal(size=(5, sum(start.blocks.values()))).astype(np.float32)
+    values = None
+    for _ in range(2):  # the warm-up
+        latest = agent.advance()
+        assert_array_equal(network.forward(latest.policy, observations), start.actions(observations))
+        assert values is None or (weights(agent.state.values) != values).mean() > 0.3  # some inputs never move
+        values = weights(agent.state.values)
+    latest = agent.advance()
+    assert not np.array_equal(latest.policy[1].arrays[0], start.layers[1].arrays[0])
+    assert_array_equal(latest.policy[0].arrays[0], start.layers[0].arrays[0])
+
+
+def test_a_run_resumes_without_the_policy_that_it_started_from(tmp_path, imitated):
+    changes = CHANGES | {"start": str(imitated), "value_warm_up": 8}
+    setup = Setup.of("leaper", "walk", {"time_limit": 0.5})
+    run, seen = Configuration.of(setup, "finetune", changes, steps=96, evaluate_every=32), []
+    assert not train(run, tmp_path / "run", minutes=0.0)
+
+    def interrupting(step, metrics):
+        if step == 64:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        train(run, tmp_path / "run", on_metrics=interrupting)
+    shutil.rmtree(imitated)
+    assert train(run, tmp_path / "run", on_metrics=lambda step, metrics: seen.append(step))
+    assert seen == [64, 64, 96, 96]
+
+
+def test_a_start_that_does_not_fit_is_refused_in_one_line(begun, tmp_path, imitated):
+    observations = "a policy of walk for other observations than those of steer: command has 0 numbers, and not 6"
+    start = {"start": str(imitated)}
+    for robot, task, changes, message in (
+        ("leaper", "steer", start, f"{imitated}: {observations}"),
+        ("leaper", "walk", start | {"hidden": 32}, f"{imitated}: expected 32 hidden units, got 16"),
+        ("tick", "walk", start, f"policy {imitated}: made for leaper, and not for tick"),
+        ("leaper", "walk", {"value_warm_up": 8}, "start: expected the folder of a run whose policy is where learning "),
+    ):
+        with pytest.raises(ValueError) as error:
+            begun(robot, task, changes).advance()
+        assert str(error.value).startswith(message) and "\n" not in str(error.value)
+    with pytest.raises(OSError, match="no such file"):
+        begun(changes={"start": str(tmp_path / "none")}).advance()
+
+
+def test_hyperparameters_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError, match=r"^minibatch: expected at most the transitions of a horizon, got 65$"):
+        dataclasses.replace(SMALL, minibatch=65)
+    with pytest.raises(ValueError, match=r"^num_envs: "):
+        dataclasses.replace(SMALL, num_envs=0)
+
+
+@pytest.mark.long
+def test_it_learns(begun):
+    """Standing still on the way to walking, in a minute: falls end."""
+    changes = {"num_envs": 32, "horizon": 16, "minibatch": 256, "hidden": 64, "epochs": 4}
+    changes |= {"initial_desired_kl": 0.012, "final_desired_kl": 0.004}
+    agent = begun("tick", changes=changes, steps=30_000)
+    first, last = agent.advance().metrics, agent.until(30_000).metrics
+    assert last["reward"] > first["reward"] + 0.1
+    assert last["falls"] < first["falls"]
+
+
+def test_a_run(tmp_path):
+    setup = Setup.of("tick", "steer", {"time_limit": 0.5})
+    assert train(Configuration.of(setup, "ppo", CHANGES, steps=64, evaluate_every=64), tmp_path / "run")
+    assert len(run_folder.table(tmp_path / "run", "training")["reward"]) == 2

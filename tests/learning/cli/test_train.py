@@ -1,0 +1,202 @@
+"""arc-suite train and export, run as a user runs them."""
+
+import importlib.util
+import json
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import programs
+import pytest
+
+from arc_suite.learning.agents import configuration
+from arc_suite.robots import ROBOTS
+
+HAS_JAX = importlib.util.find_spec("jax") is not None
+ROOT = pathlib.Path(__file__).parents[3]
+TINY = ["--robot=tick", "--algorithm=sope_eo", "--set", "time_limit=2", "--steps=200", "--evaluate_every=100"]
+for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "phase_updates=60", "check_every=20"):
+    TINY += ["--hp", number]
+FINISHED = re.compile(
+    r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d \+- \d+\.\d, score -?\d\.\d\d "
+    r"\(standing still \d+\.\d, demonstrator refined \d+\.\d\)\n"
+)
+
+
+def run(*arguments, cwd):
+    return programs.run("-m", "arc_suite", *arguments, cwd=cwd, path=ROOT)
+
+
+def one_line(done, line):
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(line), done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("flags", "line"),
+    [
+        (["--algorithm=sopee"], "arc-suite train: unknown algorithm 'sopee'; did you mean 'sope'? (there are: sac, "),
+        (
+            ["--algorithm=my_algorithms:PATIEN"],
+            "arc-suite train: algorithm 'my_algorithms:PATIEN': module 'my_algorithms' has no attribute 'PATIEN'; "
+            "did you mean 'PATIENT'?\n",
+        ),
+        (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
+        (
+            ["--robot=tock"],
+            f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? (there are: {', '.join(ROBOTS)})\n",
+        ),
+        (["--stps=5"], "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, config, "),
+        (["--steps=abc"], "arc-suite train: flag --steps=abc: expected a positive integer\n"),
+        (["--minutes=x"], "arc-suite train: flag --minutes=x: expected a non-negative number\n"),
+        (["--config=none.json"], "arc-suite train: cannot read none.json: no such file or directory\n"),
+        (["--config=policy.npz"], "arc-suite train: cannot read policy.npz: expected text in UTF-8\n"),
+        (
+            ["--algorithm=sac", "--hp=batsch=3"],
+            "arc-suite train: unknown hyperparameter 'batsch'; did you mean 'batch'",
+        ),
+        (["--hp=batch"], "arc-suite train: --hp batch: expected name=value"),
+        (["--config=a.json", "--seed=3"], "arc-suite train: --seed: expected none with --config, which has the whole "),
+        (["--seed=40001"], "arc-suite train: seed: expected an integer from 0 to 40000, got 40001"),
+        (
+            ["--set=time_limit=Infinity"],
+            "arc-suite train: time_limit: expected a finite number, as every",
+        ),
+        (["--minutes=nan"], "arc-suite train: minutes: expected a finite number of at least 0, got nan"),
+        (["--task=wlak"], "arc-suite train: unknown task 'wlak'; did you mean 'walk'?"),
+    ],
+)
+def test_errors_are_one_line(flags, line, tmp_path):
+    (tmp_path / "my_algorithms.py").write_text("PATIENT = None")
+    (tmp_path / "policy.npz").write_bytes(b"PK\x80")
+    one_line(run("train", *flags, cwd=tmp_path), line)
+    assert not list(tmp_path.rglob("*.csv"))
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ("{", "Expecting property name"),
+        ("[]", "configuration: expected a mapping of names to values, got []"),
+        ("{}", "expected a robot, got none"),
+        ('{"robot": "tik"}', "unknown domain 'tik'; did you mean 'tick'?"),
+        ('{"robot": "tick", "stops": 3}', "unknown field of a configuration 'stops'; did you mean 'steps'?"),
+        ('{"robot": "tick", "steps": "many"}', "steps: expected an integer from 1, got 'many'"),
+        ('{"robot": "tick", "hyperparameters": {"batsch": 3}}', "unknown hyperparameter 'batsch'; did you mean "),
+        ('{"robot": "tick", "prior": 3}', "prior: expected the id of a dataset, got 3"),
+    ],
+)
+def test_configurations_that_do_not_fit_are_one_line(text, line, tmp_path):
+    (tmp_path / "run.json").write_text(text)
+    with pytest.raises(ValueError) as error:
+        configuration.read(tmp_path / "run.json")
+    assert str(error.value).startswith(f"{tmp_path / 'run.json'}: {line}") and "\n" not in str(error.value)
+
+
+@pytest.mark.skipif(HAS_JAX, reason="JAX is installed")
+def test_without_jax_it_says_what_to_install(tmp_path):
+    one_line(run("train", cwd=tmp_path), f"arc-suite train: training needs JAX: {programs.install('agents')} (")
+
+
+def test_export_of_what_is_no_run(tmp_path):
+    one_line(
+        run("export", "runs/none", "-o", "a.txt", cwd=tmp_path),
+        "arc-suite export: unknown extension '.txt' (there are: .onnx)",
+    )
+    one_line(run("export", "runs/none", cwd=tmp_path), "arc-suite export: cannot read runs/none: no such file")
+    one_line(
+        run("export", cwd=tmp_path),
+        "arc-suite export: expected the folder of a run, a policy file or a zip of stable-baselines3; see --help",
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """That of a run, which one command has trained."""
+    path = tmp_path_factory.mktemp("trained")
+    done = run("train", *TINY, "--tensorboard", cwd=path)
+    assert done.returncode == 0, done.stderr
+    assert FINISHED.fullmatch(done.stdout)
+    return path / "runs" / "tick-walk-sope_eo-0"
+
+
+@pytest.mark.skipif(not HAS_JAX, reason="of the extra agents: make check-agents")
+class TestRun:
+    """One command from nothing to a policy that every program takes."""
+
+    def test_files(self, folder):
+        names = {path.name for path in folder.iterdir()}
+        assert names >= {"config.json", "checkpoint.npz", "policy.npz", "policy.onnx", "curve.png", "tensorboard"}
+        assert names >= {"evaluations.csv", "training.csv", "times.csv"}
+        assert json.loads((folder / "config.json").read_text())["hyperparameters"]["phase_updates"] == 60
+
+    def test_the_same_command_has_nothing_left_to_do(self, folder):
+        before = (folder / "evaluations.csv").read_bytes()
+        done = run("train", *TINY, cwd=folder.parents[1])
+        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout)
+        assert (folder / "evaluations.csv").read_bytes() == before
+
+    @pytest.mark.long
+    def test_its_configuration_trains_the_same_run(self, folder, tmp_path):
+        done = run("train", f"--config={folder / 'config.json'}", cwd=tmp_path)
+        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout), done.stderr
+        again = tmp_path / "runs" / folder.name
+        for name in ("config.json", "evaluations.csv", "training.csv"):
+            assert (again / name).read_text() == (folder / name).read_text()
+
+    def test_another_command_is_refused(self, folder):
+        done = run("train", *TINY, "--hp=dropout=0.02", cwd=folder.parents[1])
+        line = "runs/tick-walk-sope_eo-0: of another run, whose hyperparameters.dropout is 0.01, and not 0.02;"
+        one_line(done, f"arc-suite train: {line} write to another folder")
+
+    @pytest.mark.parametrize(
+        "command",
+        [
+            ["evaluate", "--episodes=2", "--set", "time_limit=2"],
+            ["style", "--episodes=1", "--set", "time_limit=2"],
+            ["collect", "--episodes=2", "--steps=20", "--id=arc_suite/tick/walk/learnt-v0"],
+        ],
+        ids=lambda command: command[0],
+    )
+    def test_every_program_takes_it(self, command, folder, monkeypatch, tmp_path):
+        monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+        done = run(*command, "--robot=tick", "--policy=runs/tick-walk-sope_eo-0", cwd=folder.parents[1])
+        assert (done.returncode, done.stderr) == (0, "")
+        done = run(*command, "--robot=queen", "--policy=runs/tick-walk-sope_eo-0", cwd=folder.parents[1])
+        line = "policy runs/tick-walk-sope_eo-0: made for tick, and not for queen"
+        one_line(done, f"arc-suite {command[0]}: {line}")
+
+    def test_evaluation_is_that_of_the_table(self, folder, tmp_path):
+        command = ["evaluate", "--robot=tick", "--set", "time_limit=2", f"--policy={folder}", "--json=a.json"]
+        assert run(*command, cwd=tmp_path).returncode == 0
+        episodes = json.loads((tmp_path / "a.json").read_text())["robots"]["tick"]["episodes"]
+        lines = (folder / "evaluations.csv").read_text().splitlines()[-10:]
+        assert [float(line.split(",")[2]) for line in lines] == [episode["total"] for episode in episodes]
+
+    def test_export(self, folder, tmp_path):
+        done = run("export", str(folder), "-o", "tick.onnx", cwd=tmp_path)
+        size = (tmp_path / "tick.onnx").stat().st_size
+        assert done.stdout == f"wrote tick.onnx: 199 observations, 18 actions, {size} bytes\n"
+
+    @pytest.mark.long
+    def test_ctrl_c_is_one_line_and_the_run_resumes(self, tmp_path):
+        command = [sys.executable, "-m", "arc_suite", "train", *TINY, "--steps=100000", "-o", "run"]
+        process = subprocess.Popen(
+            command, cwd=tmp_path, text=True, stderr=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)}
+        )
+        try:
+            while not (tmp_path / "run" / "checkpoint.npz").exists():
+                assert process.poll() is None
+                time.sleep(0.05)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=120)
+        finally:
+            process.kill()
+            process.wait()
+        assert process.returncode == 130
+        assert errors.splitlines()[-1] == "arc-suite train: interrupted; the same command resumes run"

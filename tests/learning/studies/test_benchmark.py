@@ -1,0 +1,294 @@
+"""The benchmark: its tracks are studies, its scores come from published tables, its table says what was run."""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+
+import numpy as np
+import programs
+import pytest
+
+from arc_suite import evaluation
+from arc_suite.evaluation import anchors
+from arc_suite.learning.agents import configuration, run_folder
+from arc_suite.learning.studies import benchmark, results, tables
+from arc_suite.learning.studies.benchmark import Score
+from arc_suite.learning.studies.results import Result
+from arc_suite.learning.studies.tracks import FAR, PLACES, SEEDS
+from arc_suite.policies.network import PACKAGED
+from arc_suite.tasks import TASKS
+
+ROOT = pathlib.Path(__file__).parents[3]
+COMMITTED = ROOT / "studies"
+# The presets that collect on the track of demonstrations.
+PRESETS = {"walk": "medium", "steer": "reactive", "rough": "surefooted", "stairs": "surefooted", "navigate": "planned"}
+
+
+def test_there_are_ten_places():
+    assert len(set(PLACES)) == 10 and set(FAR) < set(TASKS)
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "far", "prior"),
+    [
+        ("top-ppo", 1_000_000, 3_000_000, None),
+        ("samples-sac_parallel", 100_000, 100_000, None),
+        ("demonstrations-sope", 100_000, 100_000, PRESETS),
+    ],
+)
+def test_a_track_is_a_study(name, steps, far, prior):
+    study = tables.study(name)
+    assert len(study.runs) == SEEDS * len(PLACES)
+    assert [each.configuration.seed for each in study.runs] == sorted(each.configuration.seed for each in study.runs)
+    for each in study.runs:
+        task = each.configuration.setup.kind.name
+        assert each.configuration.steps == (far if task in FAR else steps)
+        assert each.configuration.setup.task_kwargs == {}
+        if prior is None:
+            assert each.prior is None
+        else:
+            assert each.prior == (prior[task], 100)
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("top-dagger", "algorithm dagger learns from a demonstrator, and the track top takes those that learn from "),
+        ("samples-sope", "algorithm sope learns from prior data, and the track samples takes those that learn from "),
+        (
+            "demonstrations-ppo",
+            "algorithm ppo learns from nothing, and the track demonstrations takes those that learn ",
+        ),
+        ("samples-pppo", "unknown algorithm 'pppo'; did you mean 'ppo'?"),
+    ],
+)
+def test_a_track_takes_algorithms_that_learn_from_what_it_gives(name, line):
+    with pytest.raises(ValueError) as error:
+        tables.study(name)
+    assert str(error.value).startswith(line)
+
+
+def scale(robot="tick", task="walk"):
+    return anchors.anchors(tables.run(robot, "sac", 100, task=task).configuration.setup)
+
+
+def result(levels, steps=(50_000, 100_000), **fields):
+    """Result of a run of SAC on Tick whose evaluations have these scores."""
+    returns = np.array([[scale().at(level)] * 10 for level in levels])
+    style = {"gait_compliance": np.full(10, 0.9), "heading_error": np.array([np.nan, *[0.2, -0.2] * 4, 0.2])}
+    run = tables.run("tick", "sac", 100_000, **fields)
+    return Result(run, np.array(steps), returns, {}, np.array([60.0, 180.0]), style, np.empty(0))
+
+
+def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
+    (score,) = benchmark.of_results([result([0.6, 0.4])])
+    assert (score.robot, score.task, score.seed) == ("tick", "walk", 0)
+    assert score.result == pytest.approx(scale().at(0.4)) and score.score == pytest.approx(0.4)
+    assert score.minutes == 1.0
+    assert (score.gait_compliance, score.heading_error) == (pytest.approx(0.9), pytest.approx(0.2))
+    (slow,) = benchmark.of_results([result([0.1, 0.4], seed=1)])
+    assert slow.minutes == np.inf and slow.seed == 1
+
+
+def test_scores_are_clipped_and_unfinished_runs_have_none():
+    low, high = benchmark.of_results([result([0.0, -3.0]), result([0.0, 9.0])])
+    assert (low.score, high.score) == (-0.5, 1.2)
+    assert benchmark.of_results([result([0.0, 0.5], steps=(50_000, 90_000))]) == []
+
+
+def test_headings_are_not_judged_where_commands_turn():
+    (score,) = benchmark.of_results([result([0.1, 0.2], task="steer")])
+    assert np.isnan(score.heading_error) and score.gait_compliance == pytest.approx(0.9)
+
+
+def score(place, seed, level, minutes=2.0):
+    return Score(*place, seed, 1000.0, level, minutes, 0.8, 0.1)
+
+
+def row(page, learner):
+    (line,) = (line for line in page.splitlines() if line.split(" | ")[1:2] == [learner])
+    return line.strip("| ").split(" | ")
+
+
+def test_the_table_says_what_was_not_run(tmp_path):
+    """One seed has no interval, and a part of the places no total."""
+    whole = [score(place, 0, 0.1 * index) for index, place in enumerate(PLACES)]
+    again = [score(place, 1, 0.1 * index + 0.02, np.inf) for index, place in enumerate(PLACES)]
+    for name, scores in (("top-one", whole), ("samples-two", [*whole, *again]), ("samples-part", whole[2:3])):
+        (tmp_path / name).mkdir()
+        benchmark.write(tmp_path / name, scores)
+        assert benchmark.read(tmp_path / name / benchmark.SCORES) == scores
+    page = benchmark.text(tmp_path)
+    assert [line.split(" | ")[:2] for line in page.splitlines()[2:]] == [
+        ["| top", "one"],
+        ["| samples", "two"],
+        ["| samples", "part"],
+    ]
+    levels = [0.1 * index for index in range(10)]
+    one = ["top", "one", "1", f"{evaluation.interquartile_mean(levels):.3f}", "2.0", "0.800", "0.100"]
+    assert row(page, "one") == one + [f"{level:.2f}" for level in levels]
+    two = row(page, "two")
+    assert two[2] == "2" and two[4] == "-" and re.fullmatch(r"0\.460 \[0\.\d{3}, 0\.\d{3}\]", two[3])
+    assert row(page, "part")[2:4] == ["1", "1 of 10 places"]
+    assert row(page, "part")[7:] == ["not run", "not run", "0.20", *["not run"] * 7]
+
+
+def test_places_with_more_seeds_weigh_no_more(tmp_path):
+    whole = [score(place, 0, 0.1 * index) for index, place in enumerate(PLACES)]
+    more = [score(PLACES[-1], seed, 0.0, np.inf) for seed in (2, 1)]
+    for name, scores in (("top-once", whole), ("top-more", [*more, *whole])):
+        (tmp_path / name).mkdir()
+        benchmark.write(tmp_path / name, scores)
+    once, uneven = (row(benchmark.text(tmp_path), name) for name in ("once", "more"))
+    assert uneven[3:-1] == once[3:-1]
+    assert (once[2], uneven[2]) == ("1", "1 to 3")
+    assert (once[-1], uneven[-1]) == ("0.90", "0.30"), "a place holds the mean over all its seeds"
+
+
+def test_damaged_scores_are_one_line(tmp_path):
+    (tmp_path / "top-mine").mkdir()
+    (tmp_path / "top-mine" / benchmark.SCORES).write_text("robot,task\n")
+    with pytest.raises(ValueError, match=r"scores.csv: expected lines of robot, task, seed, result, "):
+        benchmark.text(tmp_path)
+
+
+def run(*arguments, cwd):
+    return programs.run("-m", "arc_suite", "benchmark", *arguments, cwd=cwd, path=ROOT / "tests" / "fixtures")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["tops"], "unknown track 'tops'; did you mean 'top'? (there are: top, samples, demonstrations)"),
+        (["top", "--places=tick-wlak"], "unknown place 'tick-wlak'; did you mean 'tick-walk'?"),
+        (["top", "--algorithm=bc"], "algorithm bc learns from prior data, and the track top takes those that learn "),
+        (["top", "--policies=."], ".: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none"),
+        (["top", "--policies=.", "--name=a/b"], "--name=a/b: expected letters, digits, _, - and ."),
+        (["top", "--policies=none"], "cannot read none: no such file or directory"),
+        (["--page=none.md"], "cannot read none.md: no such file or directory"),
+        (["--page=plain.md"], "--page=plain.md: expected the lines <!-- table --> and <!-- end -->, got none"),
+        (["--page=page.md"], "studies: holds no scores of the benchmark; run a track, or name their folder by "),
+        ([], "studies: holds no scores of the benchmark; run a track, or name their folder by --results"),
+    ],
+)
+def test_errors_are_one_line(tmp_path, arguments, line):
+    """A page keeps its table."""
+    pages = {"page.md": "<!-- table -->\nrows\n<!-- end -->\n", "plain.md": "text"}
+    for name, text in pages.items():
+        (tmp_path / name).write_text(text)
+    done = run(*arguments, cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (1, "") and done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith(f"arc-suite benchmark: {line}")
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == pages
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("tick-wlk-1.npz", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1.npz"),
+        ("leaper-walk-7.zip", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as leaper-walk-2.zip"),
+        ("queen-stair.py", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as queen-stairs-2.py"),
+        ("tick-walk-0.py", "expected one policy of this place and seed, got tick-walk-0.npz, too"),
+        ("tick-walk-01/policy.npz", "expected ROBOT-TASK-SEED of a place and a seed from 0 to 2, such as tick-walk-1"),
+    ],
+)
+def test_policies_of_other_names_are_refused_before_any_plays(tmp_path, name, line):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    for each in (path, tmp_path / "tick-walk-0.npz"):
+        each.write_bytes(b"")
+    with pytest.raises(ValueError) as error:
+        benchmark.of_policies(tmp_path, progress=None)
+    assert str(error.value) == f"{tmp_path / name.partition('/')[0]}: {line}"
+
+
+MODULE = """
+import pathlib
+import numpy as np
+
+def make(robot):
+    action = np.load(pathlib.Path(__file__).with_suffix(".npy"))
+    return lambda timestep: action
+"""
+
+
+def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypatch):
+    """A module acts by the weights next to it; this one stands still, for one episode in place of ten."""
+    monkeypatch.setattr(evaluation, "EPISODES", 1)
+    (tmp_path / "tick-walk-2.py").write_text(MODULE)
+    np.save(tmp_path / "tick-walk-2.npy", np.zeros(18))
+    for name in ("README.md", ".hidden.py", "_helpers.py", "tick-walk-2_vecnormalize.pkl", "studies/other.zip"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    (found,) = benchmark.of_policies(tmp_path, lambda each, **_: each)
+    assert found[:3] == ("tick", "walk", 2) and found.score == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.long
+def test_policies_of_others_are_scored(tmp_path):
+    """Those of the package stand for them; what is no policy of a place is left out."""
+    (tmp_path / "theirs").mkdir()
+    (tmp_path / "theirs" / "tick-walk-1.npz").write_bytes((PACKAGED / "tick-walk.npz").read_bytes())
+    (tmp_path / "theirs" / "notes.txt").write_text("")
+    (tmp_path / "page.md").write_text("# Mine\n\n<!-- table -->\n<!-- end -->\n")
+    done = run("samples", "--policies=theirs", "--page=page.md", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    (found,) = benchmark.read(tmp_path / "studies" / "samples-theirs" / benchmark.SCORES)
+    assert (found.robot, found.task, found.seed) == ("tick", "walk", 1)
+    assert found.score == pytest.approx(scale().score(found.result)) and found.score > 0.9
+    assert np.isnan(found.minutes) and found.gait_compliance > 0.95 and found.heading_error < 0.2
+    page = (tmp_path / "page.md").read_text()
+    assert page == f"# Mine\n\n<!-- table -->\n\n{benchmark.text(tmp_path / 'studies')}\n\n<!-- end -->\n"
+    assert row(page, "theirs")[4] == "-"
+
+
+SHORT = """
+import sys
+from arc_suite.learning.studies import tracks
+tracks.TRACKS["samples"] = tracks.Track(300, 300)
+from arc_suite.cli import benchmark, program
+program.run(benchmark.main, "benchmark", sys.argv[1:])
+"""
+
+
+@pytest.mark.long
+def test_a_track_is_run_and_resumed(tmp_path):
+    """A track of 300 steps, by an algorithm that needs no JAX; the second command has nothing left to do."""
+    environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests" / "fixtures")])}
+    (tmp_path / "short.py").write_text(SHORT)
+    command = [sys.executable, "short.py", "samples", "--algorithm=tiny_studies:CLIMB", "--places=tick-walk"]
+
+    def go():
+        done = subprocess.run(
+            [*command, "--seeds=1", "--jobs=1"], env=environ, cwd=tmp_path, capture_output=True, text=True
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        return done.stdout
+
+    printed = go()
+    folder = tmp_path / "studies" / "samples-tiny_studies.CLIMB"
+    (found,) = benchmark.read(folder / benchmark.SCORES)
+    (config,) = folder.glob("*/config.json")
+    assert configuration.read(config).steps == 300
+    returns = run_folder.latest_returns(run_folder.table(config.parent, "evaluations"))
+    assert found.result == pytest.approx(returns.mean())
+    assert (folder / "README.md").is_file() and printed.count("not run") == 9
+    times = (config.parent / "times.csv").read_bytes()
+    go()
+    assert (config.parent / "times.csv").read_bytes() == times
+
+
+@pytest.mark.parametrize("path", sorted(COMMITTED.glob(f"*/{benchmark.SCORES}")), ids=lambda path: path.parent.name)
+def test_committed_scores_are_those_of_committed_results(path):
+    study = tables.study(path.parent.name)
+    expected = benchmark.of_results(results.results(study.runs, path.parent))
+    for one, other in zip(benchmark.read(path), expected, strict=True):
+        assert one[:3] == other[:3] and one[3:] == pytest.approx(other[3:], nan_ok=True)
+
+
+def test_the_page_holds_the_table_of_committed_scores():
+    assert (
+        f"<!-- table -->\n\n{benchmark.text(COMMITTED)}\n\n<!-- end -->" in (ROOT / "docs" / "benchmark.md").read_text()
+    )

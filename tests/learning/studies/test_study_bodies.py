@@ -1,0 +1,58 @@
+"""Tables of policies of many bodies: episodes in files, and the table of the page."""
+
+import math
+import pathlib
+import re
+
+import programs
+import pytest
+
+from arc_suite.learning import transfer
+from arc_suite.learning.studies import bodies
+from arc_suite.learning.transfer import Episode, Trial
+
+ROOT = pathlib.Path(__file__).parents[3]
+STUDY = ROOT / "studies" / "bodies"
+
+
+def trial(policy, tracking=math.nan):
+    return Trial("body", Episode(policy, True, tracking), Episode(20.0, True, 0.8), Episode(10.0, False, 0.1))
+
+
+def test_episodes_are_read_as_they_were_written(tmp_path):
+    played = {"robots": [trial(15.0, 0.4), trial(20.0, 0.6)], "small": [trial(10.0, 0.2)]}
+    bodies.write(tmp_path / "one-steer.csv", played)
+    assert bodies.read(tmp_path / "one-steer.csv") == played
+    table = bodies.text(tmp_path).splitlines()
+    assert table[0].split(" | ")[1:3] == ["task", "random"]
+    assert table[2] == (
+        "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | not run | not run | 0.00, tracking 0.25 |"
+        " not run |"
+    )
+    (tmp_path / "one-steer.csv").write_text("family,body\n")
+    with pytest.raises(ValueError, match=r"one-steer\.csv: expected the columns family, body, who, return, walked, "):
+        bodies.text(tmp_path)
+
+
+def test_the_page_holds_the_committed_table(tmp_path):
+    page = (ROOT / "docs" / "any_body.md").read_text()
+    assert f"<!-- table -->\n\n{bodies.text(STUDY)}\n\n<!-- end -->" in page
+    copy = tmp_path / "page.md"
+    copy.write_text(re.sub(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", "", page, flags=re.DOTALL))
+    done = programs.arc_suite("transfer", f"--page={copy}", f"--results={STUDY}")
+    assert (done.returncode, done.stderr) == (0, "") and copy.read_text() == page
+    done = programs.arc_suite("transfer", f"--page={copy}", f"--results={tmp_path}")
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1) and copy.read_text() == page
+    assert done.stderr.startswith(f"arc-suite transfer: {tmp_path}: holds no tables of episodes; write one by -o, or ")
+
+
+def test_what_ships_is_in_the_table_and_is_good():
+    """Most bodies walk that nobody trained with, robots and their mutants among them."""
+    found = bodies.read(STUDY / "universal-walk.csv")
+    assert list(found) == list(transfer.FAMILIES)
+    results = {name: transfer.result(trials) for name, trials in found.items()}
+    assert all(result.demonstrated == 1.0 for result in results.values())
+    assert results["random"].walk == 1.0 and results["random"].score > 0.95
+    assert min(results["robots"].walk, results["mutants"].walk) >= 0.8
+    steer = {name: transfer.result(trials) for name, trials in bodies.read(STUDY / "universal-steer.csv").items()}
+    assert steer["robots"].tracking > 0.8

@@ -1,0 +1,246 @@
+"""Reports of studies: every number comes from published tables, and says what it should."""
+
+import csv
+import pathlib
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from arc_suite import evaluation
+from arc_suite.evaluation import anchors, published
+from arc_suite.learning.agents import configuration
+from arc_suite.learning.studies import claims, report, results, tables
+from arc_suite.learning.studies.tables import Study, run
+
+METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
+STEPS = (1000, 2000)
+
+
+def publish(folder, each, returns, style=0.1):
+    """Tables of a run: returns are (evaluations, episodes)."""
+    path = folder / each.name
+    path.mkdir(parents=True)
+    lines = ["step,seed,return,length,speed,gait_compliance"]
+    for step, episodes in zip(STEPS, returns, strict=True):
+        lines += [f"{step},{seed},{total!r},1000,0.3,0.9" for seed, total in enumerate(np.asarray(episodes).tolist())]
+    (path / "evaluations.csv").write_text("\n".join(lines) + "\n")
+    (path / "times.csv").write_text("step,wall_seconds,cpu_seconds\n1000,90.0,60.0\n2000,200.0,180.0\n")
+    lines = [f"step,seed,{','.join(METRICS)}", *(f"2000,{seed}" + f",{style}" * 6 for seed in range(10))]
+    (path / "style.csv").write_text("\n".join(lines) + "\n")
+
+
+def constant(*levels):
+    return [np.full(10, level) + np.arange(10) for level in levels]
+
+
+@pytest.fixture
+def made(tmp_path):
+    """A study as the paper's table of finals would have it, two seeds of everything, and its folder."""
+    keys = [(robot, name, seed) for robot in published.FINALS for name in published.FINALS[robot] for seed in (0, 1)]
+    runs = tuple(run(robot, name, 2000, seed) for robot, name, seed in keys)
+    for each, (robot, name, seed) in zip(runs, keys, strict=True):
+        start, style = 100.0 if name in claims.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
+        publish(tmp_path / "mine", each, constant(start, float(published.FINALS[robot][name]) + seed), style)
+    levels = {"zero": np.full(10, 1600.0), "medium": np.full(10, 2048.0), "refined": np.full(10, 3600.0)}
+    anchors.write(tmp_path / "mine" / "demonstrators.csv", {"queen, walk": levels, "tick, walk": levels})
+    return Study("as in the paper", runs), tmp_path / "mine"
+
+
+def cells(page, *starts):
+    """Of the first line of a table that begins so."""
+    for line in page.splitlines():
+        found = [cell.strip() for cell in line.strip("|").split("|")]
+        if line.startswith("|") and found[: len(starts)] == list(starts):
+            return found
+    raise AssertionError(starts)
+
+
+@pytest.mark.slow
+def test_report(made):
+    study, folder = made
+    page = report.write("mine", study, folder).read_text()
+    assert (folder / "curves.png").stat().st_size > 10_000
+    assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0"]
+    # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
+    final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610"]
+    assert cells(page, "tick, walk", "sope", "2,000")[3:] == final
+    assert cells(page, "leaper, walk", "sope", "2,000")[5] == "-", "without anchors"
+    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048"]
+    assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "0.00", "-", "-"]
+    area = f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}"
+    assert cells(page, "tick, walk", "sac", "-", "-") == ["tick, walk", "sac", "-", "-", "-", "-", area]
+    assert cells(page, "tick, walk", "sope", "2,000", "3.0")[4:6] == ["2,000", "3.0"]
+    assert cells(page, "bastion, walk", "sac", "0.500")[2:] == ["0.500"] * 6
+    assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
+    assert "As in the paper.\n" in page
+    more = study._replace(runs=(*study.runs, run("tick", "sac", 2000, seed=2)))
+    assert "As in the paper. Begun: 48 of 49 runs.\n" in report.write("more", more, folder).read_text()
+
+
+@pytest.mark.slow
+def test_claims(made):
+    """On the paper's own finals each sentence comes out as in its table; one does not hold there."""
+    study, folder = made
+    page = report.write("mine", study, folder).read_text()
+    held = {claim.text: cells(page, claim.text)[1:] for claim in claims.CLAIMS}
+    for claim in claims.CLAIMS:
+        published, there, ours, here = held[claim.text]
+        if claim.in_paper:
+            assert there == here
+            assert re.findall(r"\w+ [+-]", published) == re.findall(r"\w+ [+-]", ours)
+        else:
+            assert (published, there) == ("-", "not measured")
+    assert [held[claim.text][3] for claim in claims.CLAIMS] == [
+        *("4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "3 of 4 robots"),
+        *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
+    ]
+    assert "queen -300" in held["with prior data all end higher than without"][0]
+    least = min(published.FINALS["queen"][name] for name in claims.ONLINE) - published.DEMONSTRATORS["queen"]
+    assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
+
+
+@pytest.mark.slow
+def test_commands_name_the_folder_of_the_runs(made):
+    """In which no colon stands."""
+    study, folder = made
+    (folder / study.runs[0].name / "strip.png").write_bytes(b"")
+    page = report.write("my_studies:MINE", study, folder).read_text()
+    assert f"--policy=runs/my_studies.MINE/{study.runs[0].name} " in page
+
+
+@pytest.mark.long
+def test_phases_are_told_where_they_are_published(made):
+    study, folder = made
+    assert "## Phases" not in report.write("mine", study, folder).read_text()
+    for each, lengths in zip(study.runs, ((300, 700), (1100,)), strict=False):
+        lines = ["step,updates", *(f"{10_000 * place},{updates}" for place, updates in enumerate(lengths, 1))]
+        (folder / each.name / "phases.csv").write_text("\n".join(lines) + "\n")
+    page = report.write("mine", study, folder).read_text()
+    first = study.runs[0]
+    assert cells(page, first.place, first.kind, "3") == [first.place, first.kind, "3", "700", "300", "1,100"]
+
+
+@pytest.mark.slow
+def test_claims_need_what_they_compare(made):
+    """The study's title tells short phases; other tasks and missing algorithms are not compared."""
+    study, folder = made
+    few = study._replace(runs=tuple(each for each in study.runs if each.kind == "sac"))
+    page = report.write("few", few, folder).read_text()
+    assert cells(page, claims.CLAIMS[0].text)[3:] == ["-", "not measured"]
+    found = results.results(few.runs, folder)
+    assert claims.is_papers(found[0])
+    usual = {"robot": "tick", "algorithm": "sac", "steps": 2000}
+    for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
+        assert not claims.is_papers(found[0]._replace(run=run(**usual | other)))
+
+
+def test_unfinished_evaluations_do_not_count(tmp_path):
+    each = run("tick", "sac", 5000)
+    publish(tmp_path, each, constant(100.0, 200.0))
+    with (tmp_path / each.name / "evaluations.csv").open("a") as file:
+        file.write("3000,0,900.0,1000,0.3,0.9\n")
+    (result,) = results.results([each], tmp_path)
+    assert result.steps.tolist() == [1000, 2000]
+    assert result.final == 204.5
+    assert result.progress["speed"].shape == (10,)
+
+
+def test_runs_are_compared_where_both_have_been(tmp_path):
+    """At the latest step that all have reached, and where both have several seeds."""
+    runs = [run("tick", name, 2000, seed) for seed in range(2) for name in ("sac", "speq")]
+    for each in runs:
+        publish(tmp_path, each, constant(100.0, 900.0) if each.kind == "sac" else constant(500.0, 600.0))
+        if each.kind == "speq":
+            path = tmp_path / each.name / "evaluations.csv"
+            path.write_text("\n".join(path.read_text().splitlines()[:11]) + "\n")
+    groups = results.grouped(results.results(runs, tmp_path))
+    probability, interval = results.improvement(groups, "speq", "sac")
+    assert probability == 1.0 and interval == (1.0, 1.0)
+    assert results.improvement(groups, "speq", "sope") is None
+    assert results.improvement(results.grouped(results.results(runs[:3], tmp_path)), "speq", "sac") is None
+
+
+@pytest.mark.slow
+def test_one_seed_has_no_interval(tmp_path):
+    runs = run("tick", "sac", 2000), run("tick", "speq", 2000)
+    for each in runs:
+        publish(tmp_path / "mine", each, constant(100.0, 200.0))
+    page = report.write("mine", Study("one seed each", runs), tmp_path / "mine").read_text()
+    assert cells(page, "tick, walk", "sac", "2,000", "1")[4:] == ["204.5", "-", "-", "2590"]
+    assert "Probability" not in page
+    assert cells((tmp_path / "README.md").read_text(), "tick, walk", "sac")[4:8] == ["1", "204.5", "-", "-"]
+
+
+@pytest.mark.slow
+def test_the_leaderboard_holds_each_configuration_once(tmp_path):
+    """The row with more seeds; phases tell two configurations of one algorithm apart."""
+    phases = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
+    few, many = (run("tick", "sac", 2000),), tuple(run("tick", "sac", 2000, seed) for seed in range(2))
+    other = (*many, run("tick", "speq", 2000), run("tick", "speq", 2000, hyperparameters=phases, label="speq-short"))
+    for name, runs in (("a", few), ("b", other)):
+        for each in runs:
+            publish(tmp_path / name, each, constant(100.0, 200.0))
+        report.write(name, Study(name, runs), tmp_path / name)
+    page = (tmp_path / "README.md").read_text()
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| tick")]
+    assert sorted((row[1], row[2], row[4], row[14]) for row in rows) == [
+        ("sac", "-", "2", "[b](b/README.md)"),
+        ("speq", "75,000", "1", "[b](b/README.md)"),
+        ("speq-short", "7,500", "1", "[b](b/README.md)"),
+    ]
+
+
+def test_until(tmp_path):
+    runs = run("tick", "sac", 2000), run("tick", "sac", 2000, 1)
+    publish(tmp_path, runs[0], constant(100.0, 900.0))
+    publish(tmp_path, runs[1], constant(500.0, 600.0))
+    found = results.results(runs, tmp_path)
+    assert results.until(found, 500.0) == (1500.0, 120.0)
+    assert results.until(found, 700.0) == (np.inf, np.inf)
+
+
+def test_nothing_published_is_one_line(tmp_path):
+    with pytest.raises(ValueError, match=r"none: holds no results of the study mine$"):
+        report.write("mine", Study("none", (run("tick", "sac", 10),)), tmp_path / "none")
+
+
+COMMITTED = pathlib.Path(__file__).parents[3] / "studies"
+
+
+@pytest.mark.parametrize("path", sorted(COMMITTED.glob("*/*/config.json")), ids=lambda path: path.parent.name)
+def test_committed_configurations_are_those_of_the_studies(path):
+    """Today's code reads each, and trains the same run."""
+    study = tables.study(path.parts[-3])
+    (each,) = (each for each in study.runs if each.name == path.parts[-2])
+    assert configuration.read(path) == each.configuration
+
+
+@pytest.mark.long
+def test_committed_reports_are_made_of_committed_tables(tmp_path):
+    """By the one command, and nobody has changed a number."""
+    committed = COMMITTED
+    shutil.copytree(committed, tmp_path / "studies")
+    names = sorted({path.parts[-3] for path in committed.glob("*/*/config.json")})
+    assert names
+    for name in names:
+        report.write(name, tables.study(name), tmp_path / "studies" / name)
+    for path in (*(f"{name}/README.md" for name in names), "README.md"):
+        assert (tmp_path / "studies" / path).read_text() == (committed / path).read_text(), path
+
+
+def test_the_papers_table_has_every_robot_and_algorithm():
+    assert published.FINALS.keys() == published.DEMONSTRATORS.keys()
+    for finals in published.FINALS.values():
+        assert set(finals) == {*claims.ONLINE, *claims.WITH_PRIOR}
+    assert evaluation.EPISODES == 10
+
+
+def test_the_papers_returns_as_a_table():
+    """The file for users' plots holds the suite's own numbers."""
+    with (pathlib.Path(__file__).parents[3] / "studies" / "paper.csv").open(newline="") as file:
+        rows = {(row["robot"], row["algorithm"]): float(row["return"]) for row in csv.DictReader(file)}
+    finals = {(robot, name): value for robot, values in published.FINALS.items() for name, value in values.items()}
+    assert rows == finals | {(robot, "demonstrator"): value for robot, value in published.DEMONSTRATORS.items()}
+    assert len(finals) == 24

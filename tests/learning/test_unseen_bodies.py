@@ -1,0 +1,54 @@
+"""Scores of a policy of many bodies, by family."""
+
+import math
+
+import numpy as np
+import pytest
+from legs import network as drawn
+
+from arc_suite.learning import transfer
+from arc_suite.learning.transfer import Episode, Trial
+from arc_suite.robots import ROBOTS
+
+
+def trial(policy, demonstrator, zero, walked=True):
+    return Trial("body", Episode(policy, walked, math.nan), Episode(demonstrator, True, math.nan), Episode(zero, 0, 0))
+
+
+def test_a_score_is_the_way_from_standing_to_the_demonstrator():
+    assert trial(15.0, 20.0, 10.0).score == 0.5
+    assert math.isnan(trial(15.0, 10.0, 10.0).score)
+    result = transfer.result([trial(15.0, 20.0, 10.0), trial(10.0, 30.0, 10.0, False), trial(0.0, 1.0, 2.0)])
+    assert (result.count, result.score, result.worst) == (3, pytest.approx(5.0 / 30.0), 0.0)
+    assert (result.walk, result.demonstrated) == (pytest.approx(2 / 3), 1.0)
+
+
+def test_families_hold_bodies_that_nobody_trains_with():
+    named = {name: family.made(0).name for name, family in transfer.FAMILIES.items()}
+    assert named["random"] == "random_200000" and named["varied"] == "varied_200000"
+    robots = [transfer.FAMILIES["robots"].made(index) for index in range(4)]
+    assert all(body.name not in ROBOTS for body in robots)
+    small, large = (transfer.FAMILIES[name].made(0) for name in ("small", "large"))
+    ratio = large.torso.solids[0].size[0] / small.torso.solids[0].size[0]
+    assert ratio == pytest.approx(40.0)
+
+
+@pytest.mark.slow
+def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
+    """Scale changes little: small and large bodies of a seed earn the same, up to the noise of starts."""
+    monkeypatch.setattr(transfer, "STEPS", 120)
+    bodies = [transfer.FAMILIES[name].made(0) for name in ("small", "large")]
+    small, large = transfer.trials(drawn(), bodies, "walk")
+    assert small.demonstrator.walked and large.demonstrator.walked
+    assert not small.policy.walked and not small.zero.walked
+    assert small.demonstrator.total > small.zero.total > 0.0
+    for one, other in ((small.demonstrator, large.demonstrator), (small.zero, large.zero)):
+        assert one.total == pytest.approx(other.total, rel=0.05)
+
+
+@pytest.mark.slow
+def test_tracking_of_tasks_with_a_command(monkeypatch):
+    monkeypatch.setattr(transfer, "STEPS", 60)
+    played = transfer.trials(drawn(task="steer"), [transfer.FAMILIES["random"].made(1)], "steer")
+    assert 0.0 < played[0].demonstrator.tracking <= 1.0
+    assert np.isfinite(transfer.result(played).tracking)
