@@ -55,9 +55,13 @@ def test_help_lists_the_programs(arguments):
 
 
 def test_every_program_is_listed():
-    folder = pathlib.Path(main.__file__).parent
-    programs = {path.stem for path in folder.glob("*.py") if "\ndef main(" in path.read_text()}
-    assert programs - {"main"} == set(main.PROGRAMS)
+    folder = ROOT / "arc_suite"
+    programs = {
+        path.stem: ".".join(path.relative_to(ROOT).parent.parts)
+        for path in folder.rglob("cli/*.py")
+        if "\ndef main(" in path.read_text()
+    }
+    assert programs == {"main": "arc_suite.cli"} | main.PROGRAMS
 
 
 def test_version():

@@ -29,7 +29,7 @@ def wheel(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     shutil.copytree(ROOT, folder / "sources", ignore=NOT_SOURCES)
     for name in BUILT:
-        file = folder / "sources" / "arc_suite" / "export" / "web" / name
+        file = folder / "sources" / "arc_suite" / "animation" / "web" / name
         if not file.exists():  # `make web` has not been run here
             file.parent.mkdir(exist_ok=True)
             file.write_text("// in its place\n")

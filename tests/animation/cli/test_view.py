@@ -227,7 +227,8 @@ def test_without_a_display_a_line_says_what_does_without():
 IN_A_WINDOW = """
 import sys
 import glfw, gymnasium, numpy as np
-from arc_suite.cli import live, program
+from arc_suite.animation.cli import live
+from arc_suite.cli import program
 from arc_suite.envs import window
 
 class Closed(window.Window):
@@ -252,7 +253,7 @@ print(human.is_open, env.render())
 env.close()
 print(human.is_open)
 sys.modules["arc_suite.envs.window"].Window = Closed
-from arc_suite.cli import view
+from arc_suite.animation.cli import view
 program.run(view.main, "view", ["--robot=tick", "--task=steer"])
 """
 

@@ -12,7 +12,7 @@ from arc_suite.robots.spec_files import body_to_json
 # In an interpreter of its own: programs define flags of the same names.
 SKETCHES = """
 from absl import flags
-from arc_suite.cli import studio
+from arc_suite.animation.cli import studio
 from arc_suite.animation.studio.sketch import *
 for arguments in {arguments}:
     for name in flags.FLAGS:

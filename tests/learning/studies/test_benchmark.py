@@ -248,7 +248,8 @@ SHORT = """
 import sys
 from arc_suite.learning.studies import tracks
 tracks.TRACKS["samples"] = tracks.Track(300, 300)
-from arc_suite.cli import benchmark, program
+from arc_suite.cli import program
+from arc_suite.learning.cli import benchmark
 program.run(benchmark.main, "benchmark", sys.argv[1:])
 """
 

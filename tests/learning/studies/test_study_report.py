@@ -86,12 +86,12 @@ def test_claims(made):
     page = report.write("mine", study, folder).read_text()
     held = {claim.text: cells(page, claim.text)[1:] for claim in claims.CLAIMS}
     for claim in claims.CLAIMS:
-        published, there, ours, here = held[claim.text]
+        paper, there, ours, here = held[claim.text]
         if claim.in_paper:
             assert there == here
-            assert re.findall(r"\w+ [+-]", published) == re.findall(r"\w+ [+-]", ours)
+            assert re.findall(r"\w+ [+-]", paper) == re.findall(r"\w+ [+-]", ours)
         else:
-            assert (published, there) == ("-", "not measured")
+            assert (paper, there) == ("-", "not measured")
     assert [held[claim.text][3] for claim in claims.CLAIMS] == [
         *("4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "3 of 4 robots"),
         *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
