@@ -62,7 +62,7 @@ def cell(task: str, robot: str, preset: str, settings: dict) -> str:
     return summary(played(task, robot, preset, settings)) if preset in ("zero", *presets_of(ROBOTS[robot])) else "-"
 
 
-def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.Episode]:
+def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.EpisodeResult]:
     """Play the episodes of one cell, all at once."""
     environment = VectorEnv(robot, task, FLAGS.episodes, FLAGS.threads, "Disabled", task_kwargs=settings)
     name, presets = ("zero", ()) if preset == "zero" else ("cpg", (preset,))
@@ -71,7 +71,7 @@ def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluatio
         return evaluation.episodes_in_batch(environment, policy, range(FLAGS.episodes))
 
 
-def summary(episodes: list[evaluation.Episode]) -> str:
+def summary(episodes: list[evaluation.EpisodeResult]) -> str:
     """Return the return, the metric and the failures of episodes as text."""
     means = {name: np.mean([e.progress[name] for e in episodes]) for name in episodes[0].progress}
     metric = next(means[name] for name in METRICS if name in means)

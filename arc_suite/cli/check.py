@@ -16,7 +16,7 @@ from absl import flags
 
 from arc_suite.cli.flags import ROBOT_HELP, define_task, task
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import conformance, trial
+from arc_suite.evaluation import conformance, first_walk
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import load_body
@@ -48,13 +48,13 @@ def _check_body(spec: str) -> int:
 
 
 def _check_walk(spec: str, body: Body) -> int:
-    tried = trial.walk(body)
+    tried = first_walk.walk(body)
     if not tried.fell:
         print(f"{spec}: {_said(tried)}")
         return 0
-    cure = trial.left_out(body)
+    cure = first_walk.left_out(body)
     advice = (
-        f"leaving out {', '.join(trial.FIELDS)} of its joints does not help"
+        f"leaving out {', '.join(first_walk.FIELDS)} of its joints does not help"
         if cure is None
         else f"leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
     )
@@ -62,7 +62,7 @@ def _check_walk(spec: str, body: Body) -> int:
     return 1
 
 
-def _said(tried: trial.Trial) -> str:
+def _said(tried: first_walk.FirstWalk) -> str:
     return f"walks {tried.length} control steps at {tried.speed:.2f} m/s (target {tried.target:.2f})"
 
 

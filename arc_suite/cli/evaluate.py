@@ -106,7 +106,7 @@ def main() -> None:
                 print(text.format(total["iqm"], *total["interval"]))
 
 
-def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
+def evaluate(robot: str, environment, policy) -> list[evaluation.EpisodeResult]:
     """Run the episodes of one robot behind a progress bar."""
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     with progress(seeds, desc=robot, unit="episode", leave=False) as bar:
@@ -114,7 +114,7 @@ def evaluate(robot: str, environment, policy) -> list[evaluation.Episode]:
 
 
 def report(
-    episodes: list[evaluation.Episode], zero: float, expert: float | None, scale: anchors.Anchors | None
+    episodes: list[evaluation.EpisodeResult], zero: float, expert: float | None, scale: anchors.Anchors | None
 ) -> dict:
     """Return the metrics of one robot, as in the JSON.
 

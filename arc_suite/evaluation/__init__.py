@@ -2,7 +2,7 @@
 
 from arc_suite.evaluation.protocol import (
     EPISODES,
-    Episode,
+    EpisodeResult,
     check_ends,
     episodes,
     episodes_in_batch,
@@ -25,7 +25,7 @@ from arc_suite.evaluation.statistics import (
 __all__ = [
     "EPISODES",
     "Curve",
-    "Episode",
+    "EpisodeResult",
     "check_ends",
     "Summary",
     "curve",

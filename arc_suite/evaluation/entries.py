@@ -30,7 +30,7 @@ class Entry(NamedTuple):
     policy: str
     preset: str | None
     policy_sha256: str | None
-    episodes: list[protocol.Episode]
+    episodes: list[protocol.EpisodeResult]
 
 
 def provenance(setup: Setup) -> dict[str, Any]:

@@ -17,7 +17,7 @@ EPISODES = 10  # the paper's Section 6, Experimental Setting
 _PROGRESS = "progress_"  # prefix of the task's metrics in an info
 
 
-class Episode(NamedTuple):
+class EpisodeResult(NamedTuple):
     """The results of one episode.
 
     Attributes:
@@ -87,14 +87,14 @@ def rollout(environment, policy: Policy, seed: int, max_steps: int | None = None
         yield timestep
 
 
-def run(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Episode:
+def run(environment, policy: Policy, seed: int, max_steps: int | None = None) -> EpisodeResult:
     """Play one episode and return its results; for the arguments see `rollout`."""
     rewards = [timestep.reward for timestep in rollout(environment, policy, seed, max_steps) if not timestep.first()]
     progress = {name: float(value) for name, value in environment.task.progress.items()}
-    return Episode(float(sum(rewards)), len(rewards), progress)
+    return EpisodeResult(float(sum(rewards)), len(rewards), progress)
 
 
-def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)) -> list[Episode]:
+def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)) -> list[EpisodeResult]:
     """Run one episode for each seed.
 
     Args:
@@ -110,7 +110,7 @@ def episodes_in_batch(
     policy: Policy,
     seeds: Sequence[int] = range(EPISODES),
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,
-) -> list[Episode]:
+) -> list[EpisodeResult]:
     """Run one episode for each seed, all at once.
 
     They are bit-equal to those of `episodes` if the policy takes observations as float32, as networks do.
@@ -148,4 +148,4 @@ def episodes_in_batch(
         playing &= ~ended
         if ended.any() and playing.any():
             environment.rest(~playing)
-    return [Episode(*each) for each in zip(totals.tolist(), lengths.tolist(), progress, strict=True)]
+    return [EpisodeResult(*each) for each in zip(totals.tolist(), lengths.tolist(), progress, strict=True)]

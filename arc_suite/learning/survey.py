@@ -15,7 +15,7 @@ from arc_suite import rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
-from arc_suite.evaluation.trial import MOST_TILT_COSINE
+from arc_suite.evaluation.first_walk import MOST_TILT_COSINE
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots.spec import Body
 
@@ -23,7 +23,7 @@ _LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
 _MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
 
 
-class Trial(NamedTuple):
+class Case(NamedTuple):
     """One walk of a survey.
 
     Attributes:
@@ -41,7 +41,7 @@ class Outcome(NamedTuple):
     """The result of a walk.
 
     Attributes:
-        trial: the walk.
+        case: the walk.
         froude: mean forward speed in units of sqrt(g h).
         lengths: forward displacement in body lengths.
         drift: sideways displacement as a share of the forward one.
@@ -49,7 +49,7 @@ class Outcome(NamedTuple):
         failures: reasons why it does not count as walking; empty if it does.
     """
 
-    trial: Trial
+    case: Case
     froude: float
     lengths: float
     drift: float
@@ -59,12 +59,12 @@ class Outcome(NamedTuple):
     @property
     def legs(self) -> int:
         """Number of legs."""
-        return len(self.trial.setup.body.legs)
+        return len(self.case.setup.body.legs)
 
     @property
     def links(self) -> int:
         """Number of links of a leg."""
-        return len(self.trial.setup.body.legs[0].joints)
+        return len(self.case.setup.body.legs[0].joints)
 
 
 class Trajectory(NamedTuple):
@@ -81,16 +81,16 @@ class Trajectory(NamedTuple):
     ending: str
 
 
-def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
+def play(case: Case) -> tuple[control.Environment, Trajectory]:
     """Play the walk of one body.
 
     Returns:
         The environment as the walk left it, and the walk.
     """
-    environment = trial.setup.load(trial.seed)
-    demonstrator = Demonstrator(environment, "medium" if trial.froude is None else trial.froude)
+    environment = case.setup.load(case.seed)
+    demonstrator = Demonstrator(environment, "medium" if case.froude is None else case.froude)
     data = environment.physics.data.ptr
-    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in trial.setup.body.torso.solids]
+    shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in case.setup.body.torso.solids]
     step, ending = environment.reset(), "time"
     positions, touching = [data.qpos[:2].copy()], [False]
     try:
@@ -105,13 +105,13 @@ def play(trial: Trial) -> tuple[control.Environment, Trajectory]:
     return environment, Trajectory(np.array(positions), np.array(touching), ending)
 
 
-def assess(trial: Trial, trajectory: Trajectory) -> Outcome:
+def assess(case: Case, trajectory: Trajectory) -> Outcome:
     """Return whether a trajectory is a walk, and if not, why; see `failures`."""
-    body, seconds = trial.setup.body, trial.setup.task_kwargs["time_limit"]
+    body, seconds = case.setup.body, case.setup.task_kwargs["time_limit"]
     forward, sideways = apart = trajectory.positions[-1] - trajectory.positions[0]
     touching = trajectory.touching.mean()
     return Outcome(
-        trial=trial,
+        case=case,
         froude=float(_froude(body, forward, seconds)),
         lengths=float(forward / _length(body)),
         drift=float(abs(sideways) / max(abs(forward), 1e-9)),
@@ -148,36 +148,36 @@ def _length(body: Body) -> float:
     return 2.0 * body.torso.solids[0].size[0]
 
 
-def run(trial: Trial) -> Outcome:
+def run(case: Case) -> Outcome:
     """Play the walk of one body and assess it."""
-    environment, trajectory = play(trial)
+    environment, trajectory = play(case)
     environment.close()
-    return assess(trial, trajectory)
+    return assess(case, trajectory)
 
 
-def survey(trials: Sequence[Trial], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
-    """Run many trials.
+def survey(cases: Sequence[Case], processes: int | None = None, progress: Callable = tqdm) -> Iterator[Outcome]:
+    """Run many cases.
 
     Args:
-        trials: to run.
+        cases: to run.
         processes: to run them on, at most one for each; None for one per core.
         progress: makes a progress bar as `tqdm` does.
 
     Yields:
-        The outcomes, in the order of the trials.
+        The outcomes, in the order of the cases.
 
     Raises:
         ValueError: a walk that need not end, or a setting that does not fit.
     """
-    for trial in trials:
-        protocol.check_ends(trial.setup.task_kwargs["time_limit"])
-    progress = functools.partial(progress, total=len(trials), unit="body", desc="walk")
+    for case in cases:
+        protocol.check_ends(case.setup.task_kwargs["time_limit"])
+    progress = functools.partial(progress, total=len(cases), unit="body", desc="walk")
     if processes == 1:
-        yield from progress(map(run, trials))
+        yield from progress(map(run, cases))
         return
     # Spawned, not forked: a fork would share whatever OpenGL or threads the caller has open.
-    with multiprocessing.get_context("spawn").Pool(processes and min(processes, len(trials))) as pool:
-        yield from progress(pool.imap(run, trials))
+    with multiprocessing.get_context("spawn").Pool(processes and min(processes, len(cases))) as pool:
+        yield from progress(pool.imap(run, cases))
 
 
 def table(outcomes: Sequence[Outcome]) -> str:

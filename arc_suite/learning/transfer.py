@@ -64,7 +64,7 @@ FAMILIES = {
 }
 
 
-class Episode(NamedTuple):
+class Judged(NamedTuple):
     """One episode of a body.
 
     Attributes:
@@ -79,7 +79,7 @@ class Episode(NamedTuple):
     tracking: float
 
 
-class Trial(NamedTuple):
+class Comparison(NamedTuple):
     """The episodes of one body.
 
     Attributes:
@@ -90,9 +90,9 @@ class Trial(NamedTuple):
     """
 
     body: str
-    policy: Episode
-    demonstrator: Episode
-    zero: Episode
+    policy: Judged
+    demonstrator: Judged
+    zero: Judged
 
     @property
     def score(self) -> float:
@@ -123,7 +123,7 @@ class Result(NamedTuple):
     tracking: float
 
 
-def trials(network: Network, bodies: Iterable[Body], task: str, settings: Mapping | None = None) -> list[Trial]:
+def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mapping | None = None) -> list[Comparison]:
     """Play the episodes of bodies, body i from seed i.
 
     Args:
@@ -152,43 +152,43 @@ def trials(network: Network, bodies: Iterable[Body], task: str, settings: Mappin
         played = [_episodes(environment, policy) for policy in (network, Teacher(environment), zero)]
     finally:
         environment.close()
-    return [Trial(*each) for each in zip([body.name for body in bodies], *played, strict=True)]
+    return [Comparison(*each) for each in zip([body.name for body in bodies], *played, strict=True)]
 
 
-def of_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Trial]:
-    """Play the episodes of a family of `FAMILIES`; see `trials`."""
+def of_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Comparison]:
+    """Play the episodes of a family of `FAMILIES`; see `compare`."""
     family = FAMILIES[name]
     bodies = [family.made(index) for index in range(family.count)]
-    return trials(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
+    return compare(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
 
 
-def result(played: list[Trial]) -> Result:
-    """Return the results of trials; bodies whose demonstrators gain nothing count in no score."""
-    scored = sorted((trial for trial in played if not math.isnan(trial.score)), key=lambda trial: trial.score)
+def result(played: list[Comparison]) -> Result:
+    """Return the results of comparisons; bodies whose demonstrators gain nothing count in no score."""
+    scored = sorted((each for each in played if not math.isnan(each.score)), key=lambda each: each.score)
     worst = scored[: max(1, round(_WORST * len(scored)))]
-    tracking = [[episode.tracking for episode in (trial.policy, trial.demonstrator)] for trial in played]
+    tracking = [[episode.tracking for episode in (each.policy, each.demonstrator)] for each in played]
     policy, demonstrator = np.mean(tracking, axis=0)
     return Result(
         count=len(played),
-        walk=float(np.mean([trial.policy.walked for trial in played])),
-        demonstrated=float(np.mean([trial.demonstrator.walked for trial in played])),
+        walk=float(np.mean([each.policy.walked for each in played])),
+        demonstrated=float(np.mean([each.demonstrator.walked for each in played])),
         score=_gain(scored),
         worst=_gain(worst),
-        share=float(np.mean([trial.policy.total / trial.demonstrator.total for trial in played])),
+        share=float(np.mean([each.policy.total / each.demonstrator.total for each in played])),
         tracking=float(policy / demonstrator),
     )
 
 
-def _gain(played: list[Trial]) -> float:
-    """The policy's gain over standing still as a share of the demonstrators'; NaN without trials.
+def _gain(played: list[Comparison]) -> float:
+    """The policy's gain over standing still as a share of the demonstrators'; NaN without comparisons.
 
     Sums, as the gain of a single demonstrator may be small.
     """
-    gains = [[trial.policy.total - trial.zero.total, trial.demonstrator.total - trial.zero.total] for trial in played]
+    gains = [[each.policy.total - each.zero.total, each.demonstrator.total - each.zero.total] for each in played]
     return float(np.divide(*np.sum(gains, axis=0))) if gains else math.nan
 
 
-def _episodes(environment: FlatBodies, policy: Policy) -> list[Episode]:
+def _episodes(environment: FlatBodies, policy: Policy) -> list[Judged]:
     """Play an episode in every environment, from the seed of its index, and judge the walks."""
     bodies, count = environment.unwrapped, environment.num_envs
     touching, fell = np.zeros(count), np.zeros(count, bool)
@@ -211,7 +211,7 @@ def _episodes(environment: FlatBodies, policy: Policy) -> list[Episode]:
             touching[index] / episode.length,
             "fall" if fell[index] else "time",
         )
-        found.append(Episode(episode.total, not failures, episode.progress.get("tracking", math.nan)))
+        found.append(Judged(episode.total, not failures, episode.progress.get("tracking", math.nan)))
     return found
 
 

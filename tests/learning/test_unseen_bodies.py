@@ -7,18 +7,20 @@ import pytest
 from legs import network as drawn
 
 from arc_suite.learning import transfer
-from arc_suite.learning.transfer import Episode, Trial
+from arc_suite.learning.transfer import Comparison, Judged
 from arc_suite.robots import ROBOTS
 
 
-def trial(policy, demonstrator, zero, walked=True):
-    return Trial("body", Episode(policy, walked, math.nan), Episode(demonstrator, True, math.nan), Episode(zero, 0, 0))
+def compared(policy, demonstrator, zero, walked=True):
+    return Comparison(
+        "body", Judged(policy, walked, math.nan), Judged(demonstrator, True, math.nan), Judged(zero, 0, 0)
+    )
 
 
 def test_a_score_is_the_way_from_standing_to_the_demonstrator():
-    assert trial(15.0, 20.0, 10.0).score == 0.5
-    assert math.isnan(trial(15.0, 10.0, 10.0).score)
-    result = transfer.result([trial(15.0, 20.0, 10.0), trial(10.0, 30.0, 10.0, False), trial(0.0, 1.0, 2.0)])
+    assert compared(15.0, 20.0, 10.0).score == 0.5
+    assert math.isnan(compared(15.0, 10.0, 10.0).score)
+    result = transfer.result([compared(15.0, 20.0, 10.0), compared(10.0, 30.0, 10.0, False), compared(0.0, 1.0, 2.0)])
     assert (result.count, result.score, result.worst) == (3, pytest.approx(5.0 / 30.0), 0.0)
     assert (result.walk, result.demonstrated) == (pytest.approx(2 / 3), 1.0)
 
@@ -38,7 +40,7 @@ def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
     """Scale changes little: small and large bodies of a seed earn the same, up to the noise of starts."""
     monkeypatch.setattr(transfer, "STEPS", 120)
     bodies = [transfer.FAMILIES[name].made(0) for name in ("small", "large")]
-    small, large = transfer.trials(drawn(), bodies, "walk")
+    small, large = transfer.compare(drawn(), bodies, "walk")
     assert small.demonstrator.walked and large.demonstrator.walked
     assert not small.policy.walked and not small.zero.walked
     assert small.demonstrator.total > small.zero.total > 0.0
@@ -49,6 +51,6 @@ def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
 @pytest.mark.slow
 def test_tracking_of_tasks_with_a_command(monkeypatch):
     monkeypatch.setattr(transfer, "STEPS", 60)
-    played = transfer.trials(drawn(task="steer"), [transfer.FAMILIES["random"].made(1)], "steer")
+    played = transfer.compare(drawn(task="steer"), [transfer.FAMILIES["random"].made(1)], "steer")
     assert 0.0 < played[0].demonstrator.tracking <= 1.0
     assert np.isfinite(transfer.result(played).tracking)

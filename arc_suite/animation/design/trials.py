@@ -10,7 +10,7 @@ from arc_suite import checks, evaluation, policies, registry, rotations
 from arc_suite.animation.design.genes import Budget
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation.trial import MOST_TILT_COSINE
+from arc_suite.evaluation.first_walk import MOST_TILT_COSINE
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import Policy

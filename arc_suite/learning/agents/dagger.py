@@ -26,7 +26,7 @@ from arc_suite.policies.teachers import Teacher
 CHUNK = 20  # updates of one call
 
 
-class State(NamedTuple):
+class DaggerState(NamedTuple):
     """What an update changes.
 
     Attributes:
@@ -124,18 +124,20 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
         yield Slice(step, metrics, policy(architecture, normalise, state), checkpoint)
 
 
-def begin(layers) -> State:
+def begin(layers) -> DaggerState:
     """Return the state before the first update of a network."""
-    return jax.tree.map(jnp.asarray, State(layers, optax.scale_by_adam().init(layers)))
+    return jax.tree.map(jnp.asarray, DaggerState(layers, optax.scale_by_adam().init(layers)))
 
 
-def policy(architecture: Architecture, normalise: Layer, state: State) -> tuple[Layer, ...]:
+def policy(architecture: Architecture, normalise: Layer, state: DaggerState) -> tuple[Layer, ...]:
     """Return the layers of a policy file."""
     return normalise, *architecture.exported(state.layers), Layer("clip")
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=1)
-def fit(architecture: Architecture, state: State, observations, labels, batches, rates) -> tuple[State, Any]:
+def fit(
+    architecture: Architecture, state: DaggerState, observations, labels, batches, rates
+) -> tuple[DaggerState, Any]:
     """Make updates by Adam towards the least squared distance from labels.
 
     Args:
@@ -159,7 +161,7 @@ def fit(architecture: Architecture, state: State, observations, labels, batches,
         loss, gradient = jax.value_and_grad(error)(state.layers, batch)
         steps, moments = optax.scale_by_adam().update(gradient, state.moments)
         layers = jax.tree.map(lambda layer, step: layer - rate * step, state.layers, steps)
-        return State(layers, moments), loss
+        return DaggerState(layers, moments), loss
 
     state, losses = jax.lax.scan(update, state, (batches, rates))
     return state, losses.mean()

@@ -187,7 +187,7 @@ _held_out_loss = jax.jit(sac.held_out_loss, static_argnums=0)
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=(1, 2))
-def update(hp: SoftActorCritic, state: sac.State, sums: dict, batch: Transitions, noise: sac.Noise, next_actions):
+def update(hp: SoftActorCritic, state: sac.SacState, sums: dict, batch: Transitions, noise: sac.Noise, next_actions):
     """Make an update, and return the state and the sums of the metrics with this update's added."""
     state, metrics = sac.update(hp, state, batch, noise, next_actions)
     return state, {name: sums[name] + metric for name, metric in metrics.items()}
@@ -246,7 +246,7 @@ def _distributions(policy, source, inputs: Inputs) -> list[np.ndarray]:
 
 
 def validation_loss(
-    hp: SoftActorCritic, seed: int, updates: int, state: sac.State, sources, inputs: Inputs, phase: Phase
+    hp: SoftActorCritic, seed: int, updates: int, state: sac.SacState, sources, inputs: Inputs, phase: Phase
 ) -> float:
     """Return the policy's loss on the validation set of a phase."""
     size = hp.batch * min(phase.held_out // hp.batch, hp.scored_batches)

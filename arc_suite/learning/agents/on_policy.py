@@ -118,7 +118,7 @@ def batch_of(
     values,
     normalise: Layer,
     symmetry,
-) -> ppo.Batch:
+) -> ppo.Horizon:
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
     size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
     observations = network.forward([normalise], rollout["observations"])
@@ -140,7 +140,7 @@ def batch_of(
         actions, means = (numpy.concatenate([each, mirror_action(each)]) for each in (actions, means))
         advantages, returns = numpy.tile(advantages, 2), numpy.tile(returns, 2)
     arrays = (observations, actions, means, advantages, returns)
-    return ppo.Batch(*(jnp.asarray(array, jnp.float32) for array in arrays))
+    return ppo.Horizon(*(jnp.asarray(array, jnp.float32) for array in arrays))
 
 
 def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Layer, tuple]:

@@ -19,7 +19,7 @@ _MOST_RATE, _LEAST_RATE = 1e-2, 1e-6  # of the policy
 _STEP = 1.5  # factor by which it follows the divergence
 
 
-class State(NamedTuple):
+class PpoState(NamedTuple):
     """What updates change.
 
     Attributes:
@@ -35,7 +35,7 @@ class State(NamedTuple):
     rate: Any
 
 
-class Batch(NamedTuple):
+class Horizon(NamedTuple):
     """Transitions of a horizon; leading axis (steps,).
 
     Attributes:
@@ -55,14 +55,14 @@ class Batch(NamedTuple):
 
 def begin(
     hp: ProximalPolicy, architecture: Architecture, random: np.random.Generator, policy: tuple | None = None
-) -> State:
+) -> PpoState:
     """Draw the networks; with a given policy only that of values."""
     drawn = architecture.drawn(random, hp.hidden, last_gain=0.01)
     policy = drawn if policy is None else policy
     values = architecture.drawn_values(random, hp.hidden)
     adam = optax.scale_by_adam()
     return jax.tree.map(
-        jnp.asarray, State(policy, values, (adam.init(policy), adam.init(values)), np.float32(hp.policy_rate))
+        jnp.asarray, PpoState(policy, values, (adam.init(policy), adam.init(values)), np.float32(hp.policy_rate))
     )
 
 
@@ -95,8 +95,8 @@ def advantages(hp: ProximalPolicy, rewards, values, next_values, terminated, end
 def update(
     hp: ProximalPolicy,
     architecture: Architecture,
-    state: State,
-    batch: Batch,
+    state: PpoState,
+    batch: Horizon,
     orders,
     schedules,
     with_policy: bool = True,
@@ -118,18 +118,18 @@ def update(
     std, desired_kl = schedules
     adam = optax.scale_by_adam()
 
-    def divergence(policy, part: Batch):
+    def divergence(policy, part: Horizon):
         apart = architecture.actions(policy, part.observations) - part.means
         return (apart**2).sum(axis=-1).mean() / (2.0 * std**2)
 
-    def policy_loss(policy, part: Batch):
+    def policy_loss(policy, part: Horizon):
         means = architecture.actions(policy, part.observations)
         nearer = ((part.actions - part.means) ** 2 - (part.actions - means) ** 2).sum(axis=-1)
         ratio = jnp.exp(nearer / (2.0 * std**2))
         clipped = ratio.clip(1.0 - hp.clip, 1.0 + hp.clip)
         return -jnp.minimum(ratio * part.advantages, clipped * part.advantages).mean()
 
-    def value_loss(values, part: Batch):
+    def value_loss(values, part: Horizon):
         return ((architecture.values(values, part.observations) - part.returns) ** 2).mean()
 
     def stepped(network, gradient, moments, rate):
@@ -147,7 +147,7 @@ def update(
             policy, of_policy = stepped(policy, jax.grad(policy_loss)(policy, part), of_policy, state.rate)
         loss, gradient = jax.value_and_grad(value_loss)(state.values, part)
         values, of_values = stepped(state.values, gradient, of_values, hp.value_rate)
-        return State(policy, values, (of_policy, of_values), state.rate), loss
+        return PpoState(policy, values, (of_policy, of_values), state.rate), loss
 
     state, losses = jax.lax.scan(once, state, orders)
     # Without the mirrored transitions at the end, which no policy has acted in.

@@ -36,7 +36,7 @@ def core(hp: SoftActorCritic) -> SoftActorCritic:
     return SoftActorCritic(**{name: getattr(hp, name) for name in names})
 
 
-class State(NamedTuple):
+class SacState(NamedTuple):
     """What an update changes.
 
     Attributes:
@@ -69,7 +69,7 @@ class Noise(NamedTuple):
     kept: Any
 
 
-def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> State:
+def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: int) -> SacState:
     """Draw the networks for observations (size,) and actions (joints,)."""
     hidden = [hp.hidden] * HIDDEN_LAYERS
     *trunk, mean = networks.mlp(random, (size, *hidden, joints), layer_norm=True, last_gain=hp.last_gain)
@@ -79,7 +79,7 @@ def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: i
     critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
     adam, log_alpha = optimiser(hp), np.array(math.log(hp.initial_temperature), np.float32)
     moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
-    return jax.tree.map(jnp.array, State(policy, critics, critics, log_alpha, moments))
+    return jax.tree.map(jnp.array, SacState(policy, critics, critics, log_alpha, moments))
 
 
 def optimiser(hp: SoftActorCritic) -> optax.GradientTransformation:
@@ -145,7 +145,7 @@ def values(critics, observations, actions, kept=None, dropout: float = 0.0):
     return results
 
 
-def targets(hp: SoftActorCritic, state: State, batch: Transitions, noise: Noise, next_actions=None):
+def targets(hp: SoftActorCritic, state: SacState, batch: Transitions, noise: Noise, next_actions=None):
     """Return the targets of the critics, (batch,); `next_actions` as in `update`."""
     next_actions = distribution(state.policy, batch.next_observations) if next_actions is None else next_actions
     action, density = sample(*next_actions, noise.next_action)
@@ -160,7 +160,7 @@ def critics_loss(hp: SoftActorCritic, critics, batch: Transitions, target, kept)
     return sum(jnp.mean((value - target) ** 2) for value in found), sum(found).mean() / CRITICS
 
 
-def policy_loss(hp: SoftActorCritic, policy, state: State, observations, noise, kept):
+def policy_loss(hp: SoftActorCritic, policy, state: SacState, observations, noise, kept):
     """Return the mean of alpha log pi minus the mean of the critics, and the mean of log pi."""
     action, density = sample(*distribution(policy, observations), noise)
     value = sum(values(state.critics, observations, action, kept, hp.dropout)) / CRITICS
@@ -168,8 +168,8 @@ def policy_loss(hp: SoftActorCritic, policy, state: State, observations, noise, 
 
 
 def update(
-    hp: SoftActorCritic, state: State, batch: Transitions, noise: Noise, next_actions=None
-) -> tuple[State, dict]:
+    hp: SoftActorCritic, state: SacState, batch: Transitions, noise: Noise, next_actions=None
+) -> tuple[SacState, dict]:
     """Return the state after one update, and its metrics, scalars by name.
 
     Args:
@@ -197,12 +197,12 @@ def update(
     return state._replace(critics=critics, targets=averaged, moments=moments), metrics
 
 
-def held_out_loss(hp: SoftActorCritic, state: State, observations, noise, kept):
+def held_out_loss(hp: SoftActorCritic, state: SacState, observations, noise, kept):
     """Return the policy's loss on observations (batch, size), which ends phases."""
     return policy_loss(hp, state.policy, state, observations, noise, kept)[0]
 
 
-def exported(state: State) -> tuple[Layer, ...]:
+def exported(state: SacState) -> tuple[Layer, ...]:
     """Return the deterministic policy, the tanh of the mean, as layers of a policy file."""
     return *networks.exported((*state.policy["trunk"], state.policy["mean"])), Layer("tanh")
 

@@ -1,10 +1,10 @@
-"""Run the benchmark: ten places, three tracks, a score.
+"""Run the benchmark: ten places, three divisions, a score.
 
-A score is (return - standing still) / (best demonstrator - standing still). The track `top` gives an algorithm a
+A score is (return - standing still) / (best demonstrator - standing still). The division `top` gives an algorithm a
 million steps, three on uneven ground and among pillars; `samples` gives it 100,000; `demonstrations` gives it 100,000,
-and 100 episodes of a demonstrator. The runs of an algorithm on a track are a study: killed at any moment, the same
+and 100 episodes of a demonstrator. The runs of an algorithm on a division are a study: killed at any moment, the same
 command resumes. Policies of other libraries are files ROBOT-TASK-SEED in a folder: .zip of stable-baselines3, .npz,
-.py with a function make(robot), or folders of runs. Without a track the command prints the table of all learners.
+.py with a function make(robot), or folders of runs. Without a division the command prints the table of all learners.
 
   arc-suite benchmark samples --algorithm sac_parallel
   arc-suite benchmark top --algorithm ppo --seeds 2 --jobs 8
@@ -21,7 +21,7 @@ from arc_suite import checks, files
 from arc_suite.cli.program import marked_page, progress
 from arc_suite.envs.vector import usable_cores
 from arc_suite.learning.studies import benchmark, leaderboard, report, results, runner, tables
-from arc_suite.learning.studies.tracks import PLACES, SEEDS, TRACKS
+from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")
@@ -35,27 +35,27 @@ flags.DEFINE_string("results", "studies", "Folder of the tables and reports.")
 flags.DEFINE_string("page", None, "Page to write the table into, between the lines <!-- table --> and <!-- end -->.")
 
 
-def main(track: str | None = None) -> int:
-    """Run a track, and print or write the table; the exit status is 0 if no run has failed."""
+def main(division: str | None = None) -> int:
+    """Run a division, and print or write the table; the exit status is 0 if no run has failed."""
     places = [checks.name(each, ["-".join(each) for each in PLACES], "place") for each in FLAGS.places]
     write = FLAGS.page and marked_page("page", FLAGS.page)
     status = 0
-    if track is not None:
-        checks.name(track, TRACKS, "track")
-        status = scored(track) if FLAGS.policies else learned(track, places)
+    if division is not None:
+        checks.name(division, DIVISIONS, "division")
+        status = scored(division) if FLAGS.policies else learned(division, places)
     table = benchmark.text(Path(FLAGS.results))
     (write or print)(table)
     return status
 
 
-def learned(track: str, places: list[str]) -> int:
+def learned(division: str, places: list[str]) -> int:
     """Make the runs of the algorithm, and write their report and scores.
 
     Raises:
-        ValueError: an algorithm that the track does not take.
+        ValueError: an algorithm that the division does not take.
     """
-    study = tables.benchmark(track, FLAGS.algorithm)
-    name = f"{track}-{tables.folder_name(FLAGS.algorithm)}"
+    study = tables.benchmark(division, FLAGS.algorithm)
+    name = f"{division}-{tables.folder_name(FLAGS.algorithm)}"
     runs = [each for each in study.runs if _is_asked(each, places)]
     folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
     states = runner.make_and_show(runs, folder, published, FLAGS.jobs or usable_cores(), progress)
@@ -65,7 +65,7 @@ def learned(track: str, places: list[str]) -> int:
     return int(any(each.word == "failed" for each in states))
 
 
-def scored(track: str) -> int:
+def scored(division: str) -> int:
     """Score the policies of a folder.
 
     Raises:
@@ -76,7 +76,7 @@ def scored(track: str) -> int:
     policies = Path(FLAGS.policies)
     name = leaderboard.checked_name(FLAGS.name or policies.resolve().name)
     scores = benchmark.of_policies(policies, progress)
-    benchmark.write(files.folder(Path(FLAGS.results, f"{track}-{name}")), scores)
+    benchmark.write(files.folder(Path(FLAGS.results, f"{division}-{name}")), scores)
     return 0
 
 

@@ -51,8 +51,8 @@ def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
     """Return the ends of up to twelve walks, each with its seed and failures: (height, width, 3) uint8."""
     views = []
     for outcome in outcomes[:12]:
-        environment, _ = survey.play(outcome.trial)
-        caption = f"seed {outcome.trial.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
+        environment, _ = survey.play(outcome.case)
+        caption = f"seed {outcome.case.seed}: {outcome.legs} x {outcome.links}, {', '.join(outcome.failures)}"
         view = environment.physics.render(300, 400, "portrait", quality="still")
         views.append(films.captioned(view, caption))
         environment.close()
@@ -80,21 +80,21 @@ def main() -> None:
     name, settings = task()
     settings = {"time_limit": FLAGS.seconds} | settings
     settings |= {"duty_factor": 0.6, "phase_offsets": 0.0} if FLAGS.in_phase else {}
-    trials = []
+    cases = []
     for seed in range(FLAGS.first, FLAGS.first + FLAGS.count):
         setup = Setup.of(member(seed), name, settings)
-        trials.append(survey.Trial(setup, seed, FLAGS.froude))
+        cases.append(survey.Case(setup, seed, FLAGS.froude))
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
             checks.extension(FLAGS.picture, [".png"])
         path = FLAGS.picture and stack.enter_context(files.writing(FLAGS.picture))
-        outcomes = list(survey.survey(trials, FLAGS.processes, progress))
+        outcomes = list(survey.survey(cases, FLAGS.processes, progress))
         print(survey.table(outcomes))
         print(survey.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]
         for outcome in failed:
             print(
-                f"seed {outcome.trial.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
+                f"seed {outcome.case.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
             )
         if path:
             imageio.imwrite(path, picture(failed or outcomes))

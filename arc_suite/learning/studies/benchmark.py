@@ -1,6 +1,6 @@
-"""The benchmark: scores of runs on its tracks, see `tracks`, and of policies of other libraries.
+"""The benchmark: scores of runs on its divisions, see `divisions`, and of policies of other libraries.
 
-studies/<track>-<learner>/scores.csv    a line for each run, by `write`
+studies/<division>-<learner>/scores.csv    a line for each run, by `write`
 
 The table of all learners is made from these files alone.
 """
@@ -19,9 +19,9 @@ from arc_suite import checks, evaluation, files, policies, style
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import results
+from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.studies.results import Result
-from arc_suite.learning.studies.tracks import PLACES, SEEDS, TRACKS, TURNING
 from arc_suite.policies import named, network, zips
 
 SCORES = "scores.csv"
@@ -139,7 +139,7 @@ def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
 
 
 def write(folder: Path, scores: Sequence[Score]) -> None:
-    """Write the scores of a learner on a track into its folder.
+    """Write the scores of a learner on a division into its folder.
 
     Raises:
         OSError: the file cannot be written.
@@ -163,24 +163,24 @@ def read(path: Path) -> list[Score]:
 
 
 def text(studies: Path) -> str:
-    """Return the table of the benchmark in Markdown: all learners in a folder of studies, by track and score.
+    """Return the table of the benchmark in Markdown: all learners in a folder of studies, by division and score.
 
     Raises:
-        ValueError: no scores, a damaged file of them, or a folder of a name that begins with no track.
+        ValueError: no scores, a damaged file of them, or a folder of a name that begins with no division.
         OSError: a file cannot be read.
     """
     lines = []
     for path in studies.glob(f"*/{SCORES}"):
-        track, _, learner = path.parent.name.partition("-")
-        order = tuple(TRACKS).index(checks.name(track, TRACKS, "track"))
+        division, _, learner = path.parent.name.partition("-")
+        order = tuple(DIVISIONS).index(checks.name(division, DIVISIONS, "division"))
         if scores := read(path):
             groups = _by_place(scores)
             middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
-            lines.append((order, not all(groups), -middle, track, learner, *_cells(groups)))
+            lines.append((order, not all(groups), -middle, division, learner, *_cells(groups)))
     if not lines:
-        raise ValueError(f"{studies}: holds no scores of the benchmark; run a track, or name their folder by --results")
+        raise ValueError(f"{studies}: holds no scores of the benchmark; run one, or name its folder by --results")
     places = [" ".join(each) for each in PLACES]
-    heads = ["track", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
+    heads = ["division", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
     return table(heads, [line[3:] for line in sorted(lines)])
 
 

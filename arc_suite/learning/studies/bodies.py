@@ -10,26 +10,26 @@ from pathlib import Path
 
 from arc_suite.learning import transfer
 from arc_suite.learning.studies.leaderboard import table
-from arc_suite.learning.transfer import Episode, Trial
+from arc_suite.learning.transfer import Comparison, Judged
 
 HEADS = ("family", "body", "who", "return", "walked", "tracking")
 WHO = ("policy", "demonstrator", "zero")
 
 
-def write(path: Path, played: Mapping[str, Sequence[Trial]]) -> None:
-    """Write the episodes of trials by family."""
+def write(path: Path, played: Mapping[str, Sequence[Comparison]]) -> None:
+    """Write the episodes of comparisons by family."""
     with path.open("w", encoding="utf-8", newline="") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(HEADS)
-        for family, trials in played.items():
-            for trial in trials:
+        for family, comparisons in played.items():
+            for comparison in comparisons:
                 for who in WHO:
-                    total, walked, tracking = getattr(trial, who)
-                    lines.writerow((family, trial.body, who, round(total, 3), int(walked), round(tracking, 4)))
+                    total, walked, tracking = getattr(comparison, who)
+                    lines.writerow((family, comparison.body, who, round(total, 3), int(walked), round(tracking, 4)))
 
 
-def read(path: Path) -> dict[str, list[Trial]]:
-    """Return the trials by family that `write` wrote.
+def read(path: Path) -> dict[str, list[Comparison]]:
+    """Return the comparisons by family that `write` wrote.
 
     Raises:
         ValueError: another table.
@@ -38,11 +38,11 @@ def read(path: Path) -> dict[str, list[Trial]]:
         heads, *lines = csv.reader(file)
     if tuple(heads) != HEADS or len(lines) % len(WHO):
         raise ValueError(f"{path}: expected the columns {', '.join(HEADS)}, three lines a body")
-    found: dict[str, list[Trial]] = {}
+    found: dict[str, list[Comparison]] = {}
     for first in range(0, len(lines), len(WHO)):
         family, body = lines[first][:2]
-        episodes = [Episode(float(line[3]), bool(int(line[4])), float(line[5])) for line in lines[first : first + 3]]
-        found.setdefault(family, []).append(Trial(body, *episodes))
+        episodes = [Judged(float(line[3]), bool(int(line[4])), float(line[5])) for line in lines[first : first + 3]]
+        found.setdefault(family, []).append(Comparison(body, *episodes))
     return found
 
 
@@ -59,7 +59,7 @@ def text(folder: Path) -> str:
     rows = []
     for path in sorted(folder.glob("*.csv")):
         policy, _, task = path.stem.rpartition("-")
-        results = {family: transfer.result(trials) for family, trials in read(path).items()}
+        results = {family: transfer.result(comparisons) for family, comparisons in read(path).items()}
         rows.append([policy, task, *(_cell(results.get(family)) for family in transfer.FAMILIES)])
     if not rows:
         raise ValueError(f"{folder}: holds no tables of episodes; write one by -o, or name their folder by --results")

@@ -11,7 +11,7 @@ from arc_suite.data import Settings
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.configuration import Configuration
-from arc_suite.learning.studies.tracks import PLACES, SEEDS, TRACKS
+from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
@@ -208,13 +208,13 @@ STUDIES = {
             run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
         ),
     ),
-    # Steps as on the track `top`.
+    # Steps as on the division `top`.
     "from-nothing": Study(
         "PPO from nothing in the other tasks, Tick; uneven ground and pillars three million steps",
         (
-            *(run("tick", "ppo", TRACKS["top"].steps_in(task), task=task) for task in TASKS if task != "walk"),
+            *(run("tick", "ppo", DIVISIONS["top"].steps_in(task), task=task) for task in TASKS if task != "walk"),
             # Without a curriculum it learns to stand at the first trench.
-            run("tick", "ppo", TRACKS["top"].far_steps, 0, "gaps", {"curriculum": True}, label="ppo-curriculum"),
+            run("tick", "ppo", DIVISIONS["top"].far_steps, 0, "gaps", {"curriculum": True}, label="ppo-curriculum"),
         ),
     ),
     # Four to six minutes of a core a run. One-step returns learn faster on some seeds, and fall on others.
@@ -261,22 +261,22 @@ STUDIES = {
 }
 
 
-def benchmark(track: str, algorithm: str) -> Study:
-    """Return the study of an algorithm on a track of the benchmark: all places with the first seed, then the others.
+def benchmark(division: str, algorithm: str) -> Study:
+    """Return the study of an algorithm on a division of the benchmark: all places with the first seed, then the others.
 
     Raises:
-        ValueError: an unknown track or algorithm, or one that learns from something else than the track gives.
+        ValueError: an unknown division or algorithm, or one that learns from something else than the division gives.
     """
-    rule = TRACKS[checks.name(track, TRACKS, "track")]
+    rule = DIVISIONS[checks.name(division, DIVISIONS, "division")]
     if (source := algorithms.algorithm(algorithm).source) != rule.source:
         fit = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.source == rule.source)
-        what = f"algorithm {algorithm} learns from {source}, and the track {track} takes those that learn from"
+        what = f"algorithm {algorithm} learns from {source}, and the division {division} takes those that learn from"
         raise ValueError(f"{what} {rule.source}: {fit}")
     runs = []
     for seed, (robot, task) in itertools.product(range(SEEDS), PLACES):
         prior = Prior(_collects(robot, task), rule.episodes) if rule.episodes else None
         runs.append(run(robot, algorithm, rule.steps_in(task), seed, task, prior=prior))
-    return Study(f"track {track} of the benchmark: {algorithm}", tuple(runs))
+    return Study(f"division {division} of the benchmark: {algorithm}", tuple(runs))
 
 
 def _collects(robot: str, task: str) -> str:
@@ -290,14 +290,14 @@ def folder_name(name: str) -> str:
 
 
 def study(name: str) -> Study:
-    """Return the study of a name, of `<track>-<algorithm>`, or of `module:attribute`, a `Study` on Python's path.
+    """Return the study of a name, of `<division>-<algorithm>`, or of `module:attribute`, a `Study` on Python's path.
 
     Raises:
         ValueError: there is none, or two of its runs have one name.
     """
-    track, _, algorithm = name.partition("-")
-    if track in TRACKS:
-        return benchmark(track, algorithm)
+    division, _, algorithm = name.partition("-")
+    if division in DIVISIONS:
+        return benchmark(division, algorithm)
     found = checks.imported(name, "study") if ":" in name else STUDIES[checks.name(name, STUDIES, "study")]
     if not isinstance(found, Study):
         raise ValueError(f"study {name!r}: expected a Study, got {type(found).__name__}")

@@ -83,7 +83,7 @@ def test_advantages_are_discounted_sums_of_surprises_within_an_episode():
 
 def batch(random, count=64, size=6, joints=3):
     arrays = random.normal(size=(count, size)), random.normal(size=(count, joints)), np.zeros((count, joints))
-    return ppo.Batch(*(array.astype(np.float32) for array in (*arrays, random.normal(size=count), np.ones(count))))
+    return ppo.Horizon(*(array.astype(np.float32) for array in (*arrays, random.normal(size=count), np.ones(count))))
 
 
 def test_the_policy_moves_towards_what_earned_more_and_values_towards_returns():

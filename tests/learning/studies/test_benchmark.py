@@ -1,4 +1,4 @@
-"""The benchmark: its tracks are studies, its scores come from published tables, its table says what was run."""
+"""The benchmark: its divisions are studies, its scores come from published tables, its table says what was run."""
 
 import os
 import pathlib
@@ -15,14 +15,14 @@ from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.studies import benchmark, results, tables
 from arc_suite.learning.studies.benchmark import Score
+from arc_suite.learning.studies.divisions import FAR, PLACES, SEEDS
 from arc_suite.learning.studies.results import Result
-from arc_suite.learning.studies.tracks import FAR, PLACES, SEEDS
 from arc_suite.policies.network import PACKAGED
 from arc_suite.tasks import TASKS
 
 ROOT = pathlib.Path(__file__).parents[3]
 COMMITTED = ROOT / "studies"
-# The presets that collect on the track of demonstrations.
+# The presets that collect on the division of demonstrations.
 PRESETS = {"walk": "medium", "steer": "reactive", "rough": "surefooted", "stairs": "surefooted", "navigate": "planned"}
 
 
@@ -55,11 +55,11 @@ def test_a_track_is_a_study(name, steps, far, prior):
 @pytest.mark.parametrize(
     ("name", "line"),
     [
-        ("top-dagger", "algorithm dagger learns from a demonstrator, and the track top takes those that learn from "),
-        ("samples-sope", "algorithm sope learns from prior data, and the track samples takes those that learn from "),
+        ("top-dagger", "algorithm dagger learns from a demonstrator, and the division top takes those that learn "),
+        ("samples-sope", "algorithm sope learns from prior data, and the division samples takes those that learn "),
         (
             "demonstrations-ppo",
-            "algorithm ppo learns from nothing, and the track demonstrations takes those that learn ",
+            "algorithm ppo learns from nothing, and the division demonstrations takes those that learn ",
         ),
         ("samples-pppo", "unknown algorithm 'pppo'; did you mean 'ppo'?"),
     ],
@@ -161,16 +161,16 @@ def run(*arguments, cwd):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        (["tops"], "unknown track 'tops'; did you mean 'top'? (there are: top, samples, demonstrations)"),
+        (["tops"], "unknown division 'tops'; did you mean 'top'? (there are: top, samples, demonstrations)"),
         (["top", "--places=tick-wlak"], "unknown place 'tick-wlak'; did you mean 'tick-walk'?"),
-        (["top", "--algorithm=bc"], "algorithm bc learns from prior data, and the track top takes those that learn "),
+        (["top", "--algorithm=bc"], "algorithm bc learns from prior data, and the division top takes those that "),
         (["top", "--policies=."], ".: expected policies named ROBOT-TASK-SEED, such as tick-walk-0.zip, got none"),
         (["top", "--policies=.", "--name=a/b"], "--name=a/b: expected letters, digits, _, - and ."),
         (["top", "--policies=none"], "cannot read none: no such file or directory"),
         (["--page=none.md"], "cannot read none.md: no such file or directory"),
         (["--page=plain.md"], "--page=plain.md: expected the lines <!-- table --> and <!-- end -->, got none"),
-        (["--page=page.md"], "studies: holds no scores of the benchmark; run a track, or name their folder by "),
-        ([], "studies: holds no scores of the benchmark; run a track, or name their folder by --results"),
+        (["--page=page.md"], "studies: holds no scores of the benchmark; run one, or name its folder by "),
+        ([], "studies: holds no scores of the benchmark; run one, or name its folder by --results"),
     ],
 )
 def test_errors_are_one_line(tmp_path, arguments, line):
@@ -246,8 +246,8 @@ def test_policies_of_others_are_scored(tmp_path):
 
 SHORT = """
 import sys
-from arc_suite.learning.studies import tracks
-tracks.TRACKS["samples"] = tracks.Track(300, 300)
+from arc_suite.learning.studies import divisions
+divisions.DIVISIONS["samples"] = divisions.Division(300, 300)
 from arc_suite.cli import program
 from arc_suite.learning.cli import benchmark
 program.run(benchmark.main, "benchmark", sys.argv[1:])
@@ -256,7 +256,7 @@ program.run(benchmark.main, "benchmark", sys.argv[1:])
 
 @pytest.mark.long
 def test_a_track_is_run_and_resumed(tmp_path):
-    """A track of 300 steps, by an algorithm that needs no JAX; the second command has nothing left to do."""
+    """A division of 300 steps, by an algorithm that needs no JAX; the second command has nothing left to do."""
     environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests" / "fixtures")])}
     (tmp_path / "short.py").write_text(SHORT)
     command = [sys.executable, "short.py", "samples", "--algorithm=tiny_studies:CLIMB", "--places=tick-walk"]

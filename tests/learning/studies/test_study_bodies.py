@@ -9,18 +9,18 @@ import pytest
 
 from arc_suite.learning import transfer
 from arc_suite.learning.studies import bodies
-from arc_suite.learning.transfer import Episode, Trial
+from arc_suite.learning.transfer import Comparison, Judged
 
 ROOT = pathlib.Path(__file__).parents[3]
 STUDY = ROOT / "studies" / "bodies"
 
 
-def trial(policy, tracking=math.nan):
-    return Trial("body", Episode(policy, True, tracking), Episode(20.0, True, 0.8), Episode(10.0, False, 0.1))
+def compared(policy, tracking=math.nan):
+    return Comparison("body", Judged(policy, True, tracking), Judged(20.0, True, 0.8), Judged(10.0, False, 0.1))
 
 
 def test_episodes_are_read_as_they_were_written(tmp_path):
-    played = {"robots": [trial(15.0, 0.4), trial(20.0, 0.6)], "small": [trial(10.0, 0.2)]}
+    played = {"robots": [compared(15.0, 0.4), compared(20.0, 0.6)], "small": [compared(10.0, 0.2)]}
     bodies.write(tmp_path / "one-steer.csv", played)
     assert bodies.read(tmp_path / "one-steer.csv") == played
     table = bodies.text(tmp_path).splitlines()
@@ -50,9 +50,9 @@ def test_what_ships_is_in_the_table_and_is_good():
     """Most bodies walk that nobody trained with, robots and their mutants among them."""
     found = bodies.read(STUDY / "universal-walk.csv")
     assert list(found) == list(transfer.FAMILIES)
-    results = {name: transfer.result(trials) for name, trials in found.items()}
+    results = {name: transfer.result(each) for name, each in found.items()}
     assert all(result.demonstrated == 1.0 for result in results.values())
     assert results["random"].walk == 1.0 and results["random"].score > 0.95
     assert min(results["robots"].walk, results["mutants"].walk) >= 0.8
-    steer = {name: transfer.result(trials) for name, trials in bodies.read(STUDY / "universal-steer.csv").items()}
+    steer = {name: transfer.result(each) for name, each in bodies.read(STUDY / "universal-steer.csv").items()}
     assert steer["robots"].tracking > 0.8

@@ -1,4 +1,4 @@
-"""Trials of bodies: whether the demonstrator walks one, and which fields of its spec keep it from that."""
+"""First walks of bodies: whether the demonstrator walks one, and which fields of its spec keep it from that."""
 
 import itertools
 from typing import NamedTuple
@@ -13,7 +13,7 @@ MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body ha
 FIELDS = ("motor", "damping", "armature")  # of joints, which are sized where a spec leaves them out
 
 
-class Trial(NamedTuple):
+class FirstWalk(NamedTuple):
     """A walk of the demonstrator from seed 0 in the task walk.
 
     Attributes:
@@ -32,7 +32,7 @@ class Trial(NamedTuple):
         return self.length < STEPS
 
 
-def walk(body: Body) -> Trial:
+def walk(body: Body) -> FirstWalk:
     """Let the demonstrator `medium` walk a body.
 
     Raises:
@@ -40,10 +40,10 @@ def walk(body: Body) -> Trial:
     """
     environment = Setup.of(body).load()
     episode = protocol.run(environment, Demonstrator(environment, "medium"), 0, STEPS)
-    return Trial(episode.length, episode.progress["speed"], environment.task.definition.parameters.target_velocity)
+    return FirstWalk(episode.length, episode.progress["speed"], environment.task.definition.parameters.target_velocity)
 
 
-def left_out(body: Body) -> tuple[tuple[str, ...], Trial] | None:
+def left_out(body: Body) -> tuple[tuple[str, ...], FirstWalk] | None:
     """Return the fewest fields of joints without which a body does not fall, and that walk; None if none help.
 
     Of several sets of as many fields it is the one with the fastest walk.
@@ -51,8 +51,8 @@ def left_out(body: Body) -> tuple[tuple[str, ...], Trial] | None:
     joints = [joint for leg in body.legs for joint in leg.joints]
     given = [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
     for count in range(1, len(given) + 1):
-        trials = {names: walk(_leaving_out(body, names)) for names in itertools.combinations(given, count)}
-        if upright := {names: trial for names, trial in trials.items() if not trial.fell}:
+        walks = {names: walk(_leaving_out(body, names)) for names in itertools.combinations(given, count)}
+        if upright := {names: each for names, each in walks.items() if not each.fell}:
             return max(upright.items(), key=lambda item: item[1].speed)
     return None
 

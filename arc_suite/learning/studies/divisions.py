@@ -1,4 +1,4 @@
-"""Tracks of the benchmark: the places of every track, and what each track gives to an algorithm."""
+"""Divisions of the benchmark: the places of every division, and what each division gives to an algorithm."""
 
 from typing import NamedTuple
 
@@ -14,8 +14,8 @@ FAR = ("rough", "slopes", "stairs", "navigate")  # tasks that take more steps: u
 TURNING = ("steer", "navigate")  # tasks with commands that turn: a heading error says nothing there
 
 
-class Track(NamedTuple):
-    """A track.
+class Division(NamedTuple):
+    """A division.
 
     Attributes:
         steps: environment steps of a run.
@@ -34,8 +34,8 @@ class Track(NamedTuple):
         return self.far_steps if task in FAR else self.steps
 
 
-TRACKS = {
-    "top": Track(1_000_000, 3_000_000),
-    "samples": Track(100_000, 100_000),
-    "demonstrations": Track(100_000, 100_000, "prior data", 100),
+DIVISIONS = {
+    "top": Division(1_000_000, 3_000_000),
+    "samples": Division(100_000, 100_000),
+    "demonstrations": Division(100_000, 100_000, "prior data", 100),
 }
