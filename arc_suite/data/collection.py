@@ -1,6 +1,7 @@
 """Collects datasets: plays the missing episodes, and keeps finished ones if it is killed."""
 
 import contextlib
+import functools
 import math
 import time
 from collections.abc import Callable
@@ -73,12 +74,15 @@ def collect(
                 storage.clear()
         missing = [index for index in range(episodes) if index not in storage.kept]
         try:
-            if missing:
-                if storage.metadata is None:
-                    storage.metadata = _metadata(dataset_id, settings, provenance, threads)
-                storage.metadata |= said
-                _play(storage, settings, missing, num_envs, threads, progress)
-            storage.finish(lambda indices: progress(indices, desc="merging", unit="episode", leave=False))
+            try:
+                if missing:
+                    if storage.metadata is None:
+                        storage.metadata = _metadata(dataset_id, settings, provenance, threads)
+                    storage.metadata |= said
+                    _play(storage, settings, missing, num_envs, threads, progress)
+            finally:
+                if not overwrite or storage.kept.issuperset(missing):
+                    storage.finish(functools.partial(progress, desc="merging", unit="episode", leave=False))
         except (ValueError, OSError, KeyboardInterrupt) as error:
             kind = next(kind for kind in (ValueError, OSError, KeyboardInterrupt) if isinstance(error, kind))
             cause = "interrupted" if kind is KeyboardInterrupt else error

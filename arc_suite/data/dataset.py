@@ -60,7 +60,7 @@ class Dataset:
     def __init__(self, dataset_id: str, path: Path):
         """Read the metadata; see `open`."""
         self.id, self.path = dataset_id, path
-        self.metadata = read_metadata(dataset_id, path)
+        self.metadata = read_metadata(dataset_id, path / "data")
         known = self.metadata["arc_suite"]
         try:
             setup = Setup.from_dict(known)
@@ -157,13 +157,13 @@ def _check_spec(spec: str | None, settings: Settings, known: Mapping[str, Any]) 
             raise ValueError(f"{name} of its env_spec is {said}, and its settings say {wanted}")
 
 
-def read_metadata(dataset_id: str, path: Path) -> dict:
-    """Return the metadata of a dataset in a folder.
+def read_metadata(dataset_id: str, folder: Path) -> dict:
+    """Return the metadata of a dataset from the folder that holds the file.
 
     Raises:
         ValueError: it is damaged, or the dataset is not of this suite.
     """
-    path = path / "data" / METADATA
+    path = folder / METADATA
     with damages(dataset_id, path):
         metadata = files.read_json(path)
     if not isinstance(metadata, dict) or "arc_suite" not in metadata:

@@ -1,11 +1,8 @@
 """Episodes as arrays, and as groups of an HDF5 file in Minari's layout."""
 
-import contextlib
 import hashlib
 import math
-import re
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import h5py
@@ -16,7 +13,6 @@ from arc_suite.policies import Script
 ARRAYS = ("observations", "actions", "rewards", "terminations", "truncations")
 TERMS = "infos/reward_terms"  # as in the info of a step
 
-_PART = re.compile(rb"parts/\d+\.hdf5")  # what an episode's link may lead to while a dataset is collected
 _ATTRIBUTES = {"id": int, "seed": int, "total_steps": int, "length": int, "return": float, "sha256": str}
 
 
@@ -98,7 +94,7 @@ def write(file, index: int, episode: Episode) -> None:
 def read(file, index: int) -> Episode:
     """Read an episode from an open HDF5 file.
 
-    Sizes are compared with the file's before anything is read, and no link leads out of the dataset's folder.
+    Sizes are compared with the file's before anything is read, and no link is followed.
 
     Raises:
         ValueError: its attributes, such as the digest, do not fit its content, or it is stored otherwise than
@@ -106,12 +102,12 @@ def read(file, index: int) -> Episode:
         KeyError: there is no such episode, or something in it is missing.
         OSError: it cannot be read.
     """
-    with _group(file, index) as group:
-        found, arrays = _found(group), _stored(group)
-        size, there = sum(map(_nbytes, arrays.values())), group.file.id.get_filesize()
-        if size > there:
-            raise ValueError(f"{group.name}: its arrays claim {size} bytes, and the file has {there}")
-        values = {path: array[()] for path, array in arrays.items()}
+    group = _item(file, name(index), h5py.Group)
+    found, arrays = _found(group), _stored(group)
+    size, there = sum(map(_nbytes, arrays.values())), file.id.get_filesize()
+    if size > there:
+        raise ValueError(f"{group.name}: its arrays claim {size} bytes, and the file has {there}")
+    values = {path: array[()] for path, array in arrays.items()}
     terms = {path.removeprefix(f"{TERMS}/"): values.pop(path) for path in list(values) if path.startswith(TERMS)}
     episode = Episode(found["seed"], found.get("preset"), **values, terms=terms)
     for key, value in _attributes(index, episode).items():
@@ -128,25 +124,11 @@ def summary(file, index: int) -> dict:
         KeyError: there is no such episode.
         OSError: it cannot be read.
     """
-    with _group(file, index) as group:
-        found, steps = _found(group), _array(group, "rewards", (None,), float).shape[0]
+    group = _item(file, name(index), h5py.Group)
+    found, steps = _found(group), _array(group, "rewards", (None,), float).shape[0]
     if found["length"] != steps:
         raise ValueError(f"{name(index)}: expected length {steps}, found {found['length']}")
     return found
-
-
-@contextlib.contextmanager
-def _group(file, index: int) -> Iterator[h5py.Group]:
-    """Yield the group of an episode; while a dataset is collected it lies in another file of its folder."""
-    link = file.id.links.get_info(name(index).encode())
-    if link.type != h5py.h5l.TYPE_EXTERNAL:
-        yield _item(file, name(index), h5py.Group)
-        return
-    part, path = file.id.links.get_val(name(index).encode())
-    if not _PART.fullmatch(part) or path != name(index).encode():
-        raise ValueError(f"{name(index)}: a link to elsewhere")
-    with h5py.File(Path(file.filename).parent / part.decode(), "r") as opened:
-        yield _item(opened, name(index), h5py.Group)
 
 
 def _item(group, key: str, kind: type):

@@ -40,6 +40,12 @@ def folder(dataset_id: str) -> Path:
     return get_dataset_path(check(dataset_id))
 
 
+def parts(dataset_id: str) -> Path:
+    """Return the hidden folder of the episodes that are not merged into the dataset yet."""
+    place = folder(dataset_id)
+    return place.with_name(f".{place.name}.parts")
+
+
 def existing() -> list[str]:
     """Return the ids of all datasets on this machine, hidden folders left out."""
     root = get_dataset_path()
@@ -51,9 +57,11 @@ def find(dataset_id: str) -> Path:
     """Return the folder in which a dataset lies.
 
     Raises:
-        ValueError: a malformed id, or no such dataset.
+        ValueError: a malformed id, no such dataset, or one whose first collection was killed.
     """
     if not folder(dataset_id).joinpath("data").is_dir():
+        if parts(dataset_id).is_dir():
+            raise ValueError(f"dataset {dataset_id!r} is unfinished: collect it again to continue it")
         there = existing()
         if not there:
             raise ValueError(f"unknown dataset {dataset_id!r}: there are none in {get_dataset_path()}")

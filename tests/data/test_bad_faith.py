@@ -3,19 +3,16 @@
 import json
 import os
 import pathlib
-import resource
 import subprocess
 import sys
 
 import h5py
 import numpy as np
 import pytest
-from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
-from test_storage import killed_at
+from datasets import ID, QUEEN, SHORT, collect, digests, edited, verify
 from tiers import never, tiers
 
 from arc_suite import data, style
-from arc_suite.data import collection, episodes
 
 SETTINGS = data.Settings(QUEEN, **SHORT)
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
@@ -293,45 +290,6 @@ def test_author_and_code_are_in_the_metadata_where_they_are_said(root):
 
     metadata = minari.load_dataset(ID).storage.metadata
     assert (metadata["author"], metadata["code_permalink"]) == ({"A. Walker"}, "file:///walks/1")
-
-
-@pytest.mark.slow
-def test_a_full_disk_keeps_every_episode_that_fits(root, monkeypatch):
-    settings = data.Settings(TICK, "random", (), steps=20)
-    collect("arc_suite/test/whole-v0", settings, 6)
-    whole = digests("arc_suite/test/whole-v0")
-    size = (root / "arc_suite/test/whole-v0/data/main_data.hdf5").stat().st_size
-    monkeypatch.setattr(collection, "SHARE", -1.0)  # all that is finished waits for one write
-    process = os.fork()
-    if not process:
-        status = 1
-        try:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (size // 3, size // 3))
-            collect(ID, settings, 6)
-        except OSError as error:
-            status = 0 if "file too large; 6 of 6 episodes" in str(error) else 2
-        finally:  # whatever happens, the child does not go on with other tests
-            os._exit(status)
-    assert os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]) == 0
-    assert digests() == whole
-
-
-@pytest.mark.slow
-def test_a_dataset_that_is_replaced_is_never_missing(root):
-    collect(ID, SETTINGS, 1)
-    before = digests()
-    for count in range(1, 100):
-        if not killed_at(count, settings=SETTINGS._replace(seed=9), episodes=2, overwrite=True):
-            break
-        there = digests()
-        assert there == before or len(there) == 2
-    assert 3 < count < 99
-
-
-def test_links_while_a_dataset_is_collected_lead_to_its_parts_alone(root):
-    assert killed_at(10, settings=SETTINGS, episodes=6)
-    with h5py.File(root / ID / "data" / "main_data.hdf5") as file:
-        assert episodes.read(file, 0).seed == 5
 
 
 def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(root):
