@@ -33,10 +33,10 @@ def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> st
     if value in valid:
         return value
     valid += near
-    raise ValueError(f"unknown {kind} {value!r}{_hint(value, valid)} (there are: {', '.join(valid)})")
+    raise ValueError(f"unknown {kind} {value!r}{hint(value, valid)} (there are: {', '.join(valid)})")
 
 
-def _hint(value, valid: Iterable[str]) -> str:
+def hint(value, valid: Iterable[str]) -> str:
     """Return how an error goes on that names an unknown value: with a valid one that is near, if there is any."""
     close = difflib.get_close_matches(str(value), valid, n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
@@ -210,5 +210,5 @@ def imported(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resol
     try:
         return resolve(path)
     except (ImportError, ValueError, AttributeError) as error:
-        hint = _hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
-        raise ValueError(f"{kind} {path!r}: {error}{hint}") from None
+        near = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
+        raise ValueError(f"{kind} {path!r}: {error}{near}") from None

@@ -257,12 +257,12 @@ class TaskRun(TaskView, control.Task):
         self._memory = self.definition.after(self._memory, self._readings)
 
     def get_reward(self, physics):
-        """Return the weighted sum of the terms, which stay in `terms`."""
-        weights = self.definition.settings.weights
-        self.terms = self.definition.terms(self._memory, self._latest(physics))
+        """Return the reward of the latest step, whose terms stay in `terms`."""
+        task, weights = self.definition, self.definition.settings.weights
+        raw = task.terms(self._memory, self._latest(physics))
         if physics.divergence is not None:
-            self.terms = dict.fromkeys(self.terms, np.float64(0.0))
-        reward = terms.total(self.terms, weights)
+            raw = dict.fromkeys(raw, np.float64(0.0))
+        self.terms, reward = terms.reward(raw, weights, task.cost_limit)
         if self.visualize_reward:
             physics.shown_reward = reward / (terms.greatest(weights) or 1.0)
         return reward

@@ -231,10 +231,11 @@ class VectorEnv(Together):
         self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)
         self._steps += 1
 
-        self._terms = earned = task.terms(memory, readings)
+        raw = task.terms(memory, readings)
         if diverged.any():
-            self._terms = earned = {name: np.where(diverged, 0.0, term) for name, term in earned.items()}
-        reward = np.where(stepping, terms.total(earned, task.settings.weights), 0.0)
+            raw = {name: np.where(diverged, 0.0, term) for name, term in raw.items()}
+        self._terms, reward = terms.reward(raw, task.settings.weights, task.cost_limit)
+        reward = np.where(stepping, reward, 0.0)
         observation = task.vector(task.observe(memory, readings), np.float32)
         failed, cut = task.ended(memory, readings)
         time_is_up = self._steps >= task.step_limit

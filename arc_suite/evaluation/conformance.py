@@ -4,7 +4,7 @@ import numpy as np
 
 from arc_suite.envs import trees
 from arc_suite.envs.setup import Setup
-from arc_suite.tasks import Task
+from arc_suite.tasks import Task, terms
 
 STEPS = 200  # control steps
 _ENVIRONMENTS = 64  # enough that functions which round scalars and arrays differently show it
@@ -46,6 +46,8 @@ def _told(task: Task, memory, readings) -> dict[str, np.ndarray]:
     """Everything that a task tells of a step, by name."""
     blocks = {f"block {name}": block for name, block in task.observe(memory, readings).items()}
     metrics = {f"metric {name}": np.asarray(metric) for name, metric in task.progress(memory).items()}
-    terms = {f"term {name}": np.asarray(term) for name, term in task.terms(memory, readings).items()}
-    resampled = np.broadcast_to(task.resampled(memory), np.shape(next(iter(terms.values()))))
-    return terms | metrics | blocks | {"resampled": resampled}
+    raw = task.terms(memory, readings)
+    _, reward = terms.reward(raw, task.settings.weights, task.cost_limit)
+    found = {f"term {name}": np.asarray(term) for name, term in raw.items()}
+    resampled = np.broadcast_to(task.resampled(memory), np.shape(reward))
+    return found | metrics | blocks | {"resampled": resampled, "reward": reward}

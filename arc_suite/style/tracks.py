@@ -12,7 +12,7 @@ from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.clock import desired_contacts
 from arc_suite.tasks.parameters import Parameters
-from arc_suite.tasks.terms import total
+from arc_suite.tasks.terms import reward
 
 
 class Track(NamedTuple):
@@ -117,7 +117,7 @@ class Track(NamedTuple):
     @property
     def rewards(self) -> np.ndarray:
         """Rewards of the steps, (steps,)."""
-        return total(self.terms, self.weights)
+        return reward(self.terms, self.weights)[1]
 
 
 def record(environment, policy: Policy, seed: int, max_steps: int | None = None) -> Track:

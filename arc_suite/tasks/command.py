@@ -97,9 +97,9 @@ class Command(ABC):
         """Return the memory with a live command (..., 3) in place of the task's own where it is not NaN."""
         return memory._replace(live=value)
 
-    def terms(self, memory, upright) -> dict:
-        """Return the bonus for progress, given the cosine (...) of the torso's tilt, and others of its own."""
-        return {"progress": _bounded(memory.gained) * upright}
+    def terms(self, memory, followed, upright) -> dict:
+        """Return the bonuses for following, given the step's tracking (...) and the cosine (...) of the tilt."""
+        return {"progress": _bounded(memory.gained) * upright, "tracking": followed}
 
     def observe(self, context: Context, memory) -> dict:
         """Return the blocks that it adds to the observation."""
@@ -343,9 +343,9 @@ class ToGoal(Command):
         )
         return Followed(memory, self.desired(context, memory, steps, place), _bounded(memory.gained), arrived)
 
-    def terms(self, memory: Chain, upright) -> dict:
+    def terms(self, memory: Chain, followed, upright) -> dict:
         """Return the bonuses for progress to the goal and for reaching it."""
-        return {**super().terms(memory, upright), "goal": memory.arrived * 1.0}
+        return {"progress": _bounded(memory.gained) * upright, "goal": memory.arrived * 1.0}
 
     def observe(self, context: Context, memory: Chain) -> dict:
         """Return cosine and sine of the goal's bearing, and its distance."""

@@ -33,8 +33,17 @@ from arc_suite.tasks.readings import Readings, component
 
 COST_LIMIT = 0.6  # a third of it is what standing costs, twice as much uniform torques
 
-# Walk's weights of rates in SI units, as Queen has them in units of her own.
-RATES = {"angular_velocity": -0.654, "vertical_velocity": -0.147}
+# Weights of the costs: walk's, of rates in SI units as Queen has them in units of her own.
+COSTS = {
+    "gait_cost": -0.1,
+    "control": -0.05,
+    "smoothness": -0.02,
+    "contact": -0.0005,
+    "angular_velocity": -0.654,
+    "vertical_velocity": -0.147,
+    "posture": -0.001,
+    "transport": 0.0,
+}
 
 _AHEAD = 0.8  # distance from the torso to where the command's arrows begin, R
 _SHAFT = 0.06  # radius of the arrows, R
@@ -48,7 +57,7 @@ class Settings(NamedTuple):
     Attributes:
         parameters: of the gait, and the target velocity.
         weights: signed weight of every term.
-        cost_limit: bound of the costs of a step, whose weights are negative; see `terms.limited`.
+        cost_limit: bound of the costs of a step, whose weights are negative; see `terms.reward`.
         noise: of the start.
         ground: the ground with its own settings.
     """
@@ -121,14 +130,19 @@ class CommandTask(Task):
         command: what to follow.
         ground: where, with the settings that a caller does not give.
         health: when a body has fallen.
-        bonuses: positive weights.
         yaw: half-width of the heading at the start, rad.
     """
 
     command: ClassVar[Command]
     ground: ClassVar[Ground] = Level()
     health: ClassVar[Upright] = Upright()
-    bonuses: ClassVar[Mapping[str, float]] = {"progress": 0.5, "tracking": 1.5, "healthy": 1.0, "obedient_gait": 1.5}
+    weights: ClassVar[Mapping[str, float]] = {
+        "progress": 0.5,
+        "tracking": 1.5,
+        "healthy": 1.0,
+        "obedient_gait": 1.5,
+        **COSTS,
+    }
     yaw: ClassVar[float] = math.pi
     demonstrators: ClassVar[tuple[str, ...]] = ("reactive",)
 
@@ -146,10 +160,9 @@ class CommandTask(Task):
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
         elsewhere = () if cls.own_arena else ("arena",)
         given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere)
-        weights = {**cls.bonuses, **paper.COSTS, **given["weights"], **RATES, "transport": 0.0}
         return Settings(
             parameters.parameters(body, given),
-            parameters.weights(weights, overrides.get("weights")),
+            parameters.weights(cls.weights, given["weights"], overrides.get("weights")),
             parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
             parameters.noise(given),
             cls.ground.with_settings(overrides),
@@ -180,6 +193,11 @@ class CommandTask(Task):
     def parameters(self) -> Parameters:
         """The prescribed gait."""
         return self.settings.parameters
+
+    @property
+    def cost_limit(self) -> float:
+        """The bound of the weighted sum of the costs of a step."""
+        return self.settings.cost_limit
 
     @functools.cached_property
     def context(self) -> Context:
@@ -295,7 +313,7 @@ class CommandTask(Task):
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
 
     def terms(self, memory: Memory, readings: Sensed) -> dict:
-        """Return the paper's costs without scale, within `cost_limit`, and bonuses for following the command.
+        """Return the paper's costs without scale, and bonuses for following the command.
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
@@ -303,17 +321,15 @@ class CommandTask(Task):
         costs = terms.costs(
             readings, core.action, core.previous_action, core.schedule_errors, self.parameters.default_angles
         )
-        found = {
+        return {
             **costs,
             "angular_velocity": costs["angular_velocity"] * (height / GRAVITY),
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
-            "tracking": core.followed,
             "obedient_gait": core.followed * (1.0 - core.schedule_errors / feet),
             "transport": core.energy.step / self.context.pace,
             **self.health.terms(memory.health),
-            **self.command.terms(memory.command, memory.health.upright),
+            **self.command.terms(memory.command, core.followed, memory.health.upright),
         }
-        return terms.limited(found, self.settings.weights, self.settings.cost_limit)
 
     def observe(self, memory: Memory, readings: Sensed) -> dict:
         """Return the blocks as the torso heads, without a clock at a stop and without negative zeros."""

@@ -20,7 +20,8 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
         ... the driver writes the inputs and runs the simulation for a control step ...
         readings = task.read(data)
         memory = task.after(memory, readings)
-        terms, blocks = task.terms(memory, readings), task.observe(memory, readings)
+        terms, reward = terms.reward(task.terms(memory, readings), task.settings.weights, task.cost_limit)
+        blocks = task.observe(memory, readings)
         terminated, truncated = task.ended(memory, readings)
     carry = task.stream_state(memory)
 """
@@ -114,9 +115,11 @@ class Task(ABC):
 
     Attributes:
         scene: what it is made for.
-        settings: its numbers, with a field `weights`: the signed weight of every term by name.
+        settings: its numbers, with a field `weights`: `weights` with those that the robot or the caller replaces.
         step_limit: control steps of an episode, may be infinite.
         name: by which `arc_suite.load` and ids know the task.
+        weights: signed weight of every term of the reward by name, in the order in which they are added up.
+        cost_limit: bound of the weighted sum of the costs of a step; None for no bound. See `terms.reward`.
         version: raised with any change of dynamics, reward or observation.
         reads: fields of the simulation that `read` takes.
         commands: sizes of what may be set from outside while an episode runs, such as by a player's stick,
@@ -135,6 +138,8 @@ class Task(ABC):
     step_limit: float = STEPS
 
     name: ClassVar[str]
+    weights: ClassVar[Mapping[str, float]]
+    cost_limit: ClassVar[float | None] = None
     version: ClassVar[int] = 0
     reads: ClassVar[tuple[str, ...]] = reading.FIELDS
     commands: ClassVar[Mapping[str, int]] = {}
@@ -268,7 +273,7 @@ class Task(ABC):
 
     @abstractmethod
     def terms(self, memory, readings: Readings) -> dict:
-        """Return the reward's unweighted terms by name, each (...)."""
+        """Return the reward's raw terms by name, each (...): neither weighed nor limited."""
 
     @abstractmethod
     def observe(self, memory, readings: Readings) -> dict:
@@ -323,7 +328,7 @@ class Task(ABC):
             ValueError: they are not those that the task declares.
         """
         self._check(blocks)
-        return collections.OrderedDict((name, block.copy()) for name, block in blocks.items())
+        return collections.OrderedDict({name: block.copy() for name, block in blocks.items()})
 
     def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
         if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:

@@ -145,6 +145,8 @@ class Modified(Task):
     version = property(lambda self: self.task.version)
     reads = property(lambda self: self.task.reads)
     commands = property(lambda self: self.task.commands)
+    weights = property(lambda self: self.task.weights)
+    cost_limit = property(lambda self: self.task.cost_limit)
     demonstrators = property(lambda self: self.task.demonstrators)
     adapts = property(lambda self: self.task.adapts)
     actions = property(lambda self: self.changes.actions)

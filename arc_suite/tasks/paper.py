@@ -1,4 +1,4 @@
-"""Parts of the paper's task that tasks with a command share: weights of costs, the drawn start, the observation."""
+"""Parts of the paper's task that tasks with a command share: the drawn start, the observation."""
 
 from collections.abc import Mapping
 
@@ -9,17 +9,6 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
 from arc_suite.tasks.mirrors import AXIAL, POLAR, QUATERNION, SAME, Mirror
 from arc_suite.tasks.parameters import Noise, Parameters
-
-# The paper's signed weights of costs (Section 4), the same for all robots except "control".
-COSTS = {
-    "gait_cost": -0.1,
-    "control": -0.05,
-    "smoothness": -0.02,
-    "contact": -0.0005,
-    "angular_velocity": -0.05,
-    "vertical_velocity": -0.02,
-    "posture": -0.001,
-}
 
 
 def drawn_state(standing: np.ndarray, noise: Noise, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:

@@ -201,15 +201,15 @@ def positive(name: str, value: Any) -> float:
     return checks.number(name, value, 1e-9, LARGEST)
 
 
-def weights(defaults: Mapping[str, float], changed: Any) -> dict[str, float]:
-    """Return the weights of all terms, some of them changed by the caller.
+def weights(of_task: Mapping[str, float], of_body: Mapping[str, float] = {}, changed: Any = None) -> dict[str, float]:
+    """Return the weights of all terms: the task's, of which the body and then the caller replace some.
 
     Raises:
         ValueError: an unknown term, or a weight that is no finite number.
     """
     if not isinstance(changed, Mapping | None):
         raise ValueError(f"weights: expected a mapping of names to numbers, got {changed!r}")
-    found = dict(defaults)
+    found = {name: of_body.get(name, weight) for name, weight in of_task.items()}
     for name, weight in (changed or {}).items():
         found[checks.name(name, found, "weight")] = checks.number(f"weights[{name!r}]", weight, -LARGEST, LARGEST)
     return found

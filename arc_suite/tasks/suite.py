@@ -1,8 +1,11 @@
 """The ten tasks that follow a command: each is a command on a ground, with what differs in numbers."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from arc_suite.arenas import terrain
 from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
-from arc_suite.tasks.commanded import CommandTask
+from arc_suite.tasks.commanded import COSTS, CommandTask
 from arc_suite.tasks.ground import Lanes, PillarField
 
 _LEVEL = ("clock", "clearances", "context", "_torques")  # what follows from the body on level ground
@@ -80,4 +83,10 @@ class Navigate(CommandTask):
     name = "navigate"
     command, ground = ToGoal(), PillarField()
     demonstrators = ("planned",)
-    bonuses = {"progress": 1.5, "healthy": 1.0, "obedient_gait": 2.5, "goal": 10.0}
+    weights: ClassVar[Mapping[str, float]] = {
+        "progress": 1.5,
+        "healthy": 1.0,
+        "obedient_gait": 2.5,
+        "goal": 10.0,
+        **COSTS,
+    }

@@ -1,9 +1,10 @@
-"""Terms of rewards, unweighted, and their weighted sum.
+"""Terms of rewards, and the reward that follows from them.
 
 Arrays may carry any leading axes `...`: the same text serves one environment, a batch and JAX.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 from arc_suite import checks
 from arc_suite.tasks.readings import Readings, component
@@ -38,32 +39,53 @@ def triangle(error, width):
     return share.__array_namespace__().maximum(share, 0.0)
 
 
-def limited(terms: Mapping, weights: Mapping, limit: float) -> dict:
-    """Return the weighted terms, costs scaled down together so that their weighted sum stays below a limit.
+def reward(terms: Mapping, weights: Mapping, cost_limit=None) -> tuple[dict, Any]:
+    """Return the terms with limited costs, and the reward (...): their sum, each times its signed weight.
 
-    A sum s becomes s / sqrt(1 + (s / limit)^2): small costs count in full, and more always costs more. Random
-    actions cost the most; within a limit it pays to stay alive while a learner explores.
-    """
-    costs = {name: weight for name, weight in weights.items() if weight < 0.0}
-    if not costs:
-        return {name: terms[name] for name in weights}
-    excess = total(terms, costs) / limit
-    share = 1.0 / excess.__array_namespace__().sqrt(1.0 + excess * excess)
-    return {name: terms[name] * share if name in costs else terms[name] for name in weights}
+    Every driver calls it after `Task.terms`. Terms are added up in the order of the weights.
 
-
-def total(terms: Mapping, weights: Mapping):
-    """Return the reward: the sum of the terms times their signed weights, in the order of the weights.
+    Args:
+        terms: raw terms (...) by name.
+        weights: the weight of each.
+        cost_limit: bound of the weighted sum of the costs, the terms whose weights are negative; None for no bound.
 
     Raises:
-        ValueError: a weight of a term that there is not.
+        ValueError: a weight of a term that there is not, or a term that has no weight.
     """
-    reward = 0
-    for name, weight in weights.items():
-        if name not in terms:
-            checks.name(name, terms, "weight")
-        reward = reward + weight * terms[name]
-    return reward
+    if terms.keys() != weights.keys():
+        _refuse(terms, weights)
+    found = {name: terms[name] for name in weights}
+    if cost_limit is not None:
+        found |= _limited(terms, weights, cost_limit)
+    return found, _total(found, weights, weights)
+
+
+def _refuse(terms: Mapping, weights: Mapping) -> None:
+    for name in weights:
+        checks.name(name, terms, "weight")
+    without = next(name for name in terms if name not in weights)
+    raise ValueError(f"term {without!r} has no weight{checks.hint(without, weights)} (there are: {', '.join(weights)})")
+
+
+def _limited(terms: Mapping, weights: Mapping, limit) -> dict:
+    """Return the costs, scaled down together so that their weighted sum s becomes s / sqrt(1 + (s / limit)^2).
+
+    Small costs count in full, and more always costs more. Random actions cost the most; within a limit it pays to
+    stay alive while a learner explores.
+    """
+    costs = [name for name, weight in weights.items() if weight < 0.0]
+    if not costs:
+        return {}
+    excess = _total(terms, weights, costs) / limit
+    share = 1.0 / excess.__array_namespace__().sqrt(1.0 + excess * excess)
+    return {name: terms[name] * share for name in costs}
+
+
+def _total(terms: Mapping, weights: Mapping, names: Iterable[str]):
+    total = 0
+    for name in names:
+        total = total + weights[name] * terms[name]
+    return total
 
 
 def greatest(weights: Mapping) -> float:

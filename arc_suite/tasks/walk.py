@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings, component
-
-# Signed weights (Section 4).
-WEIGHTS = {"forward": 1.5, "healthy": 1.0, "gait_bonus": 1.5, **paper.COSTS}
 
 
 class Settings(NamedTuple):
@@ -69,6 +66,18 @@ class Walk(Task):
     """Walking forward at the target speed in the prescribed gait."""
 
     name, from_body = "walk", ("clock", "clearances", "_torques")
+    weights: ClassVar[Mapping[str, float]] = {  # Section 4; robots have a "control" of their own
+        "forward": 1.5,
+        "healthy": 1.0,
+        "gait_bonus": 1.5,
+        "gait_cost": -0.1,
+        "control": -0.05,
+        "smoothness": -0.02,
+        "contact": -0.0005,
+        "angular_velocity": -0.05,
+        "vertical_velocity": -0.02,
+        "posture": -0.001,
+    }
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
@@ -83,7 +92,7 @@ class Walk(Task):
             parameters.parameters(body, given),
             parameters.positive("velocity_band", given["velocity_band"]),
             _healthy_range(given["healthy_range"]),
-            parameters.weights(WEIGHTS | given["weights"], overrides.get("weights")),
+            parameters.weights(cls.weights, given["weights"], overrides.get("weights")),
             parameters.noise(given),
         )
 

@@ -27,7 +27,7 @@ from tiers import never, tiers
 import arc_suite
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.walk import WEIGHTS
+from arc_suite.tasks.walk import Walk
 
 ROOT = pathlib.Path(__file__).parents[2]
 IDS = [f"arc_suite/{robot}-walk-v0" for robot in ("queen", "bastion", "tick", "leaper")]
@@ -117,7 +117,7 @@ def test_types_of_a_reset_and_a_step(env_id):
     assert observation.dtype == np.float32 and observation in env.observation_space
     assert [type(value) for value in (reward, terminated, truncated)] == [float, bool, bool]
     figures = ["progress_speed", "progress_gait_compliance", "progress_cost_of_transport"]
-    assert list(info) == [f"reward_{name}" for name in WEIGHTS] + figures
+    assert list(info) == [f"reward_{name}" for name in Walk.weights] + figures
     assert {type(figure) for figure in info.values()} == {float}
     assert json.loads(json.dumps(info)) == info
     weights = env.unwrapped.task.settings.weights
@@ -147,7 +147,7 @@ def test_bit_equal_to_the_dm_env(env_id):
                 observation, reward, terminated, _, info = env.step(action)
                 timestep = environment.step(action)
                 assert reward == timestep.reward and terminated == (timestep.discount == 0.0)
-                assert {name: info[f"reward_{name}"] for name in WEIGHTS} == environment.task.terms
+                assert {name: info[f"reward_{name}"] for name in Walk.weights} == environment.task.terms
             assert_same(observation, np.concatenate(list(timestep.observation.values())).astype(np.float32))
             if timestep.last():
                 break
@@ -405,7 +405,7 @@ def test_actions_out_of_range_are_clipped():
         ({"camera_id": None}, "no camera None: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
         (
             {"task_kwargs": {"weights": {"controll": 1.0}}},
-            f"unknown weight 'controll'; did you mean 'control'? (there are: {', '.join(WEIGHTS)})",
+            f"unknown weight 'controll'; did you mean 'control'? (there are: {', '.join(Walk.weights)})",
         ),
         (
             {"domain_name": "quen"},

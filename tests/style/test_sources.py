@@ -110,7 +110,7 @@ def test_datasets_are_replayed(dataset):
 
 
 def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
-    monkeypatch.setitem(walk.WEIGHTS, "healthy", 0.5)
+    monkeypatch.setitem(walk.Walk.weights, "healthy", 0.5)
     with pytest.raises(ValueError) as error:
         take(source(dataset.id), LEAPER, range(1))
     assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")

@@ -65,8 +65,8 @@ def test_a_task_in_the_arena_conforms(package):
     assert package("-c", code) == "None\n"
 
 
-WEIGHTS = '{"height": 3.0, "upright": 1.0, "control": -0.05}'
-UNCHECKED = CROUCHING.replace(f'parameters.weights({WEIGHTS}, values["weights"])', f'{WEIGHTS} | values["weights"]')
+CHECKED = 'parameters.weights(cls.weights, changed=overrides.get("weights"))'
+UNCHECKED = CROUCHING.replace(CHECKED, 'cls.weights | overrides.get("weights", {})')
 OBSERVE = re.compile(r"    def observe\(.*?\n\n", re.DOTALL)
 MISSPELT = ("--set", 'weights={"heigt": 1.0}')
 UNKNOWN = "unknown weight 'heigt'; did you mean 'height'? (there are: height, upright, control)"

@@ -24,7 +24,7 @@ def row(page, first, section=""):
 def test_a_changed_weight_changes_the_pages(monkeypatch):
     before = tasks.page("walk"), robots.page("tick")
     assert [row(page, "`gait_bonus`")[0] for page in before] == ["1.5", "1.5"]
-    monkeypatch.setitem(walk.WEIGHTS, "gait_bonus", 2.25)
+    monkeypatch.setitem(walk.Walk.weights, "gait_bonus", 2.25)
     after = tasks.page("walk"), robots.page("tick")
     assert [row(page, "`gait_bonus`")[0] for page in after] == ["2.25", "2.25"]
 

@@ -109,7 +109,7 @@ class Env:
             raise ValueError("random: expected none, as `reset` takes a key, and `start` a seed")
         self.impl, self.num_envs = device.implementation(impl), checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         self.num_starts, self.first_seed = num_starts, checks.seed(first_seed)
-        self._starts, self._terms = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed)
+        self._starts = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed)
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
         self.task, self.mj_model = prepared(domain_name, task_name, settings)
         if self.task.adapts:
@@ -148,7 +148,7 @@ class Env:
         zero = jnp.zeros(())
         info = {name: jnp.full(size, jnp.nan) for name, size in self.task.commands.items()}
         info |= {"memory": start.memory, "first_memory": start.memory, "model": start.model, "truncation": zero}
-        names = (*(f"reward_{name}" for name in self._terms), "diverged", "overflow")
+        names = (*(f"reward_{name}" for name in self.task.settings.weights), "diverged", "overflow")
         return State(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
 
     def step(self, state: State, action) -> State:
@@ -221,10 +221,9 @@ class Env:
 
         readings = task.read(device.fields(data, task.reads))
         after = task.after(moved, readings)
-        found = task.terms(after, readings)
+        found, reward = terms.reward(task.terms(after, readings), task.settings.weights, task.cost_limit)
         observation = task.vector(task.observe(after, readings), jnp.float32)
         terminated, truncated = task.ended(after, readings)
-        reward = terms.total(found, task.settings.weights)
 
         # Sums of substeps round; the time after k control steps is k dt.
         data = data.replace(time=(jnp.round(before.time / self.dt) + 1.0) * self.dt)

@@ -36,10 +36,8 @@ class Starts(NamedTuple):
     model: dict[str, np.ndarray]
 
 
-def drawn(
-    domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int
-) -> tuple[Starts, list[str]]:
-    """Return the starts of a number of seeds, and the names of the task's terms.
+def drawn(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int) -> Starts:
+    """Return the starts of a number of seeds.
 
     Args:
         domain_name: as in `arc_suite.load`.
@@ -53,7 +51,7 @@ def drawn(
     """
     checks.integer("num_starts", count, 1, MOST)
     environments = VectorEnv(domain_name, task_name, min(count, _CHUNK), task_kwargs=task_kwargs)
-    task, batch = environments.task.definition, environments.batch
+    batch = environments.batch
     parts = []
     for first in range(0, count, _CHUNK):
         observation, _ = environments.reset(seed=seed + first)
@@ -61,8 +59,7 @@ def drawn(
         names = [*batch.changed, *_DERIVED] if batch.changed else []
         model = {name: np.stack([getattr(model, name) for model in batch.models]) for name in names}
         parts.append(Starts(*state, environments._memory, observation, model))
-    terms = task.terms(environments._memory, task.read(batch.data))
     environments.close()
     joined = {name: np.concatenate([part.model[name] for part in parts])[:count] for name in parts[0].model}
     table = trees.mapped(lambda *arrays: np.concatenate(arrays)[:count], *(part._replace(model=None) for part in parts))
-    return table._replace(model=joined), list(terms)
+    return table._replace(model=joined)
