@@ -4,17 +4,14 @@ The array `setup` is the setup's JSON. The field positions of track i is the arr
 the reward's terms, has an array for each entry, `i/terms/forward`. Numbers are arrays without axes.
 """
 
-import io
 import json
-import math
 import os
-import zipfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, files, registry, versions
+from arc_suite import archives, checks, files, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
@@ -22,7 +19,7 @@ from arc_suite.tasks.parameters import Parameters
 
 FORMAT = "arc_suite tracks 3"  # another number for every change of what a file holds
 
-_HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+_MOST = 1 << 32  # bytes of all arrays
 
 # Types of single values, and shapes of arrays.
 _FIELDS = {
@@ -78,43 +75,22 @@ def load(path: str | os.PathLike) -> list[Track]:
             been imported.
         OSError: the file cannot be read.
     """
-    with files.reading(path):
-        file = open(path, "rb")  # noqa: SIM115
-    with file:
-        try:
-            arrays = _arrays(file)
-            if (found := str(arrays.get("format", "no tracks"))[:80]) == FORMAT:
-                setup = Setup.from_dict(json.loads(_value("setup", arrays["setup"], str)))
-                count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
-                tracks = [_track(setup, arrays, index) for index in range(count)]
-                if any(_names(track) != _names(tracks[0]) for track in tracks):
-                    raise ValueError("expected the same progress and gait in all tracks")
-                return tracks
-        except registry.NotImported as error:
-            raise ValueError(f"{path}: {error}") from None
-        except Exception as error:  # a damaged archive may raise anything
-            raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
+    with files.reading(path), open(path, "rb"):
+        pass  # whatever goes wrong from here on is damage
+    try:
+        arrays = archives.read(path, _MOST)
+        if (found := str(arrays.get("format", "no tracks"))[:80]) == FORMAT:
+            setup = Setup.from_dict(json.loads(_value("setup", arrays["setup"], str)))
+            count = 1 + max(int(name.split("/")[0]) for name in arrays if "/" in name)
+            tracks = [_track(setup, arrays, index) for index in range(count)]
+            if any(_names(track) != _names(tracks[0]) for track in tracks):
+                raise ValueError("expected the same progress and gait in all tracks")
+            return tracks
+    except registry.NotImported as error:
+        raise ValueError(f"{path}: {error}") from None
+    except Exception as error:  # a damaged archive may raise anything
+        raise ValueError(f"{path}: not a file of tracks, or a damaged one: {checks.quoted(error)}") from None
     raise ValueError(f"{path}: expected {FORMAT!r}, got {found!r}; record them anew")
-
-
-def _arrays(file) -> dict[str, np.ndarray]:
-    """Return the arrays of an archive as `np.savez` writes it, once none claims more than the file holds."""
-    size, arrays = os.fstat(file.fileno()).st_size, {}
-    with zipfile.ZipFile(file) as archive:
-        members = archive.infolist()
-        if any(member.compress_type != zipfile.ZIP_STORED for member in members):
-            raise ValueError("expected arrays that are not compressed")
-        if (claimed := sum(member.file_size for member in members)) > size:
-            raise ValueError(f"its arrays claim {claimed} bytes, and the file has {size}")
-        for member in members:
-            name, content = member.filename.removesuffix(".npy"), io.BytesIO(archive.read(member))
-            shape, _, dtype = _HEADERS[np.lib.format.read_magic(content)](content)
-            claimed, there = math.prod(shape) * dtype.itemsize, member.file_size - content.tell()
-            if claimed != there and not dtype.hasobject:  # objects are refused below
-                raise ValueError(f"{name}: {shape} of {dtype} are {claimed} bytes, and there are {there}")
-            content.seek(0)
-            arrays[name] = np.lib.format.read_array(content, allow_pickle=False)
-    return arrays
 
 
 def _names(track: Track) -> tuple:

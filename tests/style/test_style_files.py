@@ -219,13 +219,5 @@ def test_headers_that_claim_what_the_file_does_not_hold_are_one_line(saved, tmp_
         for name in whole.namelist():
             content = whole.read(name)
             claims.writestr(name, header(shape) + content[-288:] if name == "1/positions.npy" else content)
-    with pytest.raises(ValueError, match="1/positions: .* bytes, and there are 288$"):
-        load(path)
-
-
-def test_archives_that_are_larger_than_their_file_are_one_line(saved, tmp_path):
-    path = tmp_path / "compressed.npz"
-    with np.load(saved) as archive:
-        np.savez_compressed(path, zeros=np.zeros(1 << 20), **archive)
-    with pytest.raises(ValueError, match="expected arrays that are not compressed$"):
+    with pytest.raises(ValueError, match=f"^{path}: not a file of tracks, or a damaged one: "):
         load(path)
