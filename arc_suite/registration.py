@@ -76,7 +76,7 @@ def register(
             raise ValueError("nothing to register: give a body, tasks, arenas or families")
     else:
         _register_body(body, parameters or {}, presets, visuals)
-        MODULES["domain", body.name] = module
+        MODULES["robot", body.name] = module
     for kind, table, new in added:
         table.update(new)
         MODULES.update({(kind, name): module for name in new})
@@ -149,7 +149,7 @@ def register_ids() -> None:
                 vector_entry_point="arc_suite.envs.vector:VectorEnv",
                 max_episode_steps=STEPS,
                 kwargs={
-                    "domain_name": registry.importable("domain", domain_name),
+                    "domain_name": registry.importable("robot", domain_name),
                     "task_name": registry.importable("task", task_name),
                 },
             )

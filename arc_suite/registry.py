@@ -1,25 +1,27 @@
 """Tables of names: robots, families of bodies, tasks and arenas, including those of other packages."""
 
 import importlib
+import itertools
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
 
 from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
 from arc_suite.models.families import FAMILIES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import body_from_json, load_body
+from arc_suite.robots.spec_files import EXAMPLES, body_from_json, load_body
 from arc_suite.tasks import TASKS, Task
 
 MODULES = {}  # (kind, name) of what comes from elsewhere -> the module whose import registers it
 
-
 MOST_BODIES = 1 << 16  # that one name stands for
 
 _SEEDS = re.compile(r"(\d{1,10})(?:-(\d{1,10}))?")
+_SEVERAL = re.compile(r",|:\d+-\d+$")
 
 
 class NotImported(ValueError):
@@ -36,34 +38,57 @@ def all_tasks() -> tuple[tuple[str, str], ...]:
     return tuple((domain, task) for domain in ROBOTS for task in TASKS)
 
 
-def body_of(domain) -> Body:
-    """Return the body of a domain.
+def body_of(robot, near: Iterable[str] = ()) -> Body:
+    """Return the body that a word stands for.
 
     Args:
-        domain: name of a robot, `family:seed`, path of a file that holds a body (a `Path`, or a string that
-            ends in .json), the text of such a file, or the body itself.
+        robot: name of a robot, `module:name` for one of another package, `family:seed`, name of a packaged spec (such
+            as spider), path of a file that holds a body, text of such a file, or the body itself.
+        near: other words that are valid in its place, for the error.
 
     Raises:
         ValueError: an unknown name, a file that holds no body, or several bodies.
         OSError: the file cannot be read.
     """
-    members = _members(domain)
-    if members is None:
-        return _single(domain)
-    if len(members[1]) > 1:
-        raise ValueError(f"domain {domain!r}: expected one body, got {len(members[1])}")
-    return _member(members[0], members[1][0])
+    body, *others = itertools.islice(_bodies(robot, near), 2)
+    if others:
+        raise ValueError(f"robot {robot!r}: expected one body, got several")
+    return body
 
 
-def bodies_of(domain) -> tuple[Body, ...]:
-    """Return the bodies of a domain: those of `family:first-last`, else that of `body_of`.
+def bodies_of(robot, near: Iterable[str] = ()) -> tuple[Body, ...]:
+    """Return the bodies of `family:first-last`, or of names with commas; else that of `body_of`.
 
     Raises:
-        ValueError: as `body_of`, or more than 65536 bodies.
+        ValueError: as `body_of`, or a range of more than 65536 bodies.
         OSError: as `body_of`.
     """
-    members = _members(domain)
-    return (_single(domain),) if members is None else tuple(_member(members[0], seed) for seed in members[1])
+    return tuple(_bodies(robot, near))
+
+
+def words() -> list[str]:
+    """Return words for bodies: names of robots, and of packaged specs, and a body of each family."""
+    return [*ROBOTS, *EXAMPLES, *(f"{family}:7" for family in FAMILIES)]
+
+
+def names_several(robot) -> bool:
+    """Return whether a text names several bodies: `family:first-last`, or names with commas."""
+    return isinstance(robot, str) and not (robot.startswith("{") or _is_path(robot)) and bool(_SEVERAL.search(robot))
+
+
+def stored(robot: str) -> str:
+    """Return what a file names bodies by, if looking it up imports nothing and opens no file but packaged ones.
+
+    Raises:
+        ValueError: an unknown name, or the path of a file.
+        NotImported: the module of a name has not been imported yet.
+    """
+    for part in [] if robot.startswith("{") else robot.split(","):
+        family, _, seeds = part.rpartition(":")
+        if not family or _is_path(part):
+            checks.name(part, (*ROBOTS, *EXAMPLES), "robot", words()[-len(FAMILIES) :])
+        imported("robot", family if _SEEDS.fullmatch(seeds) else part)
+    return robot
 
 
 def family_of(name: str) -> Callable[[int], Body]:
@@ -75,20 +100,41 @@ def family_of(name: str) -> Callable[[int], Body]:
     return _find(name, FAMILIES, "family")
 
 
-def _members(domain) -> tuple[str, range] | None:
-    """The family and the seeds of `family:seed`, `module:family:seed` or a range of them; None for other domains."""
-    if not isinstance(domain, str) or domain.startswith("{"):
-        return None
-    family, _, seeds = domain.rpartition(":")
+def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
+    text = robot if isinstance(robot, str) else ""
+    family, _, seeds = text.rpartition(":")
+    if isinstance(robot, Body):
+        yield robot
+    elif text.startswith("{"):
+        yield body_from_json(text)
+    elif (text in EXAMPLES and text not in ROBOTS) or _is_path(robot):
+        yield load_body(EXAMPLES.get(text, Path(robot)))
+    elif "," in text:
+        yield from itertools.chain.from_iterable(_bodies(part, near) for part in text.split(","))
+    elif family in FAMILIES or ":" in family or (family and _SEEDS.fullmatch(seeds)):  # seeds are no name of a robot
+        yield from (_member(family, seed) for seed in _range(family, seeds))
+    else:
+        yield _find(robot, ROBOTS, "robot", (*words()[len(ROBOTS) :], *near))
+
+
+def _is_path(robot) -> bool:
+    if isinstance(robot, str):
+        path = Path(robot)
+        return path.suffix == ".json" or (":" not in robot and bool(path.suffix or path.name != robot))
+    return isinstance(robot, os.PathLike)
+
+
+def _range(family: str, seeds: str) -> range:
+    """The seeds of `seed` or `first-last`."""
     found = _SEEDS.fullmatch(seeds)
-    if not (family in FAMILIES or ":" in family or (family and found)):  # seeds are no name of a robot
-        return None
     if not found:
-        raise ValueError(f"domain {domain!r}: expected {family}:seed or {family}:first-last, such as {family}:0-9")
+        raise ValueError(
+            f"robot '{family}:{seeds}': expected {family}:seed or {family}:first-last, such as {family}:0-9"
+        )
     first, last = int(found[1]), int(found[2] or found[1])
     if not first <= last < first + MOST_BODIES:
-        raise ValueError(f"domain {domain!r}: expected seeds in ascending order, at most {MOST_BODIES}")
-    return family, range(first, last + 1)
+        raise ValueError(f"robot '{family}:{seeds}': expected seeds in ascending order, at most {MOST_BODIES}")
+    return range(first, last + 1)
 
 
 def _member(family: str, seed: int) -> Body:
@@ -96,16 +142,6 @@ def _member(family: str, seed: int) -> Body:
     if not isinstance(body, Body):
         raise ValueError(f"family {family!r}: expected a spec.Body of seed {seed}, got {body!r}")
     return body
-
-
-def _single(domain) -> Body:
-    if isinstance(domain, Body):
-        return domain
-    if isinstance(domain, os.PathLike) or (isinstance(domain, str) and domain.endswith(".json")):
-        return load_body(domain)
-    if isinstance(domain, str) and domain.startswith("{"):
-        return body_from_json(domain)
-    return _find(domain, ROBOTS, "domain")
 
 
 def task_of(name: str) -> type[Task]:
@@ -160,7 +196,7 @@ def env_id(domain_name: str, task: type[Task]) -> str:
     return f"arc_suite/{domain_name}-{task.name}-v{task.version}"
 
 
-def _find(name, table: Mapping, kind: str):
+def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
         if not all(part.isidentifier() for part in module.split(".")):
@@ -171,4 +207,4 @@ def _find(name, table: Mapping, kind: str):
             raise ValueError(f"{kind} {name!r}: cannot import {module}: {error}") from None
         if name in table and (kind, name) not in MODULES:
             raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
-    return table[checks.name(name, table, kind)]
+    return table[checks.name(name, table, kind, near)]

@@ -13,7 +13,7 @@ import itertools
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, policies, rotations
+from arc_suite import checks, policies, registry, rotations
 from arc_suite.cli import program
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.vector import VectorEnv
@@ -75,7 +75,7 @@ def line(first: str, cells) -> str:
 
 def main() -> None:
     """Print a table for each robot."""
-    robots = {name: ROBOTS[checks.name(name, ROBOTS, "robot")] for name in FLAGS.robots}
+    robots = {name: registry.body_of(name) for name in FLAGS.robots}
     for body, preset in itertools.product(robots.values(), FLAGS.presets):
         checks.name(preset, presets_of(body), "preset")
     for name, body in robots.items():

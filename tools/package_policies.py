@@ -14,7 +14,6 @@ import numpy as np
 
 from arc_suite import evaluation, files, policies
 from arc_suite.cli import program
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.policies import network, universal
@@ -41,7 +40,7 @@ def returns(path: Path) -> list[float]:
     """Return the returns of a packaged policy in the episodes of evaluation."""
     packaged = network.load(path)
     setup = packaged.setup.validation(evaluation.EPISODES)
-    if isinstance(setup, Setup):
+    if not setup.several:
         setup = Setup.of(setup.body, setup.task)  # observes all
     environment = setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled")
     return [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
@@ -52,7 +51,7 @@ def main(run: str | None = None) -> None:
     if run is None:
         raise ValueError("expected the folder of a run, got none")
     found, known = network.load(Path(run)), configuration.read(Path(run) / "config.json")
-    several = isinstance(known.setup, BodiesSetup)
+    several = known.setup.several
     kind = np.float32 if several else np.float16  # inputs of many bodies differ too much in size for 16 bits
     layers = [layer._replace(arrays=tuple(a.astype(kind) for a in layer.arrays)) for layer in found.layers]
     name = f"{universal.NAME if several else known.setup.body.name}-{known.setup.task}"

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, evaluation, files, policies
+from arc_suite import checks, evaluation, files, policies, registry
 from arc_suite.arenas import terrain
 from arc_suite.cli import program
 from arc_suite.cpg.selection import presets_of
@@ -59,7 +59,11 @@ flags.DEFINE_boolean("anchors", False, "Measure anchors in place of tables, and 
 
 def cell(task: str, robot: str, preset: str, settings: dict) -> str:
     """Return what a table says of a preset; "-" where the robot has none of that name."""
-    return summary(played(task, robot, preset, settings)) if preset in ("zero", *presets_of(ROBOTS[robot])) else "-"
+    return (
+        summary(played(task, robot, preset, settings))
+        if preset in ("zero", *presets_of(registry.body_of(robot)))
+        else "-"
+    )
 
 
 def played(task: str, robot: str, preset: str, settings: dict) -> list[evaluation.EpisodeResult]:
@@ -109,8 +113,8 @@ def written(page: str, task: str, lines: list[str]) -> str:
 
 def anchor(robot: str, task: str) -> anchors.Returns:
     """Return the returns of standing still and of the best preset of a robot in a task with default settings."""
-    setup, presets = Setup.of(robot, task), presets_of(ROBOTS[robot])
-    names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets)]
+    setup = Setup.of(robot, task)
+    names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets_of(setup.body))]
     bar = program.progress(names, desc=f"{task} {robot}", leave=False)
     found = {name: anchors.played(setup, name) for name in bar}
     return {name: found[name] for name in (anchors.ZERO, anchors.of_returns(found).preset)}
@@ -135,7 +139,7 @@ def _number(text: str):
 def main() -> None:
     """Print a table for each task, and write it into the page; or write the anchors."""
     for robot in FLAGS.robots:
-        presets = presets_of(ROBOTS[checks.name(robot, ROBOTS, "robot")])
+        presets = presets_of(registry.body_of(robot))
         for preset in FLAGS.presets or ():
             checks.name(preset, ("zero", *presets), "preset")
     tasks = FLAGS.tasks or list(TASKS if FLAGS.anchors else PRESETS)

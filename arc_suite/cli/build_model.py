@@ -16,9 +16,9 @@ import contextlib
 import imageio.v3 as imageio
 from absl import flags
 
-from arc_suite import checks, files, models
+from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_bodies, only_one, task
+from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import generator, spec_files
@@ -78,7 +78,7 @@ def _body() -> Body:
         for name in ("links", "layout"):
             if FLAGS[name].value is not None:
                 raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
-        body = only_one(named_bodies(FLAGS.robot), FLAGS.robot) if FLAGS.robot is not None else made_body()
+        body = made_body() or registry.body_of(FLAGS.robot)
     elif "seed" in sources:
         body = generator.random_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
     else:

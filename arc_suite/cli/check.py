@@ -14,12 +14,12 @@ the line names the terms, metrics and blocks that differ. Exit status 1 if there
 
 from absl import flags
 
+from arc_suite import registry
 from arc_suite.cli.flags import ROBOT_HELP, define_task, task
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import conformance, first_walk
 from arc_suite.models.soundness import flaws
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import load_body
 
 FLAGS = flags.FLAGS
 define_task()
@@ -37,7 +37,7 @@ def main(spec: str | None = None) -> int:
 
 
 def _check_body(spec: str) -> int:
-    body = load_body(spec)
+    body = registry.body_of(spec)
     found = flaws(body)
     for flaw in found:
         print(f"{spec}: {flaw.text}")

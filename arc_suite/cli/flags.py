@@ -7,9 +7,8 @@ from typing import Any
 
 from absl import flags
 
-from arc_suite import checks, policies, registry
+from arc_suite import policies, registry
 from arc_suite.envs.setup import Setup
-from arc_suite.models.families import FAMILIES
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
 from arc_suite.robots import ROBOTS, generator, palettes, shaping, spec_files
@@ -19,10 +18,7 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 MOST = 100_000  # episodes, or bodies: more than anyone waits for
-ROBOT_HELP = (
-    f"{', '.join(ROBOTS)}, module:name of one that another package has, or a body of a family: "
-    f"{', '.join(f'{family}:7' for family in FAMILIES)}"
-)
+ROBOT_HELP = f"{', '.join(registry.words())}; a JSON file; module:name of one that another package has"
 
 
 def define_body() -> None:
@@ -107,7 +103,7 @@ def made_body() -> Body | None:
                 raise ValueError(f"--{name}: goes with --spec or --legs")
         return None
     if FLAGS.spec is not None:
-        body = spec_files.load_body(FLAGS.spec)
+        body = registry.body_of(FLAGS.spec)
     else:
         body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links)
     if FLAGS.length:
@@ -118,9 +114,8 @@ def made_body() -> Body | None:
 def bodies(robot: flags.FlagHolder, near: Iterable[str] = ("all",)) -> dict[str, Body]:
     """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
 
-    A robot of another package is named `module:name`, and its module imported; `family:0-9` names ten bodies. Flaws of
-    the body in a spec file, such as feet in the floor, are warned of with the values that fit, as `arc-suite check`
-    has them.
+    For names see `registry.bodies_of`. Flaws of the body of --spec, such as feet in the floor, are warned of with the
+    values that fit, as `arc-suite check` has them.
 
     Args:
         robot: the flag.
@@ -132,7 +127,7 @@ def bodies(robot: flags.FlagHolder, near: Iterable[str] = ("all",)) -> dict[str,
     """
     body = made_body()
     if body is None:
-        return dict(ROBOTS) if robot.value == "all" else named_bodies(robot.value, near)
+        return dict(ROBOTS) if robot.value == "all" else _named(robot.value, near)
     if robot.present:
         raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
     for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
@@ -140,15 +135,8 @@ def bodies(robot: flags.FlagHolder, near: Iterable[str] = ("all",)) -> dict[str,
     return {body.name: body}
 
 
-def named_bodies(robot: str, near: Iterable[str] = ()) -> dict[str, Body]:
-    """Return the bodies by name that a value of --robot names; `near` are other values of the flag.
-
-    Raises:
-        ValueError: an unknown robot or family, or two bodies of one name.
-    """
-    if ":" not in robot:
-        return {robot: ROBOTS[checks.name(robot, ROBOTS, "robot", near)]}
-    found = registry.bodies_of(robot)
+def _named(robot: str, near: Iterable[str]) -> dict[str, Body]:
+    found = registry.bodies_of(robot, near)
     named = {body.name: body for body in found}
     if len(named) < len(found):
         raise ValueError(f"--robot={robot}: expected a name for each body, got two of one name")
@@ -162,18 +150,9 @@ def only_body(robot: flags.FlagHolder) -> Body:
         ValueError: as `bodies`, or several bodies.
         OSError: as `bodies`.
     """
-    return only_one(bodies(robot, near=()), robot.value)
-
-
-def only_one(found: dict[str, Body], robot: str) -> Body:
-    """Return the body of those that a value of --robot names.
-
-    Raises:
-        ValueError: they are several.
-    """
-    body, *others = found.values()
+    body, *others = bodies(robot, near=()).values()
     if others:
-        raise ValueError(f"--robot={robot}: expected one robot")
+        raise ValueError(f"--robot={robot.value}: expected one robot")
     return body
 
 

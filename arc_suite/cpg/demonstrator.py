@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks
+from arc_suite import checks, registry
 from arc_suite.cpg.law import checked, restarted
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepared
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -42,8 +41,8 @@ class Demonstrator:
 
         Args:
             task: a task of the contract, or an environment that has one as its `task`: of `arc_suite.load`,
-                `gymnasium.make` or `make_vec`. A robot's name or a body stands for the task walk with
-                default settings.
+                `gymnasium.make` or `make_vec`. A body, see `registry.body_of`, stands for the task walk with default
+                settings.
             preset: a name: slow, medium or fast, which every body has; for the four robots also tuned, which
                 earns most of what the paper's law can earn in walk, and refined, which earns most of all;
                 steered or surefooted, which follow a command; sighted, which needs a height scan; for leaper
@@ -140,4 +139,4 @@ def _resolved(given: Any) -> tuple[Body, Task | None]:
     task = getattr(task, "definition", task)
     if isinstance(task, Task):
         return task.scene.body, task
-    return ROBOTS[checks.name(given, ROBOTS, "robot")], None
+    return registry.body_of(given), None

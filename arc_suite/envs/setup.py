@@ -1,6 +1,7 @@
-"""`Setup`: a body, a task and its settings as one value, which opens environments and goes into files."""
+"""`Setup`: a body or several, a task and its settings as one value, which opens environments and goes into files."""
 
 import dataclasses
+import functools
 import hashlib
 import json
 from collections.abc import Mapping
@@ -13,28 +14,108 @@ from gymnasium.envs.registration import EnvSpec
 
 from arc_suite import checks, registry, versions
 from arc_suite.envs import dm
+from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.robots import ROBOTS, is_robot
+from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import body_from_json, body_to_json
+from arc_suite.robots.spec_files import body_to_json
 from arc_suite.tasks.contract import CURRICULUM, STEPS, Task
 
 ATTRIBUTE = "arc_suite"  # of an observation space: the setup that an agent was trained in, as `Setup.to_dict`
+HELD_OUT = 100_000  # first seed of the bodies of a family that validate what others trained
 
 
-class BaseSetup:
-    """What the setups of one body and of several have in common: a task with settings.
+@dataclasses.dataclass(frozen=True)
+class Setup:
+    """A body or several in a task with settings; make it by `Setup.of`, which checks names.
+
+    Equal setups have equal content, however their tasks and settings were written. Several bodies share one policy:
+    joints take positions, and environments are those of `envs.bodies`.
 
     Attributes:
-        robot: body, or bodies, as programs take them.
+        domain: the body, or the text that names several: `family:first-last`, or names with commas.
         task: name of the task, `module:name` for one of another package.
         settings_json: JSON of the task's settings, keys in order.
     """
 
-    robot: str
-    task: str
-    settings_json: str
+    domain: Body | str
+    task: str = "walk"
+    settings_json: str = "{}"
+
+    @classmethod
+    def of(cls, domain_name, task_name: str = "walk", task_kwargs: Mapping[str, Any] | None = None) -> "Setup":
+        """Return the setup of what `arc_suite.load` takes, or of several bodies; modules that names give are imported.
+
+        Values of settings are checked where the task is prepared or an environment opened.
+
+        Args:
+            domain_name: a body, see `registry.body_of`, or a text that names several, see `registry.bodies_of`.
+            task_name: see `registry.task_of`.
+            task_kwargs: settings of the task that JSON can hold, without `random`.
+
+        Raises:
+            ValueError: an unknown name, a setting that JSON cannot hold, or actions of several bodies other than
+                positions.
+            OSError: a file that cannot be read.
+        """
+        made = cls._checked(domain_name, task_name, task_kwargs)
+        _ = made.bodies  # finds out at once whether there are such bodies
+        return made
+
+    @classmethod
+    def _checked(cls, domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None) -> "Setup":
+        several, settings = registry.names_several(domain_name), checks.mapping("task_kwargs", task_kwargs)
+        domain, task = domain_name if several else registry.body_of(domain_name), registry.task_of(task_name)
+        if "random" in settings:
+            raise ValueError(
+                f"setting 'random': expected none, as every episode has a seed, got {settings['random']!r}"
+            )
+        if several:
+            checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
+        text = checks.json_text("task_kwargs", dict(settings))
+        if isinstance(arena := settings.get("arena"), str):
+            registry.arena_maker(arena)
+        return cls(domain, registry.importable("task", task.name), text)
+
+    @property
+    def several(self) -> bool:
+        """Whether the setup is of several bodies."""
+        return isinstance(self.domain, str)
+
+    @functools.cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, in order."""
+        return registry.bodies_of(self.domain)
+
+    @property
+    def body(self) -> Body:
+        """The only body.
+
+        Raises:
+            ValueError: there are several.
+        """
+        return registry.body_of(self.domain)
+
+    @property
+    def robot(self) -> str:
+        """The bodies as files name them.
+
+        Name of the robot, with the module for one of another package; the JSON text of another body; the text that
+        names several.
+        """
+        if isinstance(self.domain, str):
+            return self.domain
+        return registry.importable("robot", self.domain.name) if is_robot(self.domain) else body_to_json(self.domain)
+
+    @property
+    def name(self) -> str:
+        """Name of the bodies in names of files."""
+        return self._label.replace(":", ".").replace(",", "+")
+
+    @property
+    def _label(self) -> str:
+        return self.domain if isinstance(self.domain, str) else self.domain.name
 
     @property
     def task_kwargs(self) -> dict[str, Any]:
@@ -46,83 +127,6 @@ class BaseSetup:
         """Class of the task, with its name and version."""
         return registry.task_of(self.task)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
-        return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
-
-    def _judged_json(self) -> str:
-        """JSON of the settings with which a policy is evaluated while it learns: those without a curriculum."""
-        settings = self.task_kwargs
-        kept = {name: value for name, value in settings.items() if name not in CURRICULUM}
-        return checks.json_text("task_kwargs", kept if settings.get(CURRICULUM[0]) else settings)
-
-    def _seeded(self, seed: int | None) -> dict[str, Any]:
-        return self.task_kwargs | ({} if seed is None else {"random": seed})
-
-    def _named(self, moving: str) -> str:
-        """The setup as one line, for the name of what moves."""
-        return f"{moving}, {self.kind.name}" + (f", {self.settings_json}" if self.settings_json != "{}" else "")
-
-
-@dataclasses.dataclass(frozen=True)
-class Setup(BaseSetup):
-    """A body in a task with settings; make it by `Setup.of`, which checks names.
-
-    Equal setups have equal content, however their tasks and settings were written.
-
-    Attributes:
-        body: the body that moves.
-        task: name of the task, `module:name` for one of another package.
-        settings_json: JSON of the task's settings, keys in order.
-    """
-
-    body: Body
-    task: str = "walk"
-    settings_json: str = "{}"
-
-    @classmethod
-    def of(cls, domain_name, task_name: str = "walk", task_kwargs: Mapping[str, Any] | None = None) -> "Setup":
-        """Return the setup of what `arc_suite.load` takes; the modules that names give are imported.
-
-        Values of settings are checked where the task is prepared or an environment opened.
-
-        Args:
-            domain_name: a body; see `registry.body_of`.
-            task_name: see `registry.task_of`.
-            task_kwargs: settings of the task that JSON can hold, without `random`.
-
-        Raises:
-            ValueError: an unknown name, or a setting that JSON cannot hold.
-            OSError: a file that cannot be read.
-        """
-        body, task = registry.body_of(domain_name), registry.task_of(task_name)
-        settings = checks.mapping("task_kwargs", task_kwargs)
-        if "random" in settings:
-            raise ValueError(
-                f"setting 'random': expected none, as every episode has a seed, got {settings['random']!r}"
-            )
-        text = checks.json_text("task_kwargs", dict(settings))
-        if isinstance(arena := settings.get("arena"), str):
-            registry.arena_maker(arena)
-        return cls(body, registry.importable("task", task.name), text)
-
-    @property
-    def robot(self) -> str:
-        """Name of the robot, with the module for one of another package, or the JSON text of another body."""
-        return registry.importable("domain", self.body.name) if is_robot(self.body) else body_to_json(self.body)
-
-    @property
-    def name(self) -> str:
-        """Name of the body in names of files."""
-        return self.body.name
-
-    def validation(self, count: int) -> "Setup":
-        """Return the setup that evaluates a policy while it learns: this one, without a curriculum.
-
-        A curriculum begins at its first level in an evaluation, so policies are compared at `difficulty` instead.
-        """
-        return dataclasses.replace(self, settings_json=self._judged_json())
-
     @property
     def env_id(self) -> str:
         """Gymnasium's id, `arc_suite/<robot>-<task>-v<version>`."""
@@ -130,7 +134,7 @@ class Setup(BaseSetup):
 
     @property
     def definition(self) -> Task:
-        """The task, ready to run.
+        """The task, ready to run; of several bodies that of the first.
 
         Raises:
             ValueError: a setting that does not fit.
@@ -138,12 +142,30 @@ class Setup(BaseSetup):
         return self.prepared()[0]
 
     def prepared(self) -> tuple[Task, mujoco.MjModel]:
-        """Return the task, ready to run, and the compiled model.
+        """Return the task, ready to run, and the compiled model; of several bodies those of the first.
 
         Raises:
             ValueError: a setting that does not fit.
         """
-        return prepared(self.body, self.task, self.task_kwargs)
+        first = self.members()[0]
+        return prepared(first.domain, first.task, first.task_kwargs)
+
+    def members(self) -> tuple["Setup", ...]:
+        """Return the setup of each body; of several bodies with positions as actions."""
+        settings = checks.json_text("task_kwargs", self.task_kwargs | ({"actions": "position"} if self.several else {}))
+        return tuple(Setup(body, self.task, settings) for body in self.bodies)
+
+    def validation(self, count: int) -> "Setup":
+        """Return the setup that evaluates a policy while it learns.
+
+        It has no curriculum, which begins at its first level in an evaluation: policies are compared at `difficulty`
+        instead. Several bodies of families become at most `count` of seeds from 100,000 on; others their first `count`.
+        """
+        domain = _held_out(self.domain, count) if isinstance(self.domain, str) else self.domain
+        settings = self.task_kwargs
+        if settings.get(CURRICULUM[0]):
+            settings = {name: value for name, value in settings.items() if name not in CURRICULUM}
+        return dataclasses.replace(self, domain=domain, settings_json=checks.json_text("task_kwargs", settings))
 
     def load(self, seed: int | None = None, **options) -> dm.Environment:
         """Open a dm_env.
@@ -158,15 +180,18 @@ class Setup(BaseSetup):
         """Open a Gymnasium environment; for the options see `gymnasium.make`."""
         return gymnasium.make(self.spec(), **options)
 
-    def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options) -> VectorEnv:
-        """Open a vector environment.
+    def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options) -> VectorEnv | BodiesEnv:
+        """Open a vector environment, of several bodies with flat observations.
 
         Args:
-            num_envs: number of environments.
+            num_envs: number of environments; environment i has body i, and so on from the first after the last.
             seed: of the first environment's stream of episodes; the others count on. None for random ones.
             options: see `arc_suite.envs.vector.VectorEnv`.
         """
-        return VectorEnv(self.body, self.task, num_envs, task_kwargs=self._seeded(seed), **options)
+        options["task_kwargs"] = self._seeded(seed)
+        if self.several:
+            return BodiesEnv(self.task, num_envs, self.bodies, flat=True, **options)
+        return VectorEnv(self.domain, self.task, num_envs, **options)
 
     def spec(self, max_episode_steps: int = STEPS) -> EnvSpec:
         """Return the spec by which Gymnasium makes the environment anew, in another process too."""
@@ -179,21 +204,9 @@ class Setup(BaseSetup):
             kwargs=kwargs | ({"task_kwargs": self.task_kwargs} if self.task_kwargs else {}),
         )
 
-    def provenance(self) -> dict[str, Any]:
-        """Return, JSON-able, `to_dict` with the task's version, and hashes and versions of all that computes.
-
-        Raises:
-            ValueError: a setting that does not fit.
-        """
-        model = self.prepared()[1]
-        buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
-        mujoco.mj_saveModel(model, None, buffer)
-        return self.to_dict() | {
-            "task_version": self.kind.version,
-            "body_sha256": hashlib.sha256(body_to_json(self.body).encode()).hexdigest(),
-            "model_sha256": hashlib.sha256(buffer.data).hexdigest(),
-            "versions": versions.recorded(),
-        }
+    def to_dict(self) -> dict[str, Any]:
+        """Return the setup as files hold it, JSON-able: `robot`, `task`, `task_kwargs`."""
+        return {"robot": self.robot, "task": self.task, "task_kwargs": self.task_kwargs}
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> "Setup":
@@ -209,15 +222,45 @@ class Setup(BaseSetup):
         for name, kind in (("robot", str), ("task", str), ("task_kwargs", dict)):
             if not isinstance(fields.get(name), kind):
                 raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.quoted(fields.get(name))!r}")
-        robot, task, settings = fields["robot"], fields["task"], fields["task_kwargs"]
-        if robot.startswith("{"):
-            body = body_from_json(robot)
-        else:  # by its name alone: a path of a file is none
-            robot = registry.imported("robot", robot).rpartition(":")[2]
-            body = ROBOTS[checks.name(robot, ROBOTS, "robot")]
+        robot, task, settings = registry.stored(fields["robot"]), fields["task"], fields["task_kwargs"]
         registry.imported("task", task)
         registry.imported("arena", str(settings.get("arena", "flat")))
-        return cls.of(body, task, settings)
+        return cls._checked(robot, task, settings)  # draws no body of several
+
+    def provenance(self) -> dict[str, Any]:
+        """Return, JSON-able, `to_dict` with the task's version, and hashes and versions of all that computes.
+
+        Several bodies have no hash of a model.
+
+        Raises:
+            ValueError: a setting that does not fit.
+        """
+        texts = "".join(map(body_to_json, self.bodies))
+        known = self.to_dict() | {"task_version": self.kind.version, "body_sha256": _sha256(texts.encode())}
+        if not self.several:
+            model = self.prepared()[1]
+            buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
+            mujoco.mj_saveModel(model, None, buffer)
+            known["model_sha256"] = _sha256(buffer.data)
+        return known | {"versions": versions.recorded()}
+
+    def _seeded(self, seed: int | None) -> dict[str, Any]:
+        return self.task_kwargs | ({} if seed is None else {"random": seed})
 
     def __str__(self) -> str:
-        return self._named(self.body.name)
+        settings = "" if self.settings_json == "{}" else f", {self.settings_json}"
+        return f"{self._label}, {self.kind.name}{settings}"
+
+
+def _sha256(content) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def _held_out(robot: str, count: int) -> str:
+    """Text of at most `count` bodies that validate what several learned with."""
+    parts = robot.split(",")
+    families = list(dict.fromkeys(family for part in parts if (family := part.rpartition(":")[0])))[:count]
+    if not families:
+        return ",".join(parts[:count])
+    each = count // len(families)
+    return ",".join(f"{family}:{HELD_OUT}-{HELD_OUT + each - 1}" for family in families)

@@ -19,7 +19,6 @@ from tqdm import tqdm
 
 from arc_suite import policies
 from arc_suite.cpg.selection import suited_preset, suited_presets
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
 from arc_suite.robots import is_robot
@@ -69,19 +68,19 @@ def of_returns(played: Returns) -> Anchors:
     return Anchors(zero, None if best is None else means[best], best)
 
 
-def anchors(setup: Setup | BodiesSetup) -> Anchors:
+def anchors(setup: Setup) -> Anchors:
     """Return the anchors of a robot, a task and settings, measured where they are not committed.
 
     Raises:
         ValueError: a setting of the task that does not fit, or episodes that need not end.
     """
-    if isinstance(setup, BodiesSetup):
+    if setup.several:
         return _of_several(setup)
     return of_returns(known(setup) or measured(setup))
 
 
 @functools.lru_cache(maxsize=16)
-def _of_several(setup: BodiesSetup) -> Anchors:
+def _of_several(setup: Setup) -> Anchors:
     """The anchors of bodies, each in an episode with its own suited demonstrator."""
     zero, demonstrators = [], []
     members = setup.members()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
+from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.evaluation.published import DEMONSTRATORS, FINALS
@@ -33,7 +33,7 @@ class EpisodeResult(NamedTuple):
 
 def expert_return(setup: Setup) -> float | None:
     """Return what the paper's demonstrator earns; None for other tasks, settings and robots than the paper's."""
-    return DEMONSTRATORS.get(setup.body.name) if _is_published(setup) else None
+    return DEMONSTRATORS.get(setup.name) if _is_published(setup) else None
 
 
 def published_finals(setup: Setup, algorithms: Iterable[str]) -> dict[str, float]:
@@ -41,14 +41,14 @@ def published_finals(setup: Setup, algorithms: Iterable[str]) -> dict[str, float
 
     Empty for other tasks, settings and robots than the paper's.
     """
-    finals = FINALS.get(setup.body.name, {}) if _is_published(setup) else {}
+    finals = FINALS.get(setup.name, {}) if _is_published(setup) else {}
     if given := {name: finals[name] for name in algorithms if name in finals}:
         return given
     return {name: value for name, value in finals.items() if value == max(finals.values())}
 
 
 def _is_published(setup: Setup) -> bool:
-    return isinstance(setup, Setup) and setup.kind.name == "walk" and not setup.task_kwargs
+    return setup.kind.name == "walk" and not setup.task_kwargs
 
 
 def check_ends(limit: float) -> None:
@@ -106,7 +106,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 
 
 def episodes_in_batch(
-    environment: VectorEnv | FlatBodies,
+    environment: VectorEnv | BodiesEnv,
     policy: Policy,
     seeds: Sequence[int] = range(EPISODES),
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,

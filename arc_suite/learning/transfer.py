@@ -14,7 +14,6 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.evaluation import protocol
 from arc_suite.learning import survey
 from arc_suite.models.families import varied_body
@@ -136,16 +135,15 @@ def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mappi
         ValueError: a task or a body that does not fit.
     """
     bodies = list(bodies)
-    environment = FlatBodies(
-        BodiesEnv(
-            task,
-            len(bodies),
-            bodies,
-            num_threads=1,
-            autoreset_mode=AutoresetMode.DISABLED,
-            max_episode_steps=STEPS,
-            task_kwargs=settings,
-        )
+    environment = BodiesEnv(
+        task,
+        len(bodies),
+        bodies,
+        num_threads=1,
+        autoreset_mode=AutoresetMode.DISABLED,
+        max_episode_steps=STEPS,
+        task_kwargs=settings,
+        flat=True,
     )
     try:
         zero = Script(lambda seed: (), *environment.action_space.shape)
@@ -188,22 +186,22 @@ def _gain(played: list[Comparison]) -> float:
     return float(np.divide(*np.sum(gains, axis=0))) if gains else math.nan
 
 
-def _episodes(environment: FlatBodies, policy: Policy) -> list[Judged]:
+def _episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
     """Play an episode in every environment, from the seed of its index, and judge the walks."""
-    bodies, count = environment.unwrapped, environment.num_envs
+    count = environment.num_envs
     touching, fell = np.zeros(count), np.zeros(count, bool)
     starts, ends = np.zeros((count, 2)), np.zeros((count, 2))
 
     def watch(playing, terminated):
-        positions = bodies.positions()[:, :2]
+        positions = environment.positions()[:, :2]
         if not playing.any():
             starts[:] = positions
         ends[playing] = positions[playing]
-        touching[playing & _torso_touches(bodies)] += 1.0
+        touching[playing & _torso_touches(environment)] += 1.0
         fell[terminated] = True
 
     played, found = protocol.episodes_in_batch(environment, policy, range(count), watch), []
-    for index, (episode, task) in enumerate(zip(played, bodies.tasks, strict=True)):
+    for index, (episode, task) in enumerate(zip(played, environment.tasks, strict=True)):
         failures = survey.failures(
             task.scene.body,
             ends[index] - starts[index],

@@ -12,17 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, files, versions
+from arc_suite import checks, files, registry, versions
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal, zips
 from arc_suite.policies.network import PACKAGED, Network
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum
 from arc_suite.policies.universal import Universal
-from arc_suite.robots import ROBOTS, is_robot
+from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task
 
@@ -98,7 +97,7 @@ def policy(
             see `checkpoints`; that of a zip of stable-baselines3, see `zips`; or `module:attribute`, a function on
             Python's path that makes a function from a `TimeStep` to an action, from the name of a robot, or from a
             body that is none; or `file.py:attribute`, such a function in a file of any name.
-        robot: queen, bastion, tick or leaper, or any body.
+        robot: a body; see `registry.body_of`.
         presets: of the demonstrator, a name or several that take turns from seed to seed, see `cpg.Demonstrator`; None
             for the one that suits the task and the body.
         num_envs: number of environments.
@@ -110,7 +109,7 @@ def policy(
         ValueError: an unknown name, or a value out of range.
         OSError: a file that cannot be read.
     """
-    body = robot if isinstance(robot, Body) else ROBOTS[checks.name(robot, ROBOTS, "robot")]
+    body = registry.body_of(robot)
     if presets is None:
         presets = suited_preset(task or prepared(body, "walk")[0]) if name == "cpg" else ()
     presets = (presets,) if isinstance(presets, str) else tuple(presets)
@@ -170,7 +169,7 @@ def trained(name: str | os.PathLike) -> Network:
     """
     if (zipped := zips.parts(name)) is None:
         made = network.load(name)
-        if isinstance(made.setup, BodiesSetup):
+        if made.setup.several:
             raise ValueError(f"policy {name}: expected one of one body, or --robot; got one of {made.setup.robot}")
         return made
     if (setup := zips.setup(zipped[0])) is None:
@@ -186,7 +185,7 @@ def _from_file(path: Path, body: Body, task: Task | None) -> Policy:
     if zipped := zips.parts(path):
         return _from_zip(*zipped, body, task)
     made = network.load(path)
-    if isinstance(made.setup, BodiesSetup):
+    if made.setup.several:
         return Universal(made, task or prepared(body, "walk")[0])
     _check(path, made.setup, body, task)
     _check_joints(path, made.joints, body)

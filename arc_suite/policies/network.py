@@ -18,8 +18,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite import archives, checks, files, registry
-from arc_suite.envs.bodies import bodies_setup
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.tasks import tokens
 
@@ -127,7 +125,7 @@ class Network(NamedTuple):
     """
 
     layers: tuple[Layer, ...]
-    setup: Setup | BodiesSetup
+    setup: Setup
     blocks: Mapping[str, int]
 
     @property
@@ -204,7 +202,7 @@ def load(path: str | os.PathLike) -> Network:
         for index, kind in enumerate(known["layers"]):
             layer, width = _layer(kind, index, arrays, width)
             layers.append(layer)
-        return Network(tuple(layers), bodies_setup.from_dict(known), blocks)
+        return Network(tuple(layers), Setup.from_dict(known), blocks)
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except registry.NotImported as error:

@@ -33,7 +33,7 @@ def metadata(network: Network) -> dict:
     Raises:
         ValueError: a policy of many bodies.
     """
-    if not isinstance(network.setup, Setup):
+    if network.setup.several:
         raise ValueError(f"policy of {network.setup.robot}: expected one of one body; save_universal takes others")
     return _metadata(network.setup, network.blocks)
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies.named import policy
 from arc_suite.policies.protocol import Positioned
@@ -22,7 +21,7 @@ class Teacher:
     Different bodies have no common observation, so that it reads those of the bodies from their environments.
     """
 
-    def __init__(self, environment: VectorEnv | FlatBodies, preset: str = ""):
+    def __init__(self, environment: VectorEnv | BodiesEnv, preset: str = ""):
         """Fit the demonstrators.
 
         Args:
@@ -34,8 +33,8 @@ class Teacher:
         """
         self._bodies: BodiesEnv | None = None
         tasks: Sequence[Task]
-        if isinstance(environment, FlatBodies):
-            self._bodies, tasks = environment.unwrapped, environment.unwrapped.tasks
+        if isinstance(environment, BodiesEnv):
+            self._bodies, tasks = environment, environment.tasks
         else:
             tasks = [environment.task.definition] * environment.num_envs
         self._mask = None if self._bodies is None else self._bodies.description.mask.reshape(len(tasks), -1)

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from arc_suite.cpg.law import Clocked, checked, proprioception, torques
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.policies import network
@@ -31,7 +30,7 @@ def load(name: str | os.PathLike, task: Task | None = None) -> Network:
     trained_in = "steer" if task is not None and "command" in task.blocks else "walk"
     packaged = PACKAGED / f"{NAME}-{trained_in}{network.EXTENSION}"
     made = network.load(packaged if name == NAME else name)
-    if not isinstance(made.setup, BodiesSetup):
+    if not made.setup.several:
         raise ValueError(f"policy {name}: expected one of many bodies, got one of {made.setup.body.name}")
     return made
 

@@ -6,7 +6,7 @@ import programs
 import pytest
 from dm_control import mjcf
 
-from arc_suite import models
+from arc_suite import models, registry
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
@@ -109,8 +109,8 @@ def test_three_links_are_the_default():
         (["--legs=six"], "flag --legs=six: expected an integer in the range [4, 12]"),
         (["--legs=6", "--links=0"], "flag --links=0: expected an integer in the range [1, 4]"),
         (["--legs=6", "--links=5"], "flag --links=5: expected an integer in the range [1, 4]"),
-        (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'? (there are: queen, bastion, tick, leaper)"),
-        (["--robot=varied:0-1"], "--robot=varied:0-1: expected one robot"),
+        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.words())})"),
+        (["--robot=varied:0-1"], "robot 'varied:0-1': expected one body, got several"),
         (["--robot=queen", "--links=2"], "--links=2: goes with --legs or --seed, not with --robot"),
         ([], f"{SOURCES}, got none"),
         (["--robot=queen", "--legs=6"], f"{SOURCES}, got --robot and --legs"),

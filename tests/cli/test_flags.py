@@ -7,14 +7,15 @@ from programs import arc_suite as arc_suite_program
 from programs import run
 
 import arc_suite
+from arc_suite import registry
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.gym import Env
 from arc_suite.models.families import FAMILIES
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import generator
 from arc_suite.robots.spec import PALETTES
 from arc_suite.robots.spec_files import EXAMPLES, load_body, save_body
 
-SPIDER = EXAMPLES["spider"]
+SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.words())
 NO_PALETTE = f"Body(walker_4x3).palette: expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got 'mos'"
 
 
@@ -52,7 +53,7 @@ def test_render_takes_a_body_made_to_order(tmp_path):
         (["--legs=4", "--length=shin=2"], "unknown link 'shin' (there are: upper, middle, lower)"),
         (["--legs=4", "--palette=mos"], NO_PALETTE),
         (["--legs=2"], "flag --legs=2: expected an integer in the range [4, 12]"),
-        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)}, all)"),
+        (["--robot=quen"], f"unknown robot 'quen'; did you mean 'queen'? (there are: {WORDS}, all)"),
         (["--robot=vried:7"], f"unknown family 'vried'; did you mean 'varied'? (there are: {', '.join(FAMILIES)})"),
         (["--policy=cgp"], "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (["--preset=fats"], f"unknown preset 'fats'; did you mean 'fast'? (there are: {', '.join(preset_names())})"),

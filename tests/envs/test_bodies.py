@@ -12,8 +12,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_allclose, assert_array_equal
 
 import arc_suite
+from arc_suite import registry
 from arc_suite.envs.bodies import BodiesEnv, stacked
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.families import varied_body
@@ -131,16 +131,15 @@ def test_other_commands_of_each(monkeypatch):
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
     env = make(FEW, "steer")
-    singles, flat = alone(env, "steer"), FlatBodies(env)
-    flat.reset(seed=3)
+    singles, _ = alone(env, "steer"), env.reset(seed=3)
     for index, single in enumerate(singles):
         single.reset(seed=3 + index)
     found = []
     for action in actions_of(env, 12):
-        flat.step(action)
+        env.step(action)
         for single, own, mask in zip(singles, action, env.description.mask, strict=True):
             single.step(own[mask][None])
-        found.append(flat.resampled())
+        found.append(env.resampled())
         assert_array_equal(found[-1], [single.resampled()[0] for single in singles])
     assert np.any(found, axis=0).all() and not np.all(found, axis=0).any()
 
@@ -288,10 +287,7 @@ def test_tokens_say_what_a_body_does():
 
 @pytest.mark.slow
 def test_flat_vectors_for_plain_learners():
-    env, flat = (
-        make(FEW, autoreset_mode="SameStep", task_kwargs=SHORT),
-        FlatBodies(make(FEW, autoreset_mode="SameStep", task_kwargs=SHORT)),
-    )
+    env, flat = (make(FEW, autoreset_mode="SameStep", task_kwargs=SHORT, flat=flat) for flat in (False, True))
     assert flat.single_observation_space.shape == (664,) and flat.single_action_space.shape == (48,)
     assert_array_equal(flat.reset(seed=0)[0][:, :144], env.reset(seed=0)[0]["legs"].reshape(5, -1))
     ends = 0
@@ -304,7 +300,7 @@ def test_flat_vectors_for_plain_learners():
         for last in info.get("final_obs", ()):
             ends += last is not None and last.shape == (664,)
     assert ends >= 3
-    with pytest.raises(ValueError, match=r"^action: expected shape \(5, 12, 4\), got \(5, 47\)$"):
+    with pytest.raises(ValueError, match=r"^action: expected shape \(5, 48\), got \(5, 47\)$"):
         flat.step(np.zeros((5, 47)))
 
 
@@ -324,7 +320,7 @@ def test_pictures_show_each_body():
         ({"bodies": "varied:0-9", "num_envs": 4}, "num_envs: expected at least one for each of 10 bodies, got 4"),
         ({"bodies": [], "num_envs": 4}, "bodies: expected at least one, got []"),
         ({"bodies": "vared:0-9"}, "unknown family 'vared'; did you mean 'varied'? (there are: "),
-        ({"bodies": ["queen", 3]}, "unknown domain 3 (there are: queen, bastion, tick, leaper)"),
+        ({"bodies": ["queen", 3]}, f"unknown robot 3 (there are: {', '.join(registry.words())})"),
         ({"task_kwargs": {"actions": "torque"}}, "unknown actions of different bodies 'torque' (there are: position)"),
         ({"task_kwargs": {"weigths": {}}}, "unknown setting of walk 'weigths'; did you mean 'weights'?"),
         ({"autoreset_mode": "never"}, "unknown autoreset_mode 'never'"),

@@ -25,7 +25,7 @@ from gymnasium.wrappers import (
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite.robots import ROBOTS
+from arc_suite import registry
 from arc_suite.tasks import TASKS
 from arc_suite.tasks.walk import Walk
 
@@ -409,7 +409,7 @@ def test_actions_out_of_range_are_clipped():
         ),
         (
             {"domain_name": "quen"},
-            f"unknown domain 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.words())})",
         ),
         ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? (there are: {', '.join(TASKS)})"),
     ],

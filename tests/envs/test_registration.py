@@ -11,7 +11,7 @@ import programs
 import pytest
 
 import arc_suite
-from arc_suite import registration
+from arc_suite import registration, registry
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.robots import ROBOTS
@@ -111,10 +111,11 @@ for call in (
     except ValueError as error:
         print(error)
 """
+    words = [*ROBOTS, "hopper", *registry.words()[len(ROBOTS) :]]
     assert package(code) == [
-        f"unknown domain 'hoper'; did you mean 'hopper'? (there are: {', '.join(ROBOTS)}, hopper)",
+        f"unknown robot 'hoper'; did you mean 'hopper'? (there are: {', '.join(words)})",
         f"unknown task 'strol'; did you mean 'stroll'? (there are: {', '.join(TASKS)}, stroll)",
-        "domain 'hopper': cannot import nowhere: No module named 'nowhere'",
+        "robot 'hopper': cannot import nowhere: No module named 'nowhere'",
     ]
 
 

@@ -6,16 +6,17 @@ import pickle
 import gymnasium
 import numpy as np
 import pytest
+from numpy.testing import assert_array_equal
 
 from arc_suite import registry
 from arc_suite.arenas import FLAT
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json
 
 QUEEN = ROBOTS["queen"]
 MADE = generator.generate(4, 2)
+SHORT = {"time_limit": 0.5}
 
 
 def test_equal_content_is_equal():
@@ -68,12 +69,16 @@ def test_provenance_tells_what_episodes_depend_on():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("quen",), "unknown domain 'quen'"),
+        (("quen",), "unknown robot 'quen'"),
         (("queen", "wlak"), "unknown task 'wlak'"),
         (("queen", "walk", {"arena": "flta"}), "unknown arena 'flta'"),
         (("queen", "walk", {"arena": FLAT}), "task_kwargs: expected values that JSON can hold"),
         (("queen", "walk", {"random": 3}), "setting 'random': expected none"),
         (("queen", "walk", [3]), "task_kwargs: expected a mapping"),
+        (("random:0-1,quen",), "unknown robot 'quen'; did you mean 'queen'?"),
+        (("random:0-1", "wlak"), "unknown task 'wlak'; did you mean 'walk'?"),
+        (("random:0-1", "walk", {"actions": "torque"}), "unknown actions of different bodies 'torque'"),
+        (("random:3-1",), "robot 'random:3-1': expected seeds in ascending order"),
     ],
 )
 def test_names_and_settings_are_checked_when_it_is_made(arguments, message):
@@ -90,6 +95,9 @@ def test_names_and_settings_are_checked_when_it_is_made(arguments, message):
         ({"robot": None}, "expected robot to be a str"),
         ({"task": 3}, "expected task to be a str"),
         ({"task_kwargs": []}, "expected task_kwargs to be a dict"),
+        ({"robot": "queen,spider.json"}, "unknown robot 'spider.json'"),
+        ({"robot": "os:spider.json"}, "unknown robot 'os:spider.json'"),
+        ({"robot": "varied:0-3,strolling:crab:3-4"}, "files import nothing; import 'strolling' first"),
         ({"robot": "strolling:queen"}, "files import nothing; import 'strolling' first"),
         ({"task": "strolling:walk"}, "files import nothing; import 'strolling' first"),
         ({"task_kwargs": {"arena": "strolling:flat"}}, "files import nothing; import 'strolling' first"),
@@ -112,8 +120,72 @@ def test_policies_are_evaluated_without_the_curriculum():
     settings = {"curriculum": True, "level": 2, "time_limit": 4.0}
     setup = Setup.of("tick", "gaps", settings)
     assert setup.validation(10) == Setup.of("tick", "gaps", {"time_limit": 4.0})
-    assert BodiesSetup.of("queen,tick", "rough", settings).validation(1).task_kwargs == {"time_limit": 4.0}
+    assert Setup.of("queen,tick", "rough", settings).validation(1).task_kwargs == {"time_limit": 4.0}
     easier = Setup.of("tick", "gaps", {"difficulty": 0.2, "curriculum": True})
     assert easier.validation(10).task_kwargs == {"difficulty": 0.2}
     fixed = Setup.of("tick", "gaps", {"difficulty": 0.2, "curriculum": False})
     assert fixed.validation(10) == fixed
+
+
+@pytest.mark.parametrize(
+    ("robot", "several"),
+    [
+        ("varied:0-3", True),
+        ("queen,tick", True),
+        ("random:0,varied:1", True),
+        ("varied:7", False),
+        ("queen", False),
+        ("module:family:3", False),
+        ("module:family:3-4", True),
+        ('{"name": "a,b:1-2"}', False),
+        ("a,b.json", False),
+    ],
+)
+def test_names_of_several_bodies(robot, several):
+    assert registry.names_several(robot) is several
+
+
+def test_several_bodies_go_into_files_and_come_back():
+    setup = Setup.of("random:0-1,queen", "steer", SHORT)
+    assert setup.several and [body.name for body in setup.bodies] == ["random_0", "random_1", "queen"]
+    assert setup.name == "random.0-1+queen" and str(setup) == 'random:0-1,queen, steer, {"time_limit": 0.5}'
+    assert Setup.from_dict(setup.to_dict()) == setup
+    assert [member.body for member in setup.members()] == list(setup.bodies)
+    assert setup.members()[2] == Setup.of("queen", "steer", SHORT | {"actions": "position"})
+    assert setup.provenance()["body_sha256"] != Setup.of("random:0-2").provenance()["body_sha256"]
+    with pytest.raises(ValueError, match="^robot 'random:0-1,queen': expected one body, got several$"):
+        setup.load()
+
+
+def test_bodies_of_validation_are_of_other_seeds():
+    assert Setup.of("varied:0-3").validation(10).robot == "varied:100000-100009"
+    assert Setup.of("varied:0-3,random:0-3").validation(10).robot == "varied:100000-100004,random:100000-100004"
+    assert Setup.of("queen,tick").validation(1).robot == "queen"
+
+
+def test_flat_environments_go_on_bit_exactly_with_other_ages():
+    setup, one, other = Setup.of("random:0-1", "walk", SHORT), [], []
+    environment = setup.make_vec(2, seed=0, autoreset_mode="SameStep")
+    environment.reset()
+    snapshot = environment.snapshot()
+    assert_array_equal(snapshot["steps"], [0, 0])
+    environment.restore(snapshot | {"steps": np.array([0, 8])})
+    actions = 0.2 * np.random.default_rng(0).standard_normal((6, 2, 48))
+    for action in actions[:3]:
+        environment.step(action)
+    middle = environment.snapshot()
+    for found in (one, other):
+        environment.restore(middle)
+        found += [environment.step(action) for action in actions[3:]]
+    for first, second in zip(one, other, strict=True):
+        for left, right in zip(first[:4], second[:4], strict=True):
+            assert_array_equal(left, right)
+    assert not one[0][3].any() or one[0][3][1]
+    assert environment.step_limit == environment.task.step_limit
+
+
+def test_tasks_of_several_bodies_have_no_mirror_image():
+    task = Setup.of("random:0-1").make_vec(2).task
+    assert sum(task.blocks.values()) == 664 and task.definition is task
+    with pytest.raises(ValueError, match="different bodies have no common mirror image"):
+        _ = task.symmetry

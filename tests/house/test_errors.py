@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import arc_suite
-from arc_suite import policies
+from arc_suite import policies, registry
 from arc_suite.arenas import ARENAS
 from arc_suite.cpg import Demonstrator
 from arc_suite.robots import ROBOTS
@@ -21,7 +21,7 @@ ZEROS = np.zeros(12)
 NAN = np.where(np.arange(12) == 7, np.nan, 0.0)
 PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = f"(there are: {', '.join(TASKS)})"
-DOMAINS = f"(there are: {', '.join(ROBOTS)})"
+DOMAINS = f"(there are: {', '.join(registry.words())})"
 PRESETS = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, planned"
 CAMERAS = "['tracking', 'portrait', 'profile']"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
@@ -132,31 +132,31 @@ CASES = [
     (rows(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 environments, got 3"),
     (lambda w: policies.alone(policies.policy("random", "queen"), seed=-1), f"{SEED} -1"),
     # Ids.
-    (lambda w: arc_suite.load("Queen", "walk"), f"unknown domain 'Queen'; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: arc_suite.load(7, "walk"), f"unknown domain 7 {DOMAINS}"),
-    (lambda w: arc_suite.load(["queen"], "walk"), f"unknown domain ['queen']; did you mean 'queen'? {DOMAINS}"),
+    (lambda w: arc_suite.load("Queen", "walk"), f"unknown robot 'Queen'; did you mean 'queen'? {DOMAINS}"),
+    (lambda w: arc_suite.load(7, "walk"), f"unknown robot 7 {DOMAINS}"),
+    (lambda w: arc_suite.load(["queen"], "walk"), f"unknown robot ['queen']; did you mean 'queen'? {DOMAINS}"),
     (lambda w: arc_suite.load("queen", None), f"unknown task None {TASK_NAMES}"),
     (
         lambda w: arc_suite.load("creature:hopper", "walk"),
-        "domain 'hopper': cannot import creature: No module named 'creature'",
+        "robot 'hopper': cannot import creature: No module named 'creature'",
     ),
     (
         lambda w: arc_suite.load("..:queen", "walk"),
-        "domain '..:queen': expected module:name, with a module that can be imported",
+        "robot '..:queen': expected module:name, with a module that can be imported",
     ),
     (
         lambda w: arc_suite.load(":queen", "walk"),
-        "domain ':queen': expected module:name, with a module that can be imported",
+        "robot ':queen': expected module:name, with a module that can be imported",
     ),
     (
         lambda w: arc_suite.load("os:queen", "walk"),
-        "domain 'os:queen': queen is the suite's own, expected without a module",
+        "robot 'os:queen': queen is the suite's own, expected without a module",
     ),
     (
         lambda w: arc_suite.load("queen", "json:walk"),
         "task 'json:walk': walk is the suite's own, expected without a module",
     ),
-    (make(domain_name="bastoin"), f"unknown domain 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
+    (make(domain_name="bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (rows(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
     # Cameras and sizes.
     (lambda w: w.dm.physics.render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),

@@ -109,12 +109,12 @@ def test_names_of_families():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("varied:0-1", "domain 'varied:0-1': expected one body, got 2"),
-        ("varied:x", "domain 'varied:x': expected varied:seed or varied:first-last, such as varied:0-9"),
-        ("varied:-3", "domain 'varied:-3': expected varied:seed or varied:first-last, such as varied:0-9"),
-        ("random:", "domain 'random:': expected random:seed or random:first-last, such as random:0-9"),
-        ("varied:5-3", "domain 'varied:5-3': expected seeds in ascending order, at most 65536"),
-        ("varied:0-99999999", "domain 'varied:0-99999999': expected seeds in ascending order, at most 65536"),
+        ("varied:0-1", "robot 'varied:0-1': expected one body, got several"),
+        ("varied:x", "robot 'varied:x': expected varied:seed or varied:first-last, such as varied:0-9"),
+        ("varied:-3", "robot 'varied:-3': expected varied:seed or varied:first-last, such as varied:0-9"),
+        ("random:", "robot 'random:': expected random:seed or random:first-last, such as random:0-9"),
+        ("varied:5-3", "robot 'varied:5-3': expected seeds in ascending order, at most 65536"),
+        ("varied:0-99999999", "robot 'varied:0-99999999': expected seeds in ascending order, at most 65536"),
         ("varied:4294967296", "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         ("json:varied:3", "family 'json:varied': varied is the suite's own, expected without a module"),
         (

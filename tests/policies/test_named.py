@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import arc_suite
+from arc_suite import registry
 from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
@@ -66,7 +67,7 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (
             ("zero", "quen"),
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
+            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.words())})",
         ),
         (
             ("cpg", "queen", "midium"),

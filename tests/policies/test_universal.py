@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation, policies
 from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal
 from arc_suite.policies.universal import Universal
@@ -27,7 +26,7 @@ def trained(tmp_path_factory):
 
 def test_it_acts_for_a_body_as_among_many():
     """Bit-equal actions, whatever the other bodies are, in the same environments."""
-    made, env = drawn(), FlatBodies(BodiesEnv("walk", 2, list(BODIES)))
+    made, env = drawn(), BodiesEnv("walk", 2, list(BODIES), flat=True)
     observations, _ = env.reset(seed=0)
     alone = [Universal(made, task) for task in env.unwrapped.tasks]
     for _ in range(5):

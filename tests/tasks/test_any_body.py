@@ -10,7 +10,7 @@ import pytest
 from tiers import tiers
 
 import arc_suite
-from arc_suite import models, policies, rotations
+from arc_suite import models, policies, registry, rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.models.standing import standing
 from arc_suite.robots import ROBOTS, gaits, generator, spec_files
@@ -154,7 +154,7 @@ def test_a_domain_is_a_name_a_body_or_a_file(tmp_path):
         (
             "queeen",
             ValueError,
-            f"unknown domain 'queeen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})",
+            f"unknown robot 'queeen'; did you mean 'queen'? (there are: {', '.join(registry.words())})",
         ),
         (str(tmp_path / "a.json"), OSError, f"cannot read {tmp_path / 'a.json'}: no such file or directory"),
     ):

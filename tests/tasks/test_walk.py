@@ -9,6 +9,7 @@ from numpy.testing import assert_array_equal
 from tiers import tiers
 
 import arc_suite
+from arc_suite import registry
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
@@ -207,7 +208,7 @@ def test_overriding_one_weight_keeps_the_others():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("quen", "walk"), f"unknown domain 'quen'; did you mean 'queen'? (there are: {', '.join(ROBOTS)})"),
+        (("quen", "walk"), f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.words())})"),
         (("queen", "wlak"), f"unknown task 'wlak'; did you mean 'walk'? (there are: {', '.join(TASKS)})"),
         (
             ("queen", "walk", {"target_velocty": 1}),

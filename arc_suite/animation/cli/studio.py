@@ -18,7 +18,7 @@ from absl import flags
 
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
-from arc_suite.animation.studio.sketch import OWN, Sketch, cured
+from arc_suite.animation.studio.sketch import OWN, Sketch, cured, sources
 from arc_suite.cli.flags import (
     ROBOT_HELP,
     define_body,
@@ -30,7 +30,6 @@ from arc_suite.cli.flags import (
     policy_name,
     task,
 )
-from arc_suite.robots.spec_files import EXAMPLES
 
 FLAGS = flags.FLAGS
 define_body()
@@ -63,9 +62,9 @@ def _sketch() -> Sketch:
         policy=policy_name(FLAGS.policy),
         preset=FLAGS.preset or OWN,
     )
-    if FLAGS.spec is not None and FLAGS.spec not in EXAMPLES:
-        return cured(doing, body)
     shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
     if FLAGS.legs is not None:
         return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
-    return dataclasses.replace(doing, source=FLAGS.spec or body.name, **shape)
+    if (source := FLAGS.spec or _ROBOT.value) in sources():
+        return dataclasses.replace(doing, source=source, **shape)
+    return cured(doing, body)

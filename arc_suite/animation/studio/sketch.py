@@ -10,7 +10,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS, generator, palettes
 from arc_suite.robots.shaping import Shape, link_names, shaped
 from arc_suite.robots.spec import Body
-from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json, load_body
+from arc_suite.robots.spec_files import EXAMPLES, body_from_json, body_to_json
 
 LEGS, RANDOM, FILE = "legs and links", "random", "file"
 _DOING = ("task", "gait", "speed", "ground", "kicks", "settings", "policy", "preset")  # fields that are not the body's
@@ -82,7 +82,7 @@ def source_body(sketch: Sketch) -> Body:
     if sketch.source == FILE:
         return body_from_json(sketch.file)
     name = checks.name(sketch.source, sources(), "source", near=(FILE,))
-    return ROBOTS[name] if name in ROBOTS else load_body(name)
+    return registry.body_of(name)
 
 
 def body(sketch: Sketch) -> Body:

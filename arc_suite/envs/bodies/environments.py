@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -20,13 +20,46 @@ from arc_suite.tasks import tokens
 from arc_suite.tasks.tokens import Description, Tokens
 
 
+class BodiesTask(NamedTuple):
+    """The task of environments of different bodies with flat observations, for learners.
+
+    Attributes:
+        name: of the task.
+        step_limit: control steps after which an episode is over, may be infinite.
+        blocks: sizes of the blocks of an observation by name, in order.
+    """
+
+    name: str
+    step_limit: float
+    blocks: Mapping[str, int] = tokens.FLAT
+
+    @property
+    def definition(self) -> "BodiesTask":
+        """Itself, where the task of one body has a value of the contract."""
+        return self
+
+    @property
+    def symmetry(self):
+        """No mirror maps.
+
+        Raises:
+            ValueError: always; bodies need not be symmetric.
+        """
+        raise ValueError(f"task {self.name}: different bodies have no common mirror image")
+
+    def split(self, observation: np.ndarray) -> dict[str, np.ndarray]:
+        """Return an observation (..., 664) as named blocks, views of it."""
+        return tokens.split(observation)
+
+
 class BodiesEnv(Together):
     """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
 
     Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without
     dimension and 0 where a body has no leg or joint; see `tasks.tokens.Tokens.observed`. Actions are (num_envs, 12, 4)
     in [-1, 1], positions of joints as with `actions="position"`; entries without a joint are ignored. `description`
-    holds what does not change.
+    holds what does not change. With `flat=True`, for plain learners, observations are vectors (num_envs, 664) that
+    include legs and torso of the description, and actions are (num_envs, 48).
 
     An environment of seed s is bit-equal to an environment of its body and seed in a `VectorEnv` with
     `actions="position"`: states, rewards, infos, and the tokens of the observation. Bodies whose models have one
@@ -38,6 +71,7 @@ class BodiesEnv(Together):
     Attributes:
         bodies: of each environment.
         tasks: of each environment, for demonstrators.
+        task: of all, for learners.
         step_limit: control steps after which every episode is over, may be infinite.
         description: of each environment, (num_envs, ...) float32; see `tasks.tokens.Description`.
         autoreset_mode: what happens to an environment whose episode has ended.
@@ -56,13 +90,14 @@ class BodiesEnv(Together):
         width: int = 640,
         height: int = 480,
         camera_id: int | str = "tracking",
+        flat: bool = False,
     ):
         """Prepare the task of every body and allocate the environments.
 
         Args:
             task_name: as in `arc_suite.load`.
             num_envs: number of environments; environment i has body i, and so on from the first after the last.
-            bodies: `family:first-last`, or another body that `arc_suite.load` takes, or a list of them.
+            bodies: one or several, see `registry.bodies_of`, or a list of them.
             num_threads: as in `VectorEnv`, of each batch.
             autoreset_mode: as in `VectorEnv`.
             max_episode_steps: as in `VectorEnv`.
@@ -71,6 +106,7 @@ class BodiesEnv(Together):
             width: of a picture, pixels.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
+            flat: whether observations and actions are vectors.
 
         Raises:
             ValueError: an unknown name, a body with more than 12 legs or 4 joints a leg, or a value that does not fit.
@@ -103,7 +139,8 @@ class BodiesEnv(Together):
         members = [made[body] for body in found]
         self.num_envs, self.bodies = num_envs, tuple(found[which] for which in which_body)
         self.tasks = tuple(members[which].task for which in which_body)
-        self._tokens = Tokens.of(self.tasks)
+        self.task = BodiesTask(self.tasks[0].name, self.tasks[0].step_limit)
+        self._tokens, self._flat = Tokens.of(self.tasks), flat
         for indices in grouped([members[which] for which in which_body]):
             group = Group([members[which_body[index]] for index in indices], task_name, **options)
             self._places.append(Place(group, np.array(indices), self._tokens.part(indices)))
@@ -113,12 +150,7 @@ class BodiesEnv(Together):
         described = [tokens.described(member.task) for member in members]
         columns = zip(*(described[which] for which in which_body), strict=True)
         self.description = Description(*map(np.stack, columns))
-        sizes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
-        boxes: dict[str, gymnasium.Space] = {
-            name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()
-        }
-        self.single_observation_space = gymnasium.spaces.Dict(boxes)
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (tokens.LEGS, tokens.JOINTS), np.float32)
+        self.single_observation_space, self.single_action_space = _spaces(flat)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         if seed is not None:
@@ -145,7 +177,7 @@ class BodiesEnv(Together):
         """Advance every environment by one control step, except those that start an episode; see `VectorEnv.step`.
 
         Args:
-            actions: (num_envs, 12, 4), clipped to [-1, 1].
+            actions: (num_envs, 12, 4), or (num_envs, 48) of flat environments, clipped to [-1, 1].
 
         Raises:
             ValueError: actions of another shape, or NaN in one; nothing has moved then.
@@ -163,7 +195,7 @@ class BodiesEnv(Together):
                 place.tokens.actions(actions[indices])
             )
             if "final_obs" in own:
-                own["final_obs"] = place.last(own["final_obs"])
+                own["final_obs"] = self._last(place, own["final_obs"])
             scatter(info, own, indices, self.num_envs)
         return self._observed(), reward, terminated, truncated, info
 
@@ -204,27 +236,34 @@ class BodiesEnv(Together):
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return the state of all environments as arrays by name, from which `restore` goes on.
 
+        Among them are flat `observation` (num_envs, 664), and `steps` (num_envs,), control steps of the episodes.
+
         Raises:
             ResetNeeded: before the first reset.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("take a snapshot")
         taken = enumerate(place.group.snapshot() for place in self._places)
-        return {f"{number}/{name}": array for number, arrays in taken for name, array in arrays.items()}
+        arrays = {f"{number}/{name}": array for number, arrays in taken for name, array in arrays.items()}
+        steps = np.array(self._of_each(lambda group: group._steps))
+        return arrays | {"observation": self._vectors(self._gathered_tokens()), "steps": steps}
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Go on, bit-exact, from the snapshot of environments of the same bodies and task.
+
+        Its `steps` may have been changed.
 
         Raises:
             ValueError: an array is missing or does not fit; none has been used.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
-        checked = []
+        checked, steps = [], np.asarray(arrays.get("steps", ()))
         for number, place in enumerate(self._places):
             prefix = f"{number}/"
             own = {name.removeprefix(prefix): array for name, array in arrays.items() if name.startswith(prefix)}
+            own["steps"] = steps[place.indices] if steps.shape == (self.num_envs,) else steps
             checked.append(place.group._checked_snapshot(own))
         for place, snapshot in zip(self._places, checked, strict=True):
             snapshots.put(place.group, snapshot)
@@ -268,11 +307,42 @@ class BodiesEnv(Together):
                 found[index] = value
         return tuple(found)
 
-    def _observed(self) -> dict[str, np.ndarray]:
+    def _observed(self) -> dict[str, np.ndarray] | np.ndarray:
+        found = self._gathered_tokens()
+        return self._vectors(found) if self._flat else found
+
+    def _gathered_tokens(self) -> dict[str, np.ndarray]:
         gathered = np.empty(self._tokens.places.shape, np.float32)
         for group, indices, own in self._places:
             gathered[indices] = own.gathered(group._observation)
         return self._tokens.observed(gathered)
+
+    def _vectors(self, found: Mapping[str, np.ndarray], indices=slice(None)) -> np.ndarray:
+        """Flat observations of the tokens of some environments."""
+        return tokens.flat(found, self.description.legs[indices], self.description.torso[indices])
+
+    def _last(self, place: Place, vectors: np.ndarray) -> np.ndarray:
+        """The last observations of a group's episodes, objects (environments,), None where none ended."""
+        found = np.full(len(vectors), None, object)
+        for index in [i for i, vector in enumerate(vectors) if vector is not None]:
+            own = place.tokens.part([index])
+            seen = own.observed(own.gathered(vectors[index][None]))
+            last = self._vectors(seen, place.indices[[index]])[0]
+            found[index] = last if self._flat else {name: array[0] for name, array in seen.items()}
+        return found
+
+
+def _spaces(flat: bool) -> tuple[gymnasium.Space, gymnasium.Space]:
+    """The spaces of observations and of actions."""
+    joints = (tokens.LEGS * tokens.JOINTS,) if flat else (tokens.LEGS, tokens.JOINTS)
+    actions = gymnasium.spaces.Box(-1.0, 1.0, joints, np.float32)
+    if flat:
+        return gymnasium.spaces.Box(-np.inf, np.inf, (sum(tokens.FLAT.values()),), np.float32), actions
+    sizes = {"legs": (tokens.LEGS, tokens.LEG), "torso": (tokens.TORSO,), "command": (tokens.COMMAND,)}
+    boxes: dict[str, gymnasium.Space] = {
+        name: gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32) for name, size in sizes.items()
+    }
+    return gymnasium.spaces.Dict(boxes), actions
 
 
 def _of_tasks(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -49,15 +49,6 @@ class Place(NamedTuple):
     indices: np.ndarray
     tokens: Tokens
 
-    def last(self, vectors: np.ndarray) -> np.ndarray:
-        """Return the tokens of last observations of episodes, objects (environments,), None where none ended."""
-        found = np.full(len(vectors), None, object)
-        for index in [i for i, vector in enumerate(vectors) if vector is not None]:
-            own = self.tokens.part([index])
-            tokens = own.observed(own.gathered(vectors[index][None]))
-            found[index] = {name: array[0] for name, array in tokens.items()}
-        return found
-
 
 def grouped(members: Sequence[Member]) -> list[list[int]]:
     """Indices of environments that share a batch."""

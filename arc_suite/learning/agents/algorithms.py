@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 from arc_suite import checks, versions
 from arc_suite.arenas import FLAT
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
 
@@ -54,7 +53,7 @@ class Algorithm(NamedTuple):
                 raise ValueError(f"learner {self.learner}: {error}") from None
             raise versions.MissingExtra("training needs JAX", "agents", error) from None
 
-    def steps_of(self, setup: Setup | BodiesSetup) -> int:
+    def steps_of(self, setup: Setup) -> int:
         """Return the environment steps of a run, by default.
 
         Raises:

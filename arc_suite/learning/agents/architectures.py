@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
+from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.normaliser import Moments
@@ -130,8 +130,8 @@ class Perceptron(NamedTuple):
 class PerLeg(NamedTuple):
     """Networks of any body: one for all legs, which sees a leg, the torso, and the mean of what it finds of all legs.
 
-    Observations are those of `envs.flat_bodies`. A first network maps each leg, with torso, command and description,
-    to features. A second one maps the features of a leg and their mean over all legs to actions of its joints. Values
+    Observations are those of a flat `BodiesEnv`. A first network maps each leg, with torso, command and description, to
+    features. A second one maps the features of a leg and their mean over all legs to actions of its joints. Values
     are means over legs.
     """
 
@@ -192,9 +192,9 @@ class PerLeg(NamedTuple):
         return features, head
 
 
-def of(environment: VectorEnv | FlatBodies) -> Architecture:
+def of(environment: VectorEnv | BodiesEnv) -> Architecture:
     """Return the architecture that suits environments."""
-    if isinstance(environment, FlatBodies):
+    if isinstance(environment, BodiesEnv):
         return PerLeg()
     return Perceptron.of(environment.task.definition)
 

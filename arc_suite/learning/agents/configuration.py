@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any, Self
 
 from arc_suite import checks, evaluation, files, versions
-from arc_suite.envs.bodies import bodies_setup
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.learner import MOST_SEEDS
@@ -31,7 +29,7 @@ class Configuration:
         prior: id of a dataset of prior data; None for none.
     """
 
-    setup: Setup | BodiesSetup
+    setup: Setup
     algorithm: str
     hyperparameters: Any
     seed: int
@@ -42,7 +40,7 @@ class Configuration:
     @classmethod
     def of(
         cls,
-        setup: Setup | BodiesSetup,
+        setup: Setup,
         algorithm: str = "ppo",
         hyperparameters: Mapping[str, Any] | None = None,
         seed: int = 0,
@@ -56,7 +54,7 @@ class Configuration:
             ValueError: an unknown algorithm or hyperparameter, or a value out of its range.
         """
         definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters or {})
-        if isinstance(setup, BodiesSetup) and not definition.several:
+        if setup.several and not definition.several:
             those = ", ".join(name for name, each in algorithms.ALGORITHMS.items() if each.several)
             raise ValueError(f"algorithm {algorithm}: learns with one body, got {setup.robot}; with several: {those}")
         steps = definition.steps_of(setup) if steps is None else steps
@@ -69,7 +67,7 @@ class Configuration:
         return cls(setup, algorithm, definition.hyperparameters, seed, steps, evaluate_every, prior)
 
     @property
-    def validation(self) -> Setup | BodiesSetup:
+    def validation(self) -> Setup:
         """Setup in which the policy is evaluated while it learns."""
         return self.setup.validation(evaluation.EPISODES)
 
@@ -106,7 +104,7 @@ class Configuration:
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         checks.mapping("hyperparameters", fields.get("hyperparameters"))
-        setup = bodies_setup.of_any(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
+        setup = Setup.of(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
         return cls.of(setup, **{name: fields[name] for name in own if name in fields})
 
     def record(self) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 
 from arc_suite import checks
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
-from arc_suite.envs.bodies.flat_bodies import FlatBodies
+from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import teachers
@@ -50,7 +49,7 @@ class RunContext(NamedTuple):
         checkpoint: arrays of the latest `Slice` to resume from; None for a new run.
     """
 
-    setup: Setup | BodiesSetup
+    setup: Setup
     seed: int
     steps: int
     evaluate_every: int
@@ -64,7 +63,7 @@ class RunContext(NamedTuple):
         """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
         return _SEEDS * (1 + self.seed)
 
-    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv | FlatBodies:
+    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv | BodiesEnv:
         """Return environments to learn in, seeded apart from evaluation and from other runs.
 
         Their `reset()` begins the first episodes.
@@ -106,12 +105,12 @@ def generator(seed: int, purpose: str, count: int) -> np.random.Generator:
     return np.random.default_rng((seed, zlib.crc32(purpose.encode()), count))
 
 
-def environment_arrays(environment: VectorEnv) -> dict[str, np.ndarray]:
+def environment_arrays(environment: VectorEnv | BodiesEnv) -> dict[str, np.ndarray]:
     """Return the snapshot of an environment as part of a checkpoint."""
     return {f"{ENVIRONMENT}{name}": array for name, array in environment.snapshot().items()}
 
 
-def restore_environment(environment: VectorEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+def restore_environment(environment: VectorEnv | BodiesEnv, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """Restore an environment from `environment_arrays`, and return its observations (num_envs, size)."""
     snapshot = {name.removeprefix(ENVIRONMENT): array for name, array in arrays.items() if name.startswith(ENVIRONMENT)}
     environment.restore(snapshot)

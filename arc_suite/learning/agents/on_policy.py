@@ -15,7 +15,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.learning.agents import collecting, inputs, learner, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
@@ -166,6 +165,6 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
 
 def _start(hp: ProximalPolicy, context: RunContext, task):
     """The policy that learning starts from."""
-    if isinstance(context.setup, BodiesSetup):
+    if context.setup.several:
         return universal.load(hp.start)
     return policies.policy(Path(hp.start), context.setup.body, task=task)

@@ -21,11 +21,10 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import evaluation, files, versions
+from arc_suite import evaluation, files, registry, versions
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_values, only_body, task
 from arc_suite.cli.program import progress, use_one_thread
-from arc_suite.envs.bodies import bodies_setup
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
+from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
@@ -75,7 +74,7 @@ def main() -> None:
             finished = train(run, folder, **limits, progress=progress, on_metrics=on_metrics)
         except KeyboardInterrupt:
             raise KeyboardInterrupt(f"interrupted; the same command resumes {folder}") from None
-    if finished and importlib.util.find_spec("onnx") and not isinstance(run.setup, BodiesSetup):
+    if finished and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
 
@@ -94,8 +93,8 @@ def configured() -> Configuration:
         return configuration.read(Path(FLAGS.config))
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior
-    several = bodies_setup.is_several(_ROBOT.value) and made_body() is None
-    setup = bodies_setup.of_any(_ROBOT.value if several else only_body(_ROBOT), *task())
+    several = registry.names_several(_ROBOT.value) and made_body() is None
+    setup = Setup.of(_ROBOT.value if several else only_body(_ROBOT), *task())
     return Configuration.of(setup, FLAGS.algorithm, hyperparameters, *run)
 
 

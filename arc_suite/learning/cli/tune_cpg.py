@@ -67,7 +67,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
             course.step(generation.fitness)
         done = len(journal.generations)
         wanted = given("generations")
-        with progress(total=max(wanted, done), initial=done, desc=FLAGS.robot, unit="generation") as bar:
+        with progress(total=max(wanted, done), initial=done, desc=setup.name, unit="generation") as bar:
             for _ in range(done, wanted):
                 journal.append(course.step())
                 bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}")
@@ -77,7 +77,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
 
 def evaluate(setup: Setup, preset: Preset) -> dict:
     """Return returns, falls and style over the resets: of the result, of the preset it started from, and of medium."""
-    there = PRESETS[FLAGS.robot]
+    there = PRESETS[setup.name]
     presets = {"found": preset} | {name: there[name] for name in (SPACES[FLAGS.space].preset, "medium")}
     score = Evaluator(setup, len(presets), FLAGS.resets, STEPS)(list(presets.values()), range(FLAGS.resets))
     return {
@@ -96,8 +96,8 @@ def violations(metrics: dict) -> list[str]:
 
 def main() -> None:
     """Search, evaluate, print and write."""
-    checks.name(FLAGS.robot, PRESETS, "robot")
     setup = Setup.of(FLAGS.robot, *task())
+    checks.name(setup.body.name, PRESETS, "robot with presets")
     checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
@@ -109,7 +109,7 @@ def main() -> None:
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
         course, journal = search(setup, folder)
         preset = course.result()
-        plots.course(FLAGS.robot, course.reward, journal.generations, STEPS).savefig(picture)
+        plots.course(setup.name, course.reward, journal.generations, STEPS).savefig(picture)
         metrics = evaluate(setup, preset)
         file.update(
             **setup.to_dict(),

@@ -103,7 +103,7 @@ def test_another_search_is_refused_and_left_alone(found):
         (("--set=speed=3",), "unknown setting of walk 'speed'"),
         (("--set=rise",), "--set rise: expected name=value"),
         (("--goal=tracking", "--task=walk"), "--goal=tracking: task walk does not measure tracking"),
-        (("--around=tik",), "unknown domain 'tik'; did you mean 'tick'?"),
+        (("--around=tik",), "unknown robot 'tik'; did you mean 'tick'?"),
         (("--around=missing.json",), "cannot read missing.json: no such file or directory"),
     ],
 )

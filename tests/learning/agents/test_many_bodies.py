@@ -9,7 +9,6 @@ pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
 import jax
 
-from arc_suite.envs.bodies.bodies_setup import BodiesSetup
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents.architectures import PerLeg
@@ -19,7 +18,7 @@ from arc_suite.learning.agents.training import train
 from arc_suite.policies import network, policy
 from arc_suite.tasks import tokens
 
-SETUP = BodiesSetup.of("random:0-1", "steer", {"time_limit": 0.5})
+SETUP = Setup.of("random:0-1", "steer", {"time_limit": 0.5})
 SMALL = {"num_envs": 4, "round": 8, "left_out": 2, "updates": 20, "last_updates": 40, "batch": 32, "hidden": 8}
 PPO = {"num_envs": 4, "horizon": 6, "minibatch": 8, "hidden": 8, "value_warm_up": 6}
 
@@ -40,7 +39,7 @@ def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
     assert_allclose(network.forward(layers, normalised), expected, atol=1e-5)
     again = architecture.imported(layers)
     assert_array_equal(np.asarray(architecture.actions(again, normalised)), expected)
-    assert not expected[~SETUP.make_vec(2).unwrapped.description.mask.reshape(2, -1)].any()
+    assert not expected[~SETUP.make_vec(2).description.mask.reshape(2, -1)].any()
     with pytest.raises(ValueError, match="^a policy of different bodies$"):
         architecture.imported((network.Layer("clip"),))
 
@@ -114,7 +113,7 @@ def test_a_run_makes_a_policy_of_any_body(tmp_path):
 
 
 def test_anchors_are_means_over_bodies_of_validation():
-    scale = anchors.anchors(BodiesSetup.of("random:0-1", "walk", {"time_limit": 1.0}).validation(2))
+    scale = anchors.anchors(Setup.of("random:0-1", "walk", {"time_limit": 1.0}).validation(2))
     assert scale.preset == "of each body" and scale.demonstrator > scale.zero > 0.0
 
 

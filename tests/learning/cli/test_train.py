@@ -13,8 +13,8 @@ import time
 import programs
 import pytest
 
+from arc_suite import registry
 from arc_suite.learning.agents import configuration
-from arc_suite.robots import ROBOTS
 
 HAS_JAX = importlib.util.find_spec("jax") is not None
 ROOT = pathlib.Path(__file__).parents[3]
@@ -49,7 +49,7 @@ def one_line(done, line):
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
         (
             ["--robot=tock"],
-            f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? (there are: {', '.join(ROBOTS)})\n",
+            f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? (there are: {', '.join(registry.words())})\n",
         ),
         (["--stps=5"], "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, config, "),
         (["--steps=abc"], "arc-suite train: flag --steps=abc: expected a positive integer\n"),
@@ -84,7 +84,7 @@ def test_errors_are_one_line(flags, line, tmp_path):
         ("{", "Expecting property name"),
         ("[]", "configuration: expected a mapping of names to values, got []"),
         ("{}", "expected a robot, got none"),
-        ('{"robot": "tik"}', "unknown domain 'tik'; did you mean 'tick'?"),
+        ('{"robot": "tik"}', "unknown robot 'tik'; did you mean 'tick'?"),
         ('{"robot": "tick", "stops": 3}', "unknown field of a configuration 'stops'; did you mean 'steps'?"),
         ('{"robot": "tick", "steps": "many"}', "steps: expected an integer from 1, got 'many'"),
         ('{"robot": "tick", "hyperparameters": {"batsch": 3}}', "unknown hyperparameter 'batsch'; did you mean "),

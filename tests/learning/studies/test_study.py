@@ -210,11 +210,11 @@ def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
     body = dataclasses.replace(generator.generate(4, 2), name="creature")
     monkeypatch.setitem(sys.modules, "others", types.ModuleType("others"))
     monkeypatch.setitem(registry.ROBOTS, "creature", body)
-    monkeypatch.setitem(registry.MODULES, ("domain", "creature"), "others")
+    monkeypatch.setitem(registry.MODULES, ("robot", "creature"), "others")
     each = run("others:creature", "sac", 100)
     assert each.configuration.setup.body is body and each.name == "creature-walk-sac-0"
     assert each.configuration.to_dict()["robot"] == "others:creature"
-    with pytest.raises(ValueError, match=r"^unknown domain 'tik'; did you mean 'tick'"):
+    with pytest.raises(ValueError, match=r"^unknown robot 'tik'; did you mean 'tick'"):
         run("tik", "sac", 100)
 
 
