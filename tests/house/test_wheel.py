@@ -76,6 +76,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(wheel):
         f"arc_suite/animation/{name}" for name in ("page.html", "play.html", *(f"web/{name}" for name in BUILT))
     }
     package |= {"arc_suite_command.py", "arc_suite/animation/design/gallery.html", "arc_suite/evaluation/anchors.csv"}
+    package |= {"arc_suite/cpg/searched.json"}
     package |= {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite" / "policies" / "packaged").iterdir()}
     package |= {f"arc_suite/robots/examples/{name}.json" for name in spec_files.EXAMPLES}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"
