@@ -30,7 +30,7 @@ from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
 ID = "arc_suite/test/fuzz-v0"
-SETTINGS = data.Settings(Setup.of("tick"), "random", (), steps=5)
+SETTINGS = data.DatasetSettings(Setup.of("tick"), "random", (), steps=5)
 QUIET = functools.partial(tqdm, disable=True)
 SPEC = EXAMPLES["spider"]
 

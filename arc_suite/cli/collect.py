@@ -90,7 +90,7 @@ def main() -> None:
         presets = FLAGS.preset if FLAGS.policy == "cpg" else ()
         if presets is None:
             presets = [suited_preset(setup.definition)]
-        settings = data.Settings(setup, policy, tuple(presets), FLAGS.noise, FLAGS.seed, FLAGS.steps)
+        settings = data.DatasetSettings(setup, policy, tuple(presets), FLAGS.noise, FLAGS.seed, FLAGS.steps)
         dataset_id = settings.dataset_id(label) if FLAGS.id is None else FLAGS.id
         missing = data.collect(
             dataset_id,

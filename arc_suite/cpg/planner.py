@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.arenas.pillars import RADIUS
-from arc_suite.cpg.commanded import State
+from arc_suite.cpg.commanded import CommandedState
 from arc_suite.cpg.steering import Steered, SteeringParameters
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
@@ -60,11 +60,11 @@ class Planned:
         self._parameters, self._steered = parameters, Steered(task, parameters.steering)
         self._extent = self._steered.extent / reach(self._steered.body)
 
-    def initial(self, count: int) -> State:
+    def initial(self, count: int) -> CommandedState:
         """Return the state of the law that steers."""
         return self._steered.initial(count)
 
-    def __call__(self, state: State, observation: Mapping) -> tuple:
+    def __call__(self, state: CommandedState, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
         p, command = self._parameters, observation["command"].copy()
         for index, (goal, ranges) in enumerate(zip(observation["goal"], observation["ranges"], strict=True)):

@@ -87,7 +87,7 @@ class Steered(Commanded):
         self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
 
     def initial_paths(self, count: int) -> tuple:
-        """Return nothing: the law remembers no more than `State` does."""
+        """Return nothing: the law remembers no more than `CommandedState` does."""
         return ()
 
     def planned(self, none: tuple, request: Request, observation: Mapping) -> tuple:

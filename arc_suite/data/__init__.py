@@ -18,7 +18,7 @@ except ImportError as error:
 from arc_suite.data.collection import collect
 from arc_suite.data.dataset import Dataset, open
 from arc_suite.data.episodes import Episode
-from arc_suite.data.settings import Settings
+from arc_suite.data.settings import DatasetSettings
 from arc_suite.data.verification import verify
 
-__all__ = ["Dataset", "Episode", "Settings", "collect", "open", "verify"]
+__all__ = ["Dataset", "Episode", "DatasetSettings", "collect", "open", "verify"]

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from arc_suite import checks, evaluation, policies
 from arc_suite.data import rollouts
-from arc_suite.data.settings import Settings
+from arc_suite.data.settings import DatasetSettings
 from arc_suite.data.storage import Storage
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import Task, terms
@@ -28,7 +28,7 @@ BYTES = 1 << 24
 
 def collect(
     dataset_id: str,
-    settings: Settings,
+    settings: DatasetSettings,
     episodes: int,
     num_envs: int = NUM_ENVS,
     threads: int | None = None,
@@ -91,14 +91,14 @@ def collect(
         return len(missing)
 
 
-def _check(settings: Settings, episodes: int) -> None:
+def _check(settings: DatasetSettings, episodes: int) -> None:
     checks.integer("steps", settings.steps, 1)
     checks.seed(settings.seed)
     checks.seed(settings.seed + episodes - 1)
     _policy(settings, num_envs=1)  # finds out whether there is such a policy
 
 
-def _policy(settings: Settings, num_envs: int, task: Task | None = None) -> policies.Policy:
+def _policy(settings: DatasetSettings, num_envs: int, task: Task | None = None) -> policies.Policy:
     return policies.policy(settings.policy, settings.setup.body, settings.presets, num_envs, settings.noise, task)
 
 
@@ -114,7 +114,9 @@ def _difference(was: dict, now: dict) -> str | None:
     return None
 
 
-def _play(storage: Storage, settings: Settings, missing: list[int], num_envs: int, threads, progress: Callable) -> None:
+def _play(
+    storage: Storage, settings: DatasetSettings, missing: list[int], num_envs: int, threads, progress: Callable
+) -> None:
     """Play the missing episodes into the storage."""
     # All environments are busy to the end, or nearly.
     num_envs = math.ceil(len(missing) / math.ceil(len(missing) / num_envs))
@@ -158,7 +160,7 @@ def _play(storage: Storage, settings: Settings, missing: list[int], num_envs: in
             environment.close()
 
 
-def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) -> dict:
+def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, threads) -> dict:
     """Return Minari's metadata without the counts."""
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
@@ -183,7 +185,7 @@ def _metadata(dataset_id: str, settings: Settings, provenance: dict, threads) ->
         }
 
 
-def _mean_return(environment: VectorEnv, settings: Settings) -> float:
+def _mean_return(environment: VectorEnv, settings: DatasetSettings) -> float:
     """Return the mean return by the evaluation protocol."""
     policy = _policy(settings, environment.num_envs, environment.task.definition)
     return float(np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, policy)]))

@@ -12,7 +12,7 @@ import h5py
 from arc_suite import checks, files
 from arc_suite.data import episodes, ids
 from arc_suite.data.episodes import Episode
-from arc_suite.data.settings import Settings
+from arc_suite.data.settings import DatasetSettings
 from arc_suite.envs.setup import Setup
 
 METADATA = "metadata.json"
@@ -53,7 +53,7 @@ class Dataset:
     Attributes:
         id: Minari's.
         path: its folder.
-        metadata: Minari's for the dataset; "arc_suite" holds `Settings.provenance`.
+        metadata: Minari's for the dataset; "arc_suite" holds `DatasetSettings.provenance`.
         settings: what the episodes depend on.
     """
 
@@ -68,7 +68,7 @@ class Dataset:
             raise ValueError(f"dataset {dataset_id!r}: {METADATA}: {checks.quoted(error)}") from None
         with damages(dataset_id, path / "data" / METADATA):
             presets = _typed("presets", known["presets"], list)
-            self.settings = Settings(
+            self.settings = DatasetSettings(
                 setup=setup,
                 policy=_typed("policy", known["policy"], str),
                 presets=tuple(_typed("presets", preset, str) for preset in presets),
@@ -138,7 +138,7 @@ def _typed(name: str, value, kind: type):
     return value
 
 
-def _check_spec(spec: str | None, settings: Settings, known: Mapping[str, Any]) -> None:
+def _check_spec(spec: str | None, settings: DatasetSettings, known: Mapping[str, Any]) -> None:
     """Compare Minari's spec of the environment, if there is one, with the settings, which are what we replay.
 
     Raises:

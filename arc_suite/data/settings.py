@@ -13,7 +13,7 @@ from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
 
-class Settings(NamedTuple):
+class DatasetSettings(NamedTuple):
     """Everything that the episodes of a dataset depend on; episode k has the seed `seed + k`.
 
     Attributes:

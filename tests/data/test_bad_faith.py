@@ -14,7 +14,7 @@ from tiers import never, tiers
 
 from arc_suite import data, style
 
-SETTINGS = data.Settings(QUEEN, **SHORT)
+SETTINGS = data.DatasetSettings(QUEEN, **SHORT)
 TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
 READERS = {"open": lambda dataset_id: list(data.open(dataset_id)), "verify": verify}
 

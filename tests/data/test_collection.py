@@ -65,7 +65,7 @@ MODIFIERS = {
 }
 MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "exclude_blocks": "contact_forces"}
 BUMPS = Setup.of("queen", "walk", {"arena": "bumps"})
-RANDOM = data.Settings(QUEEN, "random", (), seed=3, steps=30)
+RANDOM = data.DatasetSettings(QUEEN, "random", (), seed=3, steps=30)
 
 
 REPLAYED = {
@@ -76,7 +76,7 @@ REPLAYED = {
     "bumps": RANDOM._replace(setup=BUMPS),
     "shoved": RANDOM._replace(setup=Setup.of("queen", "shoved"), steps=60),
     "modifiers": RANDOM._replace(setup=Setup.of("queen", "steer", MODIFIERS), steps=60),
-    "spider by positions": data.Settings(Setup.of(SPIDER.body, "walk", MODIFIERS), noise=0.05, seed=3, steps=60),
+    "spider by positions": data.DatasetSettings(Setup.of(SPIDER.body, "walk", MODIFIERS), noise=0.05, seed=3, steps=60),
     "spider steers on bumps": RANDOM._replace(setup=Setup.of(SPIDER.body, "steer", {"arena": "bumps"})),
     "no gait": None,  # of a task that the test registers
 }
@@ -112,7 +112,7 @@ def test_minari_opens_a_dataset_whose_environment_replays_it(name, stay):
 
 @pytest.mark.slow
 def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
-    collect(ID, data.Settings(SPIDER, **SHORT), 1)
+    collect(ID, data.DatasetSettings(SPIDER, **SHORT), 1)
     code = f"import minari; e = minari.load_dataset({ID!r}).recover_environment(); print(e.reset(seed=5)[0].sum())"
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -120,7 +120,7 @@ def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
 
 
 def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
-    collect(ID, data.Settings(QUEEN, "zero", (), steps=30), 10)
+    collect(ID, data.DatasetSettings(QUEEN, "zero", (), steps=30), 10)
     dataset = minari.load_dataset(ID)
     totals = [episode.rewards.sum() for episode in dataset]
     assert minari.get_normalized_score(dataset, np.mean(totals)) == pytest.approx(0.0, abs=1e-12)
@@ -139,7 +139,7 @@ class Rounded:
 
 
 def test_an_episode_is_what_the_single_environment_plays():
-    collect(ID, data.Settings(TICK, "random", (), **SHORT), 2)
+    collect(ID, data.DatasetSettings(TICK, "random", (), **SHORT), 2)
     for episode in data.open(ID):
         random = Rounded(policies.policy("random", "tick"))
         steps = evaluation.rollout(TICK.load(), random, episode.seed, max_steps=20)
@@ -147,10 +147,10 @@ def test_an_episode_is_what_the_single_environment_plays():
 
 
 COLLECTED = {
-    "presets and noise": data.Settings(QUEEN, "cpg", ("slow", "medium", "fast"), noise=0.1, **SHORT),
-    "spider": data.Settings(SPIDER, "cpg", ("medium", "fast"), **SHORT),
-    "random": data.Settings(TICK, "random", (), steps=60),
-    "own": data.Settings(TICK, "own:make", (), noise=0.2, **SHORT),
+    "presets and noise": data.DatasetSettings(QUEEN, "cpg", ("slow", "medium", "fast"), noise=0.1, **SHORT),
+    "spider": data.DatasetSettings(SPIDER, "cpg", ("medium", "fast"), **SHORT),
+    "random": data.DatasetSettings(TICK, "random", (), steps=60),
+    "own": data.DatasetSettings(TICK, "own:make", (), noise=0.2, **SHORT),
 }
 
 
@@ -170,7 +170,7 @@ def test_episodes_depend_on_seed_and_settings_alone(name):
 
 @pytest.mark.slow
 def test_every_setting_matters():
-    base = data.Settings(QUEEN, **SHORT)
+    base = data.DatasetSettings(QUEEN, **SHORT)
     changes = ({}, {"noise": 0.1}, {"presets": ("fast",)}, {"policy": "zero", "presets": ()})
     seen = set()
     for number, change in enumerate(changes):
@@ -180,7 +180,7 @@ def test_every_setting_matters():
 
 
 def test_noise_is_normal_and_differs_from_episode_to_episode():
-    settings = data.Settings(QUEEN, "zero", (), noise=0.1, steps=40)
+    settings = data.DatasetSettings(QUEEN, "zero", (), noise=0.1, steps=40)
     collect(ID, settings, 2)
     first, second = (episode.actions for episode in data.open(ID))
     for noise in (first, second):
@@ -190,7 +190,7 @@ def test_noise_is_normal_and_differs_from_episode_to_episode():
 
 
 def test_more_episodes_continue_and_a_finished_dataset_stays_as_it_is(root):
-    settings = data.Settings(QUEEN, **SHORT)
+    settings = data.DatasetSettings(QUEEN, **SHORT)
     collect(ID, settings, 3)
     file = root / ID / "data" / "main_data.hdf5"
     before = file.stat()
@@ -206,7 +206,7 @@ def test_more_episodes_continue_and_a_finished_dataset_stays_as_it_is(root):
 
 @pytest.mark.slow
 def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
-    settings = data.Settings(QUEEN, **SHORT)
+    settings = data.DatasetSettings(QUEEN, **SHORT)
     collect(ID, settings, 2)
     before = digests()
     for changed, difference in (
@@ -237,7 +237,7 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
 
 @pytest.mark.slow
 def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch):
-    settings = data.Settings(QUEEN, presets=("slow", "medium"), **SHORT)
+    settings = data.DatasetSettings(QUEEN, presets=("slow", "medium"), **SHORT)
     collect(ID, settings, 2)
     before, medium = digests(), PRESETS["queen"]["medium"]
     for changed in (medium._replace(stiffness=0.81), medium._replace(centre=medium.centre | {"ankle": (15, 30, -14)})):
@@ -271,6 +271,6 @@ def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch
 )
 def test_wrong_settings_leave_nothing_behind(root, changes, message):
     with pytest.raises(ValueError) as error:
-        collect(ID, data.Settings(QUEEN)._replace(**changes), 2)
+        collect(ID, data.DatasetSettings(QUEEN)._replace(**changes), 2)
     assert str(error.value).startswith(message)
     assert not root.exists()

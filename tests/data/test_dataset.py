@@ -14,9 +14,9 @@ from arc_suite.cpg.presets import PRESETS
 
 
 def test_metadata():
-    collect(ID, data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20), 3)
+    collect(ID, data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20), 3)
     dataset = data.open(ID)
-    assert dataset.settings == data.Settings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
+    assert dataset.settings == data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
     assert len(dataset) == 3
     about = dataset.metadata["arc_suite"]
     assert about["versions"] == versions.recorded()
@@ -45,7 +45,7 @@ def test_metadata():
 
 
 def test_style_records_a_dataset():
-    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 2)
     dataset = data.open(ID)
     environment = dataset.settings.setup.load()
     for episode in dataset:
@@ -60,7 +60,7 @@ def test_style_records_a_dataset():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["versions", "model_sha256"])
 def test_metadata_that_do_not_tell_all_are_damage(root, name):
-    settings = data.Settings(QUEEN, **SHORT)
+    settings = data.DatasetSettings(QUEEN, **SHORT)
     collect(ID, settings, 1)
     for change in (lambda about: about.update({name: 1}), lambda about: about.pop(name)):
         edited(root, lambda metadata, change=change: change(metadata["arc_suite"]))
@@ -70,16 +70,16 @@ def test_metadata_that_do_not_tell_all_are_damage(root, name):
 
 
 def test_episodes_without_metadata_are_not_continued_as_others(root):
-    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 2)
     (root / ID / "data" / "metadata.json").unlink()
     with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: "):
-        collect(ID, data.Settings(TICK, **SHORT), 3)
+        collect(ID, data.DatasetSettings(TICK, **SHORT), 3)
 
 
 @pytest.mark.parametrize("name", ["main_data.hdf5", "metadata.json"])
 @pytest.mark.parametrize("length", tiers([0, 100], lambda length: length == 100))
 def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length):
-    settings = data.Settings(QUEEN, **SHORT)
+    settings = data.DatasetSettings(QUEEN, **SHORT)
     collect(ID, settings, 2)
     before, path = digests(), root / ID / "data" / name
     os.truncate(path, length)

@@ -11,13 +11,17 @@ from arc_suite.envs.setup import Setup
 
 def test_ids_by_default_are_minaris():
     named = {
-        "arc_suite/queen/walk/cpg-medium-v0": data.Settings(QUEEN),
-        "arc_suite/tick/steer/random-v0": data.Settings(Setup.of("tick", "steer"), "random", ()),
-        "arc_suite/queen/walk/cpg-medium-fast-noise0_1-v0": data.Settings(QUEEN, presets=("medium", "fast"), noise=0.1),
-        "arc_suite/spider/walk/my_package_policies_make-50steps-v0": data.Settings(
+        "arc_suite/queen/walk/cpg-medium-v0": data.DatasetSettings(QUEEN),
+        "arc_suite/tick/steer/random-v0": data.DatasetSettings(Setup.of("tick", "steer"), "random", ()),
+        "arc_suite/queen/walk/cpg-medium-fast-noise0_1-v0": data.DatasetSettings(
+            QUEEN, presets=("medium", "fast"), noise=0.1
+        ),
+        "arc_suite/spider/walk/my_package_policies_make-50steps-v0": data.DatasetSettings(
             SPIDER, "my_package.policies:make", (), steps=50
         ),
-        "arc_suite/queen/walk/cpg-medium-set59ccfc0d-v0": data.Settings(Setup.of("queen", "walk", {"arena": "bumps"})),
+        "arc_suite/queen/walk/cpg-medium-set59ccfc0d-v0": data.DatasetSettings(
+            Setup.of("queen", "walk", {"arena": "bumps"})
+        ),
     }
     for dataset_id, settings in named.items():
         assert settings.dataset_id() == dataset_id
@@ -26,7 +30,7 @@ def test_ids_by_default_are_minaris():
 
 def test_ids_tell_settings_apart():
     def dataset_id(**task_kwargs):
-        return data.Settings(Setup.of("queen", "walk", task_kwargs)).dataset_id()
+        return data.DatasetSettings(Setup.of("queen", "walk", task_kwargs)).dataset_id()
 
     ids = {dataset_id(), dataset_id(gait="wave"), dataset_id(gait="ripple"), dataset_id(target_velocity=0.4)}
     assert len(ids) == 4
@@ -35,7 +39,7 @@ def test_ids_tell_settings_apart():
 
 
 def test_provenance_is_plain_and_tells_what_episodes_depend_on():
-    settings = data.Settings(Setup.of("queen", "walk", {"healthy_range": (0.2, 1.0)}), presets=("slow", "tuned"))
+    settings = data.DatasetSettings(Setup.of("queen", "walk", {"healthy_range": (0.2, 1.0)}), presets=("slow", "tuned"))
     provenance = settings.provenance()
     assert json.loads(json.dumps(provenance)) == provenance
     assert provenance["task_kwargs"] == {"healthy_range": [0.2, 1.0]}

@@ -11,7 +11,7 @@ from arc_suite.data import ids
 def test_unknown_ids():
     with pytest.raises(ValueError, match=f"^unknown dataset '{ID}': there are none in "):
         data.open(ID)
-    collect(ID, data.Settings(QUEEN, **SHORT), 1)
+    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 1)
     with pytest.raises(ValueError) as error:
         data.open("arc_suite/test/same-v0")
     assert str(error.value) == f"unknown dataset 'arc_suite/test/same-v0'; did you mean {ID!r}? (there are: {ID})"
@@ -33,6 +33,6 @@ def test_unknown_ids():
 
 def test_names_of_one_letter():
     for dataset_id in ("a-v0", "ab/c-v0", "a/b/c-v0"):
-        collect(dataset_id, data.Settings(QUEEN, **SHORT), 1)
+        collect(dataset_id, data.DatasetSettings(QUEEN, **SHORT), 1)
         assert len(data.open(dataset_id)) == len(minari.load_dataset(dataset_id)) == 1
     assert set(ids.existing()) == {"a-v0", "a/b/c-v0", "ab/c-v0"}

@@ -24,7 +24,7 @@ TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
 ID = "arc_suite/test/some-v0"
 PARTS = "arc_suite/test/.some-v0.parts"
 slowly = functools.partial(pytest.param, marks=pytest.mark.slow)
-SETTINGS = data.Settings(Setup.of("tick"), "random", (), steps=4)
+SETTINGS = data.DatasetSettings(Setup.of("tick"), "random", (), steps=4)
 
 collect = functools.partial(data.collect, progress=functools.partial(tqdm, disable=True))
 
@@ -263,5 +263,5 @@ def test_a_folder_that_cannot_be_made_is_named(root):
     (root / ID).mkdir(parents=True)
     (root / ID / "data").touch()
     with pytest.raises(OSError) as error:
-        collect(ID, data.Settings(Setup.of("queen")), 1)
+        collect(ID, data.DatasetSettings(Setup.of("queen")), 1)
     assert str(error.value) == f"cannot make folder {root / ID / 'data'}: file exists"

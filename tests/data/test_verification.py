@@ -17,7 +17,7 @@ from arc_suite.data import episodes
     ),
 )
 def test_a_bit_that_changed_is_found(root, key):
-    collect(ID, data.Settings(QUEEN, "zero", (), **SHORT), 2)
+    collect(ID, data.DatasetSettings(QUEEN, "zero", (), **SHORT), 2)
     file = root / ID / "data" / "main_data.hdf5"
     with h5py.File(file) as opened:
         group = opened["episode_1"]
@@ -34,7 +34,7 @@ def test_a_bit_that_changed_is_found(root, key):
 
 @pytest.mark.parametrize("key", tiers(["seed", "preset", "return", "length", "id"], lambda key: key == "seed"))
 def test_episode_metadata_that_changed_is_found(root, key):
-    collect(ID, data.Settings(QUEEN, **SHORT), 2)
+    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 2)
     with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
         attributes = file["episode_0"].attrs
         attributes[key] = attributes[key] + ("x" if key == "preset" else 1)
@@ -52,7 +52,7 @@ def test_episode_metadata_that_changed_is_found(root, key):
     ],
 )
 def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key, message):
-    collect(ID, data.Settings(QUEEN, "zero", (), **SHORT), 2)
+    collect(ID, data.DatasetSettings(QUEEN, "zero", (), **SHORT), 2)
     with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
         episode = episodes.read(file, 1)
         if key == "seed":
@@ -67,7 +67,7 @@ def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key
 
 
 def test_another_version_or_model_is_refused(root):
-    settings = data.Settings(QUEEN, **SHORT)
+    settings = data.DatasetSettings(QUEEN, **SHORT)
     collect(ID, settings, 2)
     edited(root, lambda metadata: metadata["arc_suite"].update(model_sha256="0" * 64))
     with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with another model of queen$"):

@@ -52,7 +52,7 @@ with files.locked(".lock"):
 spec_files.save_body(ROBOTS["queen"], "queen.json")
 assert spec_files.load_body("queen.json") == ROBOTS["queen"]
 collect = functools.partial(data.collect, progress=functools.partial(tqdm.tqdm, disable=True))
-settings = data.Settings(arc_suite.Setup.of("tick"), "random", (), steps=4)
+settings = data.DatasetSettings(arc_suite.Setup.of("tick"), "random", (), steps=4)
 for arguments in ({}, {"overwrite": True}):
     assert collect("test-v0", settings, 2, **arguments) == 2
 assert len(data.open("test-v0")) == 2

@@ -61,7 +61,7 @@ def _rows(page, first):
 def dataset(tmp_path, monkeypatch):
     """A little of what the page of datasets collects."""
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-    settings = data.Settings(Setup.of("queen"), "cpg", ("tuned",))
+    settings = data.DatasetSettings(Setup.of("queen"), "cpg", ("tuned",))
     assert f"--verify {settings.dataset_id()}\n" in _page("datasets")
     data.collect(settings.dataset_id(), settings._replace(steps=5), episodes=1)
 

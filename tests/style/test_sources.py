@@ -15,7 +15,7 @@ from arc_suite.style import record, source
 from arc_suite.tasks import walk
 
 BODY = generator.generate(5, 2)
-SETTINGS = data.Settings(Setup.of("leaper"), "cpg", ("medium",), noise=0.1, seed=7, steps=30)
+SETTINGS = data.DatasetSettings(Setup.of("leaper"), "cpg", ("medium",), noise=0.1, seed=7, steps=30)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +90,7 @@ def test_stored_tracks_tell_their_setup(tmp_path, monkeypatch):
     offsets = (0.0, 3.0, 0.0, 3.0, 0.0, 3.0)
     setup = Setup.of("tick", "steer", {"phase_offsets": offsets, "arena": "bumps"})
     style.save(tmp_path / "tick.npz", [record(setup.load(), policy("cpg", "tick"), 0, 5)])
-    data.collect("arc_suite/tick/steers-v0", data.Settings(setup, steps=5), episodes=1)
+    data.collect("arc_suite/tick/steers-v0", data.DatasetSettings(setup, steps=5), episodes=1)
     for name in (str(tmp_path / "tick.npz"), "arc_suite/tick/steers-v0"):
         assert source(name).setup == setup
         (track,) = take(source(name), setup, range(1))

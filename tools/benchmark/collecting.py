@@ -34,7 +34,7 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
     turns = iter(tqdm(range(len(robots) * len(POLICIES) * rounds), unit="round", disable=None))
     for robot in robots:
         for policy in POLICIES:
-            settings = data.Settings(Setup.of(robot), policy, ("medium",) if policy == "cpg" else ())
+            settings = data.DatasetSettings(Setup.of(robot), policy, ("medium",) if policy == "cpg" else ())
             speeds = []
             for _ in range(rounds):
                 next(turns)
@@ -46,14 +46,14 @@ def measure(robots: Sequence[str], episodes: int, rounds: int) -> str:
     return "\n".join(lines)
 
 
-def _collecting(settings: data.Settings, episodes: int) -> float:
+def _collecting(settings: data.DatasetSettings, episodes: int) -> float:
     started = time.perf_counter()
     data.collect(_ID, settings, episodes, NUM_ENVS, progress=functools.partial(tqdm, disable=True))
     seconds = time.perf_counter() - started
     return data.open(_ID).metadata["total_steps"] / seconds
 
 
-def _bare(settings: data.Settings) -> float:
+def _bare(settings: data.DatasetSettings) -> float:
     """Steps the actions of the dataset's first episodes, row by row, again and again where they are over."""
     environment = settings.environment(NUM_ENVS)
     dataset = data.open(_ID)

@@ -28,7 +28,7 @@ from arc_suite.animation import pages
 from arc_suite.animation.design import axes, gallery
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Around, Budget, Made, extent
-from arc_suite.animation.design.search import BATCH, Batch, Search
+from arc_suite.animation.design.search import BATCH, Candidates, Search
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, walk
 from arc_suite.cli.flags import MOST, ROBOT_HELP, named_values
 from arc_suite.cli.program import progress, use_one_thread
@@ -123,7 +123,7 @@ def settled(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
 
 def search(folder: pathlib.Path, course: Search, known: Mapping[str, Any]) -> None:
     """Search behind a progress bar, or go on."""
-    with contextlib.closing(Journal(folder / "journal.jsonl", known, Batch.restored)) as journal:
+    with contextlib.closing(Journal(folder / "journal.jsonl", known, Candidates.restored)) as journal:
         for batch in journal.generations:
             course.add(batch)
         done, batches = len(journal.generations), -(-FLAGS.bodies // BATCH)

@@ -8,7 +8,7 @@ from arc_suite.animation.clips.root_motion import Motion, Pose
 from arc_suite.robots.spec import Body
 
 
-class Walk(NamedTuple):
+class WalkLoop(NamedTuple):
     """A loop under a command.
 
     Attributes:
@@ -58,25 +58,25 @@ class Showcase(NamedTuple):
     preset: str
 
 
-WALK = Walk((1.0, 0.0, 0.0))
-CLIPS: dict[str, Walk | Passage | Idle | Acted | Showcase] = {
+WALK = WalkLoop((1.0, 0.0, 0.0))
+CLIPS: dict[str, WalkLoop | Passage | Idle | Acted | Showcase] = {
     "walk": WALK,
-    "slow": Walk((0.6, 0.0, 0.0)),
-    "fast": Walk((1.25, 0.0, 0.0)),
-    "turn_left": Walk((0.5, 0.0, 0.5)),
-    "turn_right": Walk((0.5, 0.0, -0.5)),
-    "forward_left": Walk((0.7, 0.0, 0.3)),
-    "forward_right": Walk((0.7, 0.0, -0.3)),
-    "turn_in_place_left": Walk((0.0, 0.0, 1.0)),
-    "turn_in_place_right": Walk((0.0, 0.0, -1.0)),
-    "strafe_left": Walk((0.0, 0.5, 0.0)),
-    "strafe_right": Walk((0.0, -0.5, 0.0)),
-    "back": Walk((-0.5, 0.0, 0.0)),
+    "slow": WalkLoop((0.6, 0.0, 0.0)),
+    "fast": WalkLoop((1.25, 0.0, 0.0)),
+    "turn_left": WalkLoop((0.5, 0.0, 0.5)),
+    "turn_right": WalkLoop((0.5, 0.0, -0.5)),
+    "forward_left": WalkLoop((0.7, 0.0, 0.3)),
+    "forward_right": WalkLoop((0.7, 0.0, -0.3)),
+    "turn_in_place_left": WalkLoop((0.0, 0.0, 1.0)),
+    "turn_in_place_right": WalkLoop((0.0, 0.0, -1.0)),
+    "strafe_left": WalkLoop((0.0, 0.5, 0.0)),
+    "strafe_right": WalkLoop((0.0, -0.5, 0.0)),
+    "back": WalkLoop((-0.5, 0.0, 0.0)),
     "start": Passage(starts=True, cycles=3),
     "stop": Passage(starts=False, cycles=3),
     "idle": Idle(),
     "hit": Acted(acting.hit, (0, -1)),
-    "limp": Walk((1.0, 0.0, 0.0), failing=0),
+    "limp": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "rise": Acted(acting.rise, (-1,)),
     "death": Acted(acting.death, (0,)),
     "tuned": Showcase("tuned"),
@@ -93,7 +93,7 @@ def sources(names: Sequence[str]) -> dict[str, list[str]]:
     """Return the names of the recordings that clips are made of, each with the clips that cannot be made without it."""
     found: dict[str, list[str]] = {}
     for name in names:
-        recorded = isinstance(CLIPS[name], Walk | Showcase)
+        recorded = isinstance(CLIPS[name], WalkLoop | Showcase)
         found.setdefault(name if recorded else REST, []).append(name)
         if isinstance(CLIPS[name], Passage) or name in FASTER or name == "limp":
             found.setdefault("walk", [])

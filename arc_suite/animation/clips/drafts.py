@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips import in_place, loops, planting, root_motion
-from arc_suite.animation.clips.catalogue import CLIPS, FASTER, REST, WALK, Acted, Passage, Showcase, Walk, sources
+from arc_suite.animation.clips.catalogue import CLIPS, FASTER, REST, WALK, Acted, Passage, Showcase, WalkLoop, sources
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
 from arc_suite.animation.clips.recorder import Recorded, Recorder, Transition
 from arc_suite.animation.clips.root_motion import Motion, Pose
@@ -114,7 +114,7 @@ def _recordings(recorder: Recorder, names, progress, left_out) -> dict[str, Reco
 def _recording(recorder: Recorder, source: str) -> Recorded | Transition:
     if source == REST:
         return recorder.transition(WALK.command)
-    spec = cast(Walk | Showcase, CLIPS[source])  # `sources` names no others
+    spec = cast(WalkLoop | Showcase, CLIPS[source])  # `sources` names no others
     if isinstance(spec, Showcase):
         return recorder.showcase(spec.preset)
     return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(spec.command, spec.failing)
@@ -140,7 +140,7 @@ def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: flo
 def _straight(name: str, motion: Motion) -> Motion:
     """Return a loop that goes where its command says, unless that is a turn."""
     spec = CLIPS[name]
-    forward, left, turning = spec.command if isinstance(spec, Walk) else (1.0, 0.0, 0.0)
+    forward, left, turning = spec.command if isinstance(spec, WalkLoop) else (1.0, 0.0, 0.0)
     return motion if turning else loops.straightened(motion, math.atan2(left, forward))
 
 
@@ -153,7 +153,7 @@ def _first_touchdown(body: Body, draft: Draft) -> int:
 def _check_commands(found: dict[str, Draft], units: np.ndarray | None, left_out) -> None:
     """Leave out loops that do not follow their commands."""
     for name, draft in list(found.items()):
-        if units is not None and isinstance(spec := CLIPS[name], Walk):
+        if units is not None and isinstance(spec := CLIPS[name], WalkLoop):
             command = np.array(spec.command)
             share = command @ (draft.motion.twist / units) / (command @ command)
             if share < _FOLLOWS:

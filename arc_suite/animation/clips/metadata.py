@@ -4,7 +4,7 @@ import collections
 from collections.abc import Sequence
 from typing import Any
 
-from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, Idle, Walk
+from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, Idle, WalkLoop
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN
 from arc_suite.robots.spec import Body
@@ -79,7 +79,7 @@ def _spaces(clips: Sequence[Clip], moving: Sequence[bool]) -> dict[str, Any]:
         points = []
         for clip in clips:
             spec = CLIPS[clip.name]
-            walks = isinstance(spec, Walk) and clip.name not in ADDITIVE and spec.command[zero] == 0.0
+            walks = isinstance(spec, WalkLoop) and clip.name not in ADDITIVE and spec.command[zero] == 0.0
             if walks or isinstance(spec, Idle):
                 figures = metadata(clip)
                 animation = next(iter(animations(clip, moving)))

@@ -21,7 +21,7 @@ from arc_suite import files, policies, style
 from arc_suite.animation import pages
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.search import Search
-from arc_suite.animation.design.trials import GOALS, Trial, Walk, opened
+from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, opened
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
@@ -29,7 +29,7 @@ from arc_suite.simulation import films
 STEPS = 200  # control steps of a walk on a page
 _BEFORE_PICTURE = 60
 _SIZE = (300, 225)  # pixels of a cell of the picture
-_FIELDS = ("number", "cell", "elite", "reason", *(f"{name}_{turn}" for turn in (1, 2) for name in Walk._fields))
+_FIELDS = ("number", "cell", "elite", "reason", *(f"{name}_{turn}" for turn in (1, 2) for name in WalkMeans._fields))
 
 
 class Elite(NamedTuple):
@@ -47,8 +47,8 @@ class Elite(NamedTuple):
     cell: tuple[int, ...]
     number: int
     body: Body
-    first: Walk
-    second: Walk
+    first: WalkMeans
+    second: WalkMeans
 
     def to_dict(self) -> dict:
         """Return what `design.json` holds of it."""
@@ -67,7 +67,7 @@ def elites(search: Search, cells: Map) -> list[Elite]:
 
 def write_table(path: Path, search: Search, cells: Map) -> None:
     """Write a row for every body evaluated, CSV: cell, why it is excluded, metrics of both evaluations, genes."""
-    best, none = set(search.elites.values()), [""] * len(Walk._fields)
+    best, none = set(search.elites.values()), [""] * len(WalkMeans._fields)
     with files.writing(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow([*_FIELDS, *search.genes])

@@ -13,7 +13,7 @@ import numpy as np
 
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Genes, within
-from arc_suite.animation.design.trials import GOALS, Outcome, Trial, Walk
+from arc_suite.animation.design.trials import GOALS, Outcome, Trial, WalkMeans
 from arc_suite.robots.spec import Body
 
 BATCH = 20
@@ -36,7 +36,7 @@ class Candidate(NamedTuple):
     outcome: Outcome
 
 
-class Batch(NamedTuple):
+class Candidates(NamedTuple):
     """Bodies that were evaluated together.
 
     Attributes:
@@ -46,13 +46,13 @@ class Batch(NamedTuple):
     candidates: Sequence[Candidate]
 
     @classmethod
-    def restored(cls, candidates: Sequence[Sequence]) -> "Batch":
+    def restored(cls, candidates: Sequence[Sequence]) -> "Candidates":
         """Return a batch from lists as JSON holds them."""
         return cls([Candidate(tuple(genes), cell and tuple(cell), _outcome(*rest)) for genes, cell, rest in candidates])
 
 
 def _outcome(reason: str, first: Sequence | None, second: Sequence | None) -> Outcome:
-    return Outcome(reason, Walk(*first) if first else None, Walk(*second) if second else None)
+    return Outcome(reason, WalkMeans(*first) if first else None, WalkMeans(*second) if second else None)
 
 
 class Search:
@@ -79,7 +79,7 @@ class Search:
         self.candidates: list[Candidate] = []
         self.elites: dict[tuple[int, ...], int] = {}
 
-    def batch(self, evaluated: Callable[[Iterable[tuple]], Iterable[Outcome]]) -> Batch:
+    def batch(self, evaluated: Callable[[Iterable[tuple]], Iterable[Outcome]]) -> Candidates:
         """Evaluate the next batch of bodies, add and return it.
 
         Args:
@@ -89,11 +89,11 @@ class Search:
         bodies = [self.body(numbers, len(self.candidates) + index) for index, numbers in enumerate(genes)]
         cells = [None if isinstance(body, str) else self._cells.cell(body) for body in bodies]
         outcomes = evaluated([(self._trial, body, self._value(cell)) for body, cell in zip(bodies, cells, strict=True)])
-        found = Batch([Candidate(*each) for each in zip(map(tuple, genes.tolist()), cells, outcomes, strict=True)])
+        found = Candidates([Candidate(*each) for each in zip(map(tuple, genes.tolist()), cells, outcomes, strict=True)])
         self.add(found)
         return found
 
-    def add(self, batch: Batch) -> None:
+    def add(self, batch: Candidates) -> None:
         """Add evaluated bodies: one whose second evaluation exceeds that of its cell's elite takes its place."""
         for one in batch.candidates:
             walk = None if one.outcome.reason else one.outcome.second

@@ -22,7 +22,7 @@ _SEEDS = 2**32  # of a ground
 LEAST_SHARE = 0.7  # share of what is commanded, below which a cost of transport counts for nothing
 
 
-class Walk(NamedTuple):
+class WalkMeans(NamedTuple):
     """Means over episodes.
 
     Attributes:
@@ -47,7 +47,7 @@ class Goal(NamedTuple):
     """What bodies are searched for.
 
     Attributes:
-        metric: of a walk, named as in `Walk`.
+        metric: of a walk, named as in `WalkMeans`.
         sign: 1 for a metric to be raised, -1 for one to be lowered.
         task: by default.
         preset: of the demonstrator; None for the one that suits task and body.
@@ -62,7 +62,7 @@ class Goal(NamedTuple):
     may_fall: bool = False
     unit: str = ""
 
-    def value(self, walk: Walk) -> float:
+    def value(self, walk: WalkMeans) -> float:
         """Return the metric as a number to be raised."""
         return self.sign * getattr(walk, self.metric)
 
@@ -129,8 +129,8 @@ class Outcome(NamedTuple):
     """
 
     reason: str = ""
-    first: Walk | None = None
-    second: Walk | None = None
+    first: WalkMeans | None = None
+    second: WalkMeans | None = None
 
 
 def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
@@ -158,7 +158,7 @@ def evaluate(trial: Trial, body: Body | str, elite: float) -> Outcome:
     return Outcome(f"evaluated again: {reason}" if reason else "", first, second)
 
 
-def excluded(goal: Goal, budget: Budget, walk: Walk) -> str:
+def excluded(goal: Goal, budget: Budget, walk: WalkMeans) -> str:
     """Return why a walk counts for nothing; empty if it counts."""
     if walk.falls and not goal.may_fall:
         return "fell"
@@ -169,7 +169,7 @@ def excluded(goal: Goal, budget: Budget, walk: Walk) -> str:
     return "" if math.isfinite(goal.value(walk)) else "no finite metric"
 
 
-def walk(body: Body, task: str, episodes: Round, goal: Goal) -> Walk:
+def walk(body: Body, task: str, episodes: Round, goal: Goal) -> WalkMeans:
     """Let the demonstrator walk a body and return means over the episodes.
 
     Raises:
@@ -180,7 +180,7 @@ def walk(body: Body, task: str, episodes: Round, goal: Goal) -> Walk:
         walks = [_episode(environment, policy, seed, episodes.steps) for seed in episodes.seeds]
     finally:
         environment.close()
-    return Walk(*map(float, np.mean(walks, axis=0)))
+    return WalkMeans(*map(float, np.mean(walks, axis=0)))
 
 
 def opened(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environment, Policy]:
@@ -193,7 +193,7 @@ def opened(body: Body, task: str, episodes: Round, goal: Goal) -> tuple[Environm
     return environment, policies.policy("cpg", body, goal.preset, task=environment.task.definition)
 
 
-def _episode(environment, policy, seed: int, steps: int) -> Walk:
+def _episode(environment, policy, seed: int, steps: int) -> WalkMeans:
     data, task = environment.physics.data.ptr, environment.task.definition
     body, seconds = task.scene.body, steps * task.scene.control_timestep
     torques, spent = energy.torques(body), energy.start(len(body.joint_names))
@@ -208,4 +208,4 @@ def _episode(environment, policy, seed: int, steps: int) -> Walk:
     achieved = way / target if "distance" in progress or math.isnan(tracking) else tracking
     fell = timestep.discount == 0.0 or rotations.upright(data.qpos[3:7]) < MOST_TILT_COSINE
     power = spent.total * GRAVITY / (length * task.scene.control_timestep)
-    return Walk(way / seconds, achieved, tracking, progress.get("cost_of_transport", math.nan), power, fell)
+    return WalkMeans(way / seconds, achieved, tracking, progress.get("cost_of_transport", math.nan), power, fell)

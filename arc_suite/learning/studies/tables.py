@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from arc_suite import checks
 from arc_suite.cpg.selection import suited_preset
-from arc_suite.data import Settings
+from arc_suite.data import DatasetSettings
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.configuration import Configuration
@@ -29,9 +29,9 @@ class Prior(NamedTuple):
     preset: str = "medium"
     episodes: int = _EPISODES
 
-    def settings(self, setup: Setup) -> Settings:
+    def settings(self, setup: Setup) -> DatasetSettings:
         """Return the settings of the dataset."""
-        return Settings(setup, "cpg", (self.preset,))
+        return DatasetSettings(setup, "cpg", (self.preset,))
 
     def dataset_id(self, setup: Setup) -> str:
         """Return the id of the dataset."""

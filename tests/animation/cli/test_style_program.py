@@ -94,7 +94,7 @@ def test_a_saved_body_beside_a_policy(tmp_path):
 def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     data.collect(
-        "arc_suite/tick/noisy-v0", data.Settings(Setup.of("tick"), "cpg", ("medium",), 0.2, steps=50), episodes=2
+        "arc_suite/tick/noisy-v0", data.DatasetSettings(Setup.of("tick"), "cpg", ("medium",), 0.2, steps=50), episodes=2
     )
     compare = ("--compare=cpg", "--compare_preset=medium")
     done = run("--policy=arc_suite/tick/noisy-v0", *compare, "--episodes=2", f"--output={tmp_path}")

@@ -6,8 +6,8 @@ import numpy as np
 
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, Made
-from arc_suite.animation.design.search import BATCH, RANDOM, Batch, Search
-from arc_suite.animation.design.trials import Outcome, Round, Trial, Walk
+from arc_suite.animation.design.search import BATCH, RANDOM, Candidates, Search
+from arc_suite.animation.design.trials import Outcome, Round, Trial, WalkMeans
 
 ROUND = Round({}, (0,), 10)
 TRIAL = Trial("walk", "transport", Budget(12.0, 1.5), ROUND, ROUND)
@@ -17,7 +17,7 @@ def fake(body):
     """A walk whose cost of transport follows from proportions alone: thin, high torsos are cheap."""
     length, width, thickness = body.torso.solids[0].size
     cost = 1.0 + (thickness + width) / length + 0.3 / body.torso.standing_height
-    return Walk(1.0, 1.0, 1.0, cost, 5.0, 0.0)
+    return WalkMeans(1.0, 1.0, 1.0, cost, 5.0, 0.0)
 
 
 def evaluated(jobs):
@@ -48,7 +48,7 @@ def test_a_search_restored_from_json_goes_on_as_if_nothing_had_happened():
     straight, batches = search()
     again = Search(Made(), Map.of(["legs", "links"]), TRIAL, 3, "body")
     for batch in batches[:6]:
-        again.add(Batch.restored(**json.loads(json.dumps(batch._asdict()))))
+        again.add(Candidates.restored(**json.loads(json.dumps(batch._asdict()))))
     for _ in range(4):
         again.batch(evaluated)
     assert again.candidates == straight.candidates and again.elites == straight.elites
@@ -84,7 +84,7 @@ def test_an_elite_is_challenged_by_the_second_metric():
     before = dict(course.elites)
 
     def lucky(jobs):
-        worse = Walk(1.0, 1.0, 1.0, 9.0, 5.0, 0.0)
+        worse = WalkMeans(1.0, 1.0, 1.0, 9.0, 5.0, 0.0)
         return [Outcome("", worse._replace(cost_of_transport=0.1), worse) for _ in jobs]
 
     course.batch(lucky)

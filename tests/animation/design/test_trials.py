@@ -5,11 +5,11 @@ import math
 import pytest
 
 from arc_suite.animation.design.genes import Budget
-from arc_suite.animation.design.trials import GOALS, Trial, Walk, evaluate, excluded, walk
+from arc_suite.animation.design.trials import GOALS, Trial, WalkMeans, evaluate, excluded, walk
 from arc_suite.robots.generator import generate
 
 BUDGET = Budget(12.0, 1.5)
-GOOD = Walk(0.5, 0.9, math.nan, 1.5, 6.0, 0.0)
+GOOD = WalkMeans(0.5, 0.9, math.nan, 1.5, 6.0, 0.0)
 
 
 @pytest.mark.parametrize(

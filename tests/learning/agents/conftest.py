@@ -72,7 +72,7 @@ def prior(tmp_path_factory):
     """Id of a dataset of Tick, 30 episodes of 40 steps."""
     patch = pytest.MonkeyPatch()
     patch.setenv("MINARI_DATASETS_PATH", str(tmp_path_factory.mktemp("datasets")))
-    settings = data.Settings(Setup.of("tick", "walk", SHORT), "cpg", ("medium",))
+    settings = data.DatasetSettings(Setup.of("tick", "walk", SHORT), "cpg", ("medium",))
     data.collect(settings.dataset_id(), settings, 30, num_envs=15, threads=1)
     yield settings.dataset_id()
     patch.undo()
