@@ -75,7 +75,7 @@ def chosen_setups(asked: dict[str, Setup], stored: Setup | None) -> dict[str, Se
         return asked
     bodies = [setup.body for setup in asked.values()] if _ROBOT.present or made_body() else [stored.body]
     task = next(iter(asked.values())) if FLAGS["task"].present or FLAGS["set"].present else stored
-    return {body.name: dataclasses.replace(task, body=body) for body in bodies}
+    return {body.name: dataclasses.replace(task, domain=body) for body in bodies}
 
 
 def number(value: float, decimals: int = 3) -> str:
