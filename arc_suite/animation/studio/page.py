@@ -17,6 +17,7 @@ from arc_suite.animation.studio import saving, texts
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.charts import Charts
 from arc_suite.animation.studio.creature import Creature
+from arc_suite.animation.studio.gate import Server
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import FILE, LEGS, OWN, RANDOM, Sketch, cured, opened_file
 from arc_suite.animation.studio.view import View
@@ -50,13 +51,6 @@ _KEYS = (
 _KEYS_TOLD = ", ".join(f"{key} {label.lower()}" for label, key, _ in _KEYS)
 
 
-class _Server(viser.ViserServer):
-    """A server that stays on this machine: a visitor's request for a public address does nothing."""
-
-    def request_share_url(self, verbose: bool = True) -> None:
-        return None
-
-
 def serve(session: Session, host: str, port: int, tell: Callable[[str], None]) -> None:
     """Serve the page until the session is closed or the keyboard interrupts.
 
@@ -74,10 +68,10 @@ def serve(session: Session, host: str, port: int, tell: Callable[[str], None]) -
     except OSError as error:
         raise ValueError(f"host {host}: cannot listen there: {(error.strerror or str(error)).lower()}") from None
     with contextlib.redirect_stdout(io.StringIO()):  # viser's own banner
-        server = _Server(host=host, port=port, label="arc_suite studio", verbose=False)
+        server = Server(host=host, port=port, label="arc_suite studio", verbose=False)
     try:
         page = Page(server, session)
-        tell(f"http://{host}:{server.get_port()}")
+        tell(f"http://{host}:{server.get_port()}/?token={server.token}")
         session.run(page.show)
     finally:
         server.stop()

@@ -104,7 +104,7 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
     """
     try:
         field = checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
     kind, found = registry.task_of(sketch.task), dict[str, Any]()
     if sketch.gait != OWN:
