@@ -146,7 +146,7 @@ def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
         made = policies.trained(name)
     if isinstance(made, Universal):  # acts in the task that it was trained in
         task = Setup.of(body, made.network.setup.task).definition
-        made, blocks = Universal(made.network, task), task.blocks
+        made, blocks = Universal(made.network, task), task.sizes
     elif isinstance(made, Network):
         blocks, task = made.blocks, made.setup.definition
     else:

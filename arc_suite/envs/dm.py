@@ -212,7 +212,7 @@ class TaskRun(TaskView, control.Task):
 
     def observation_spec(self, physics):
         """Return the specs of the observation's blocks by name, or of the flat vector."""
-        sizes = {_FLAT: self.definition.size} if self._flat else self.definition.blocks
+        sizes = {_FLAT: self.definition.size} if self._flat else self.definition.sizes
         return collections.OrderedDict((name, specs.Array((size,), float, name)) for name, size in sizes.items())
 
     def initialize_episode(self, physics):

@@ -40,9 +40,9 @@ class TaskView:
         return self.definition.settings
 
     @property
-    def blocks(self) -> Mapping[str, int]:
+    def sizes(self) -> Mapping[str, int]:
         """Sizes of the observation's blocks by name, in the order of the vector."""
-        return self.definition.blocks
+        return self.definition.sizes
 
     def split(self, observation: np.ndarray) -> collections.OrderedDict:
         """Return an observation vector (..., size) as named blocks, views of it.

@@ -76,7 +76,7 @@ def save_universal(path: str | os.PathLike, network: Network, setup: Setup) -> N
         OSError: the file cannot be written.
     """
     policy = Universal(network, setup.definition)
-    _write(path, graphs.of(policy), policy.task.size, len(policy.reach), _metadata(setup, policy.task.blocks))
+    _write(path, graphs.of(policy), policy.task.size, len(policy.reach), _metadata(setup, policy.task.sizes))
 
 
 def _write(path: str | os.PathLike, graph: Graph, size: int, joints: int, known: Mapping) -> None:

@@ -89,7 +89,7 @@ class Saved:
             factor = 1.0 / np.sqrt(known.obs_rms.var + known.epsilon)
             arrays = known.obs_rms.mean, factor, known.clip_obs
             layers = (Layer("normalise", tuple(np.asarray(array, np.float32) for array in arrays)), *layers)
-        made = Network(layers, setup, task.blocks)
+        made = Network(layers, setup, task.sizes)
         samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
         if np.abs(made.actions(samples) - self._actions(samples)).max() > _TOLERANCE:
             raise ValueError(f"policy {self._path}: expected a perceptron, got another network")

@@ -72,7 +72,7 @@ class Universal:
         Raises:
             ValueError: an observation of another body, or without a block of the task.
         """
-        blocks = checked(observation, self.task.blocks, len(self.reach), len(self.task.scene.body.part_names))
+        blocks = checked(observation, self.task.sizes, len(self.reach), len(self.task.scene.body.part_names))
         vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
         own = self.tokens.part(np.zeros(len(vectors), int))
         seen = own.observed(own.gathered(vectors))

@@ -16,6 +16,7 @@ from arc_suite import rotations
 from arc_suite.arenas.pillars import CELLS, PITCH
 from arc_suite.markers import Marker
 from arc_suite.tasks import terms
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.readings import component
@@ -53,16 +54,11 @@ class Command(ABC):
 
     Attributes:
         live: sizes of what may be set from outside while an episode runs, by name.
-        blocks: sizes of the blocks that it adds to the observation, by name.
+        blocks: that it adds to the observation, by name.
     """
 
     live: ClassVar[Mapping[str, int]] = {"command": 3}
-    blocks: ClassVar[Mapping[str, int]] = {}
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right maps of these blocks."""
-        return {}
+    blocks: ClassVar[Mapping[str, Block]] = {}
 
     @abstractmethod
     def start(self, context: Context, random: np.random.RandomState, schedule: "Scheduled") -> Any:
@@ -305,12 +301,7 @@ class ToGoal(Command):
     """
 
     live: ClassVar[Mapping[str, int]] = {}
-    blocks: ClassVar[Mapping[str, int]] = {"goal": 3}
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right map of the goal."""
-        return {"goal": Mirror.signed(1, -1, 1)}
+    blocks: ClassVar[Mapping[str, Block]] = {"goal": Block(3, Mirror.signed(1, -1, 1))}
 
     def start(self, context: Context, random, schedule: Scheduled) -> Chain:
         """Draw the chain of goals."""

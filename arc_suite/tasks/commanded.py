@@ -19,15 +19,16 @@ from arc_suite.arenas import Arena
 from arc_suite.markers import Marker
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import clock, energy, mirrors, paper, parameters, terms
+from arc_suite.tasks import blocks, clock, energy, mirrors, parameters, terms
 from arc_suite.tasks import readings as reading
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.command import Command, draw_schedule
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.ground import Ground, Level
 from arc_suite.tasks.health import Condition, Upright
-from arc_suite.tasks.mirrors import PLANAR, Mirror
+from arc_suite.tasks.mirrors import PLANAR
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings, component
 
@@ -174,15 +175,11 @@ class CommandTask(Task):
         return settings.ground.arena(body, settings.parameters)
 
     @functools.cached_property
-    def blocks(self) -> Mapping[str, int]:
+    def blocks(self) -> Mapping[str, Block]:
         """The paper's observation, the command with the motion that is to follow it, what command and ground add."""
-        return {**paper.blocks(self.scene.body), "command": 6, **self.command.blocks, **self.settings.ground.blocks}
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right maps of the blocks."""
-        command = {"command": mirrors.joined([PLANAR, PLANAR]), **self.command.mirrors}
-        return {**paper.symmetry(self.scene.body, self.parameters), **command, **self.settings.ground.mirrors}
+        own = blocks.of_gait(self.scene.body, self.parameters.phase_offsets, self.parameters.default_angles)
+        own["command"] = Block(6, mirrors.joined([PLANAR, PLANAR]))
+        return {**own, **self.command.blocks, **self.settings.ground.blocks}
 
     @property
     def adapts(self) -> bool:
@@ -227,7 +224,7 @@ class CommandTask(Task):
         """
         context, ground = self.context, self.settings.ground
         ground_memory, displacement = ground.place(context, random, stream)
-        qpos, qvel = paper.drawn_state(self.scene.standing, self.settings.noise, random)
+        qpos, qvel = self.settings.noise.drawn(self.scene.standing, random)
         qpos[:2] += displacement
         qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
         schedule = draw_schedule(random)

@@ -43,7 +43,8 @@ from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks.mirrors import Mirror, Symmetry
+from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Layout, Readings
 
@@ -165,8 +166,13 @@ class Task(ABC):
 
     @property
     @abstractmethod
-    def blocks(self) -> Mapping[str, int]:
+    def blocks(self) -> Mapping[str, Block]:
+        """The blocks of the observation by name, in the order of the vector."""
+
+    @functools.cached_property
+    def sizes(self) -> dict[str, int]:
         """The size of every block of the observation by name, in the order of the vector."""
+        return {name: block.size for name, block in self.blocks.items()}
 
     def phase(self, memory) -> Any:
         """Return the phase (...) of the prescribed gait, rad in [0, 2 pi); None where the task prescribes none."""
@@ -187,15 +193,6 @@ class Task(ABC):
         """The constant target velocity along world x, m/s; None where it changes or there is none."""
         return None
 
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """How the blocks of the observation are mirrored across the x-z plane, by name.
-
-        Raises:
-            ValueError: the gait is not mirror-symmetric, or the task defines no mirror.
-        """
-        raise ValueError(f"task {self.name}: does not tell how its observation is mirrored")
-
     @functools.cached_property
     def symmetry(self) -> Symmetry:
         """The mirror maps of observations and actions.
@@ -205,11 +202,13 @@ class Task(ABC):
         the image walks on mirrored ground.
 
         Raises:
-            ValueError: the body is not left-right symmetric, or see `mirrors`.
+            ValueError: the body, the gait or its default angles are not symmetric, or a block declares no mirror.
         """
-        action = mirrors.joints(mirror.image(self.scene.body))
-        blocks = self.mirrors
-        return Symmetry(mirrors.joined(blocks[name] for name in self.blocks), action)
+        image = mirror.image(self.scene.body)
+        if undeclared := [name for name, block in self.blocks.items() if block.mirror is None]:
+            raise ValueError(f"task {self.name}: block {undeclared[0]!r} declares no mirror")
+        observation = mirrors.joined(block.map(image) for block in self.blocks.values())
+        return Symmetry(observation, mirrors.joints(image))
 
     def first(self) -> Any:
         """Return the carry with which a new stream of episodes begins."""
@@ -309,7 +308,7 @@ class Task(ABC):
     @functools.cached_property
     def size(self) -> int:
         """Of the observation as a vector."""
-        return sum(self.blocks.values())
+        return sum(self.sizes.values())
 
     def vector(self, blocks: Mapping[str, np.ndarray], dtype=None) -> np.ndarray:
         """Return observed blocks as one vector (..., size), in new memory.
@@ -333,7 +332,7 @@ class Task(ABC):
     def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
         if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
             observed = {name: block.shape[-1] for name, block in blocks.items()}
-            raise ValueError(f"observation of {self.name}: expected blocks {dict(self.blocks)}, got {observed}")
+            raise ValueError(f"observation of {self.name}: expected blocks {self.sizes}, got {observed}")
 
     def split(self, vector: np.ndarray) -> collections.OrderedDict:
         """Return an observation vector (..., size) as named blocks, views of it.
@@ -347,10 +346,10 @@ class Task(ABC):
 
     @functools.cached_property
     def _declared(self) -> list[tuple[str, int]]:
-        return list(self.blocks.items())
+        return list(self.sizes.items())
 
     @functools.cached_property
     def _parts(self) -> dict[str, slice]:
         """Where each block lies in the vector."""
-        ends = itertools.accumulate(self.blocks.values())
-        return {name: slice(end - size, end) for (name, size), end in zip(self.blocks.items(), ends, strict=True)}
+        ends = itertools.accumulate(self.sizes.values())
+        return {name: slice(end - size, end) for (name, size), end in zip(self.sizes.items(), ends, strict=True)}

@@ -15,6 +15,7 @@ from arc_suite.arenas import FLAT, Arena, terrain
 from arc_suite.arenas.pillars import COUNT, RADIUS, Pillars
 from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import CURRICULUM, STEPS
 from arc_suite.tasks.fitting import reach
@@ -32,6 +33,10 @@ LONGEST = 300.0  # length of a lane ahead of the start
 END = 1.0  # before the end of a lane, at which an episode is truncated
 SINKING = 5  # consecutive control steps after which a foot has sunk for good
 
+# The places of the scan and the rays across the x-z plane: ground and pillars are seen as in a mirror.
+_ACROSS = np.arange(SCAN.shape[1]).reshape(len(FORWARD), len(LEFT))[:, ::-1].ravel()
+_AROUND = -np.arange(RAYS.shape[1]) % RAYS.shape[1]
+
 
 class Nothing(NamedTuple):
     """Memory of a ground that remembers nothing."""
@@ -43,11 +48,11 @@ class Ground:
 
     Attributes:
         own_arena: whether the ground is the only arena of the task.
-        blocks: sizes of the blocks that it adds to the observation, by name.
+        blocks: that it adds to the observation, by name.
     """
 
     own_arena: ClassVar[bool] = False
-    blocks: ClassVar[Mapping[str, int]] = {}
+    blocks: ClassVar[Mapping[str, Block]] = {}
 
     @property
     def adapts(self) -> bool:
@@ -70,11 +75,6 @@ class Ground:
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return the arena that suits a body."""
         return FLAT
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right maps of the blocks."""
-        return {}
 
     def first(self) -> Any:
         """Return the stream state with which a new stream of episodes begins."""
@@ -204,7 +204,7 @@ class Lanes(Ground):
     width: float | None = None
 
     own_arena: ClassVar[bool] = True
-    blocks: ClassVar[Mapping[str, int]] = {"scan": SCAN.shape[1]}
+    blocks: ClassVar[Mapping[str, Block]] = {"scan": Block(len(_ACROSS), Mirror.moved(_ACROSS), noise=0.1)}  # h
 
     @property
     def settings(self) -> tuple[str, ...]:
@@ -240,12 +240,6 @@ class Lanes(Ground):
         copies = dict.fromkeys(self.kinds, self.copies[self.curriculum])
         sizes = {name: size for name in terrain.SIZES if (size := getattr(self, name)) is not None}
         return terrain.made(body, copies, float(length), tuple(map(float, levels)), self.terrain_seed, sizes)
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right map of the scan, as on mirrored ground."""
-        places = np.arange(SCAN.shape[1]).reshape(len(FORWARD), len(LEFT))[:, ::-1].ravel()
-        return {"scan": Mirror(places, np.ones(len(places), np.int8))}
 
     def first(self) -> Stream:
         """Return the level at which a stream begins, which its first episode neither raises nor lowers."""
@@ -317,17 +311,12 @@ class PillarField(Ground):
     """A floor with pillars, seen by a range sensor. Lengths are multiples of R, as bodies fit between by their legs."""
 
     own_arena: ClassVar[bool] = True
-    blocks: ClassVar[Mapping[str, int]] = {"ranges": RAYS.shape[1]}
+    # With noise as a share of the farthest that is seen.
+    blocks: ClassVar[Mapping[str, Block]] = {"ranges": Block(len(_AROUND), Mirror.moved(_AROUND), noise=0.02)}
 
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return a floor with pillars that suits the body's size."""
         return Pillars(reach(body), 2.0 * body.torso.standing_height)
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right map of the ranges."""
-        rays = np.arange(RAYS.shape[1])
-        return {"ranges": Mirror(-rays % len(rays), np.ones(len(rays), np.int8))}
 
     def obstacles(self, context: Context, random: np.random.RandomState, memory) -> tuple[Pillared, np.ndarray]:
         """Draw where pillars stand."""

@@ -29,6 +29,11 @@ class Mirror(NamedTuple):
         """Return the map that leaves numbers in place, some with the other sign."""
         return cls(np.arange(len(signs)), np.array(signs, np.int8))
 
+    @classmethod
+    def moved(cls, sources: np.ndarray) -> Self:
+        """Return the map that takes numbers from other places, with their signs."""
+        return cls(sources, np.ones(len(sources), np.int8))
+
     def __call__(self, vectors):
         """Return the mirrored vectors (..., n), in their own precision; of NumPy or JAX."""
         return vectors[..., self.sources] * self.signs

@@ -17,8 +17,9 @@ from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.robots import mirror
 from arc_suite.tasks import noise
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
-from arc_suite.tasks.mirrors import Mirror
+from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
 from arc_suite.tasks.readings import Readings
 
@@ -122,8 +123,7 @@ def modified(task: Task, settings: Mapping[str, Any]) -> "Modified":
     Raises:
         ValueError: an unknown name, or a value that does not fit.
     """
-    widths = noise.half_widths(task.scene.body, task.blocks)
-    changes = checked(settings, task.scene.body, task.blocks, widths)
+    changes = checked(settings, task.scene.body, task.blocks)
     return Modified(task.scene, task.settings, task.step_limit, task=task, changes=changes)
 
 
@@ -158,9 +158,9 @@ class Modified(Task):
         """Refuse, as the other task fits its own settings."""
         raise TypeError("a modified task is made by tasks.modified.modified, of a task that is fitted")
 
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The other task's; what is drawn is as likely on either side.
+    @functools.cached_property
+    def symmetry(self) -> Symmetry:
+        """The mirror maps of observations and actions; what is drawn is as likely on either side.
 
         Raises:
             ValueError: a leg of one side fails in every episode, or as the other task.
@@ -168,12 +168,12 @@ class Modified(Task):
         leg = self.changes.actuator_failure
         if not isinstance(leg, bool) and mirror.image(self.scene.body).legs[leg] != leg:
             raise ValueError(f"actuator_failure: expected a leg that is drawn, or one on the midline, got {leg}")
-        return self.task.mirrors
+        return super().symmetry
 
-    @functools.cached_property
-    def blocks(self) -> Mapping[str, int]:
-        """Return the other task's blocks without the excluded ones."""
-        return {name: size for name, size in self.task.blocks.items() if name not in self.changes.exclude_blocks}
+    @property
+    def blocks(self) -> Mapping[str, Block]:
+        """The other task's blocks without the excluded ones."""
+        return {name: block for name, block in self.task.blocks.items() if name not in self.changes.exclude_blocks}
 
     @functools.cached_property
     def members(self) -> np.ndarray:
@@ -195,12 +195,12 @@ class Modified(Task):
     @functools.cached_property
     def noises(self) -> dict[str, tuple[slice, np.ndarray]]:
         """Where the noise of a block lies among that of all blocks, and its half-widths (size,), by name."""
-        levels, first, noises = self.changes.observation_noise, 0, {}
-        for name, widths in noise.half_widths(self.scene.body, self.task.blocks).items():
-            last = first + len(widths)
-            if levels.get(name) and name in self.blocks:
-                noises[name] = slice(first, last), levels[name] * widths
-            first = last
+        levels, last, noises = self.changes.observation_noise, 0, {}
+        for name, block in self.task.blocks.items():
+            if block.noise is not None:
+                first, last = last, last + block.size
+                if levels.get(name) and name not in self.changes.exclude_blocks:
+                    noises[name] = slice(first, last), levels[name] * block.widths
         return noises
 
     def first(self) -> Any:

@@ -5,11 +5,12 @@ standing height h, so that nothing has a scale. Where a setting takes two number
 draws its own between them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 from arc_suite import checks
 from arc_suite.robots.spec import Body
+from arc_suite.tasks.blocks import Block
 
 FAILS_FROM = 40  # control steps after which the motors of a leg fail
 LONGEST_DELAY = 100  # control steps
@@ -27,8 +28,8 @@ class Modifiers(NamedTuple):
         actuator_failure: True for a leg that is drawn, or the index of one: its motors do nothing from step 40 on.
         friction: multiple of the friction of all contacts, or two of them.
         mass: multiple of mass and inertia of all parts, or two of them.
-        observation_noise: level of uniform noise on what is measured, for all blocks that
-            `noise.half_widths` knows, or by the name of a block.
+        observation_noise: level of uniform noise on what is measured, for all blocks that declare
+            `noise`, or by the name of a block.
         delay: delay of actions, control steps, or two of them.
         actions: "torque", or "position": an action is then the joints' wanted angles, 0 for the standing
             pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains.
@@ -59,14 +60,13 @@ BOUNDS = {
 }
 
 
-def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], noisy) -> Modifiers:
+def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Modifiers:
     """Return the modifiers that settings ask for.
 
     Args:
         settings: some of the fields of `Modifiers` by name.
         body: that is modified.
-        blocks: sizes of the blocks of the task's observation, by name.
-        noisy: names of those that can be noisy.
+        blocks: of the task's observation, by name.
 
     Raises:
         ValueError: an unknown name, or a value that does not fit.
@@ -80,7 +80,9 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, int], 
         actuator_failure=_actuator_failure(values["actuator_failure"], body),
         friction=checks.span("friction", values["friction"], *BOUNDS["friction"]),
         mass=checks.span("mass", values["mass"], *BOUNDS["mass"]),
-        observation_noise=_noise(values["observation_noise"], list(noisy)),
+        observation_noise=_noise(
+            values["observation_noise"], [name for name in blocks if blocks[name].noise is not None]
+        ),
         delay=_delay(values["delay"]),
         actions=checks.name(values["actions"], ACTIONS, "actions"),
         exclude_blocks=_exclude_blocks(values["exclude_blocks"], blocks),
@@ -106,7 +108,7 @@ def _delay(value) -> tuple[int, int]:
     return low, checks.integer("delay", high, low, most)
 
 
-def _exclude_blocks(value, blocks: Mapping[str, int]) -> tuple[str, ...]:
+def _exclude_blocks(value, blocks: Iterable[str]) -> tuple[str, ...]:
     names = (value,) if isinstance(value, str) else value
     if not isinstance(names, tuple | list):
         raise ValueError(f"exclude_blocks: expected names of blocks, got {value!r}")

@@ -120,6 +120,23 @@ class Noise(NamedTuple):
     joint_angle_noise: float
     joint_velocity_noise: float
 
+    def drawn(self, standing: np.ndarray, random: np.random.RandomState) -> tuple[np.ndarray, np.ndarray]:
+        """Draw the state in which an episode starts: the standing pose with this noise.
+
+        Args:
+            standing: (nq,) torso position and quaternion, then joint angles.
+            random: to draw from.
+
+        Returns:
+            qpos (nq,) and qvel (nq - 1,).
+        """
+        joints = len(standing) - 7
+        widths = np.repeat((self.position_noise, self.orientation_noise, self.joint_angle_noise), (3, 4, joints))
+        qpos = standing + random.uniform(-widths, widths)
+        qpos[3:7] /= np.linalg.norm(qpos[3:7])
+        deviations = self.linear_velocity_noise, self.angular_velocity_noise, self.joint_velocity_noise
+        return qpos, np.repeat(deviations, (3, 3, joints)) * random.standard_normal(6 + joints)
+
 
 # Settings that every task with a gait has.
 NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")

@@ -236,8 +236,8 @@ class Tokens(NamedTuple):
 
     @staticmethod
     def _places(task: Task) -> np.ndarray:
-        body, ends = task.scene.body, itertools.accumulate(task.blocks.values())
-        first = {name: end - size for (name, size), end in zip(task.blocks.items(), ends, strict=True)}
+        body, ends = task.scene.body, itertools.accumulate(task.sizes.values())
+        first = {name: end - size for (name, size), end in zip(task.sizes.items(), ends, strict=True)}
         posture, velocities, forces, clock = (first[name] for name in BLOCKS)
         joints = padded(body, np.arange(len(body.joint_names))).astype(int).ravel()
         upward = np.zeros(LEGS, int)

@@ -8,10 +8,10 @@ import numpy as np
 
 from arc_suite import checks
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import clock, energy, paper, parameters, terms
+from arc_suite.tasks import blocks, clock, energy, parameters, terms
+from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.clock import Clock
 from arc_suite.tasks.contract import Inputs, Start, Task
-from arc_suite.tasks.mirrors import Mirror
 from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings, component
 
@@ -97,14 +97,9 @@ class Walk(Task):
         )
 
     @functools.cached_property
-    def blocks(self) -> Mapping[str, int]:
+    def blocks(self) -> Mapping[str, Block]:
         """The paper's observation (Section 3)."""
-        return paper.blocks(self.scene.body)
-
-    @property
-    def mirrors(self) -> Mapping[str, Mirror]:
-        """The left-right maps of the blocks."""
-        return paper.symmetry(self.scene.body, self.parameters)
+        return blocks.of_gait(self.scene.body, self.parameters.phase_offsets, self.parameters.default_angles)
 
     @functools.cached_property
     def parameters(self) -> Parameters:
@@ -134,7 +129,7 @@ class Walk(Task):
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the state: the standing pose, with noise. The clock starts at 0, with no action before."""
-        qpos, qvel = paper.drawn_state(self.scene.standing, self.settings.noise, random)
+        qpos, qvel = self.settings.noise.drawn(self.scene.standing, random)
         still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
         spent = energy.start(len(still))
         return Start(qpos, qvel, Memory(0, still, still, zero, zero, zero, zero, zero, np.True_, spent))

@@ -40,7 +40,7 @@ def test_policies_get_named_rows_and_the_reward_of_the_step_before():
 
         def act(self, observation, rewards):
             assert {name: block.shape for name, block in observation.items()} == {
-                name: (1, size) for name, size in environment.task.definition.blocks.items()
+                name: (1, size) for name, size in environment.task.sizes.items()
             }
             self.rewards.append(rewards)
             return np.full((1, 18), 0.1)

@@ -69,7 +69,7 @@ def test_specs_are_those_of_the_declared_blocks(domain, task):
     assert isinstance(action, specs.BoundedArray)
     assert action.shape == (JOINTS[domain],)
     assert (action.minimum == -1).all() and (action.maximum == 1).all()
-    declared = {name: (size,) for name, size in environment.task.definition.blocks.items()}
+    declared = {name: (size,) for name, size in environment.task.sizes.items()}
     timestep = environment.reset()
     assert {name: block.shape for name, block in timestep.observation.items()} == declared
     assert {name: spec.shape for name, spec in environment.observation_spec().items()} == declared

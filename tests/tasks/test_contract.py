@@ -97,7 +97,7 @@ def test_functions_are_pure_and_read_what_is_declared(task_name, body, settings)
         assert type(memory) is type(before)
         assert task.terms(memory, readings).keys() == task.settings.weights.keys()
         assert {name: block.shape for name, block in task.observe(memory, readings).items()} == {
-            name: (size,) for name, size in task.blocks.items()
+            name: (size,) for name, size in task.sizes.items()
         }
         assert all(np.shape(figure) == () for figure in task.progress(memory).values())
         assert np.shape(task.resampled(memory)) == ()

@@ -425,7 +425,7 @@ def test_models_of_rows_and_of_one_environment_are_one():
 
 
 def test_the_scan_in_a_mirror():
-    mirror = prepared("queen", "rough")[0].mirrors["scan"]
+    mirror = prepared("queen", "rough")[0].blocks["scan"].mirror
     assert_allclose(mirror(SCAN), SCAN * [[1.0], [-1.0]], atol=1e-15)
 
 

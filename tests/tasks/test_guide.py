@@ -12,7 +12,9 @@ from tiers import never, tiers
 
 ROOT = pathlib.Path(__file__).parents[2]
 GUIDE = (ROOT / "docs" / "adding_a_task.md").read_text()
-CROUCHING, USING_A_TASK, RAMPS, USING_AN_ARENA = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+CROUCHING, USING_A_TASK, LEVEL_STEER, USING_A_TERM, RAMPS, USING_AN_ARENA = re.findall(
+    r"```python\n(.*?)```", GUIDE, re.DOTALL
+)
 COMMANDS = re.findall(r"(?:^|`)(arc-suite [^`\n]*)", GUIDE, re.MULTILINE)
 SHORT = {
     "evaluate": ["--episodes=1"],
@@ -26,6 +28,7 @@ SHORT = {
 def package(tmp_path):
     """Writes the guide's modules and returns a function that runs Python in their folder."""
     (tmp_path / "crouching.py").write_text(CROUCHING)
+    (tmp_path / "level_steer.py").write_text(LEVEL_STEER)
     (tmp_path / "ramps.py").write_text(RAMPS)
     environ = os.environ | {
         "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)]),
@@ -48,6 +51,27 @@ def test_task(package):
     assert out.endswith("(8, 48) [(8, 23), (8, 24), (8, 1)]\n")
     out = package("-c", USING_A_TASK + 'print((arc_suite.symmetry("leaper", "crouch").observation.signs < 0).sum())')
     assert out.endswith(f"\n{2 + 4 + 3 + 4}\n")  # the quaternion, hips, velocities of the torso, hips
+
+
+BATCH = """
+from arc_suite.envs.setup import Setup
+from arc_suite.evaluation import conformance
+setup = Setup.of("tick", "level_steer", settings)
+print(conformance.difference(setup, 20), setup.definition.symmetry.observation.sources.max())
+last = timestep.observation["last_action"] - 0.5
+assert 0.0 < abs(last).min() and abs(last).max() <= 0.02
+weights = environment.task.settings.weights
+reward = 0
+for name, weight in weights.items():
+    reward = reward + weight * environment.task.terms[name]
+assert (reward, weights["level"]) == (timestep.reward, 1.0)
+"""
+
+
+@pytest.mark.slow
+def test_a_term_and_a_block(package):
+    """In a dm_env as the guide shows them, and in a batch; test_jax runs them under `jit`."""
+    assert package("-c", USING_A_TERM + BATCH).splitlines()[-1] == f"None {23 + 24 + 150 + 2 + 6 + 18 - 1}"
 
 
 @pytest.mark.slow

@@ -1,14 +1,20 @@
 """The text of a task under `jax.jit` and `jax.vmap`: what it computes is what NumPy computes."""
 
+import pathlib
+import re
+
 import numpy as np
 import pytest
 
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.tasks import TASKS
+from arc_suite.tasks import TASKS, terms
 
 jax = pytest.importorskip("jax", reason="of the extra `jax`: make check-jax")
 jax.config.update("jax_enable_x64", True)
+
+GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "adding_a_task.md").read_text()
+(OF_THE_GUIDE,) = re.findall(r"```python\n([^`]*?class LevelSteer.*?)```", GUIDE, re.DOTALL)
 
 BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": generator.random_body(3)}
 ROWS, STEPS = 3, 60
@@ -50,6 +56,16 @@ PLACES = [
 PLACES += [(name, MODIFIERS) for name in ("walk", "steer", "course")]
 
 
+def test_the_term_and_the_block_of_the_guide():
+    there = {"__name__": "level_steer"}
+    exec(compile(OF_THE_GUIDE, "adding_a_task.md", "exec"), there)
+    try:
+        settings = {"observation_noise": {"last_action": 0.02}}
+        test_jit_and_vmap_compute_what_numpy_computes("level_steer", settings, "leaper")
+    finally:
+        del TASKS["level_steer"]
+
+
 @pytest.mark.parametrize(("task_name", "settings"), PLACES)
 @pytest.mark.parametrize("body", BODIES)
 def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
@@ -63,7 +79,7 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
             readings,
             memory,
             inputs,
-            task.terms(memory, readings),
+            terms.reward(task.terms(memory, readings), task.settings.weights, task.cost_limit),
             task.observe(memory, readings),
             ends[0],
             task.progress(memory),

@@ -75,7 +75,7 @@ def test_a_modified_task_conforms(case, task_name, body):
     one, two = load(body, task_name, **CASES[case]), load(body, task_name, **CASES[case])
     plain = load(body, task_name)
     timestep, _ = one.reset(), plain.reset()
-    blocks = {name: (size,) for name, size in one.task.definition.blocks.items()}
+    blocks = {name: (size,) for name, size in one.task.sizes.items()}
     assert {name: block.shape for name, block in timestep.observation.items()} == blocks
     assert set(plain.task.definition.blocks) - set(blocks) == (
         {"contact_forces"} if case in ("exclude_blocks", "all") else set()
@@ -369,7 +369,7 @@ def test_noise_is_on_what_is_measured_and_on_nothing_else():
         errors.append({name: once.observation[name] - block for name, block in other.observation.items()})
         once, other = noisy.step(action), plain.step(action)
         assert once.reward == other.reward
-    widths = noise.half_widths(ROBOTS["queen"], plain.task.definition.blocks)
+    widths = {name: block.widths for name, block in plain.task.definition.blocks.items() if block.noise is not None}
     assert set(widths) == {"posture", "velocities", "contact_forces", "scan"} & set(plain.task.definition.blocks)
     for name, width in widths.items():
         error = np.array([step[name] for step in errors]) / width

@@ -238,7 +238,7 @@ def test_the_same_shape_finds_its_way_at_any_size():
 
 
 def test_the_ring_in_a_mirror():
-    mirror = arc_suite.load("queen", "navigate").task.definition.mirrors["ranges"]
+    mirror = arc_suite.load("queen", "navigate").task.definition.blocks["ranges"].mirror
     assert_allclose(mirror(sensors.RAYS), sensors.RAYS * [[1.0], [-1.0]], atol=1e-15)
 
 

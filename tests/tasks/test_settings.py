@@ -83,6 +83,7 @@ def test_settings_of_walk_alone_are_refused_elsewhere(task):
 DERIVED = {
     "symmetry",
     "size",
+    "sizes",
     "vector",
     "named",
     "split",

@@ -39,7 +39,7 @@ def test_registry():
 @every_robot
 def test_blocks(domain):
     n, parts = JOINTS[domain], (SIZES[domain] - 13 - 2 * JOINTS[domain]) // 6
-    assert load(domain).task.definition.blocks == {
+    assert load(domain).task.sizes == {
         "posture": 5 + n,
         "velocities": 6 + n,
         "contact_forces": 6 * parts,

@@ -34,8 +34,8 @@ def test_a_changed_weight_changes_the_pages(monkeypatch):
 def test_every_entry_of_an_observation_has_its_name(robot, task):
     definition = Setup.of(robot, task).definition
     entries = observations.entries(definition)
-    sizes = {block: sum(entry.block == block for entry in entries) for block in definition.blocks}
-    assert sizes == dict(definition.blocks)
+    sizes = {block: sum(entry.block == block for entry in entries) for block in definition.sizes}
+    assert sizes == definition.sizes
     assert len({(entry.block, entry.name) for entry in entries}) == len(entries)
 
 
@@ -58,7 +58,7 @@ def test_the_named_entries_hold_what_they_say():
 def test_the_page_of_a_task_is_complete(name):
     """Every block, term, metric and setting has a row; a new one without a text fails here."""
     page, task = tasks.page(name), Setup.of("bastion", name).definition
-    for block, size in task.blocks.items():
+    for block, size in task.sizes.items():
         assert row(page, f"`{block}`", "Observation")[1] == str(size)
     for term in task.settings.weights:
         assert row(page, f"`{term}`", "Reward")[-1]

@@ -16,7 +16,7 @@ _ONSET, _STEPS = 40, 20  # control steps before those that are timed, and of one
 def _walking(task: str, robot: str, threads: int):
     """Rows that are under way, and the actions of their next steps, which every turn repeats."""
     rows = VectorEnv(robot, task, NUM_ENVS, threads)
-    has_command = "command" in rows.task.blocks
+    has_command = "command" in rows.task.sizes
     policy = policies.policy(
         "cpg", robot, "surefooted" if has_command else "tuned", NUM_ENVS, task=rows.task.definition
     )

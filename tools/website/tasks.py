@@ -125,7 +125,7 @@ def _asks(kind: type[Task]) -> str:
 def _observation(tasks) -> str:
     lines = []
     for block in next(iter(tasks.values())).blocks:
-        sizes = [str(task.blocks[block]) for task in tasks.values()]
+        sizes = [str(task.sizes[block]) for task in tasks.values()]
         lines.append([f"`{block}`", *sizes, observations.BLOCKS[block]])
     lines.append(["in all", *(str(task.size) for task in tasks.values()), ""])
     robot, task = next(iter(tasks.items()))

@@ -26,12 +26,12 @@ class BodiesTask(NamedTuple):
     Attributes:
         name: of the task.
         step_limit: control steps after which an episode is over, may be infinite.
-        blocks: sizes of the blocks of an observation by name, in order.
+        sizes: of the blocks of an observation by name, in order.
     """
 
     name: str
     step_limit: float
-    blocks: Mapping[str, int] = tokens.FLAT
+    sizes: Mapping[str, int] = tokens.FLAT
 
     @property
     def definition(self) -> "BodiesTask":

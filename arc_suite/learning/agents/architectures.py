@@ -80,7 +80,7 @@ class Perceptron(NamedTuple):
     @classmethod
     def of(cls, task: Task) -> Self:
         """Return the architecture for a task."""
-        return cls(tuple(task.blocks.values()), len(task.scene.body.joint_names))
+        return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names))
 
     def drawn(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""

@@ -49,9 +49,9 @@ class Inputs(NamedTuple):
         Raises:
             ValueError: no block is left.
         """
-        seen = np.concatenate([np.full(size, name not in exclude_blocks) for name, size in task.blocks.items()])
+        seen = np.concatenate([np.full(size, name not in exclude_blocks) for name, size in task.sizes.items()])
         if not seen.any():
-            raise ValueError(f"exclude_blocks: expected to leave a block, got all of them: {', '.join(task.blocks)}")
+            raise ValueError(f"exclude_blocks: expected to leave a block, got all of them: {', '.join(task.sizes)}")
         columns = np.flatnonzero(seen)
         moments = Moments.none(len(columns)) if normalize else None
         return cls(task.size, columns, moments, symmetry(task) if mirror else None)

@@ -148,8 +148,8 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
     first, *layers, last = getattr(found, "layers", ()) or (Layer("none"), Layer("none"))
     if (first.kind, last.kind) != ("normalise", "clip"):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
-    for name in {**found.blocks, **task.blocks}:
-        there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.blocks))
+    for name in {**found.blocks, **task.sizes}:
+        there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.sizes))
         if there != here:
             other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")

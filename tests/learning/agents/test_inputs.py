@@ -29,7 +29,7 @@ def test_excluded_blocks_and_moments():
     inputs = Inputs.of(TASK, CONTACTS, normalize=True, mirror=False).after(drawn(300))
     parts = [block for name, block in TASK.split(drawn(300)).items() if name not in CONTACTS]
     seen = np.concatenate(parts, axis=-1)
-    assert seen.shape == (300, TASK.size - TASK.blocks["contact_forces"])
+    assert seen.shape == (300, TASK.size - TASK.sizes["contact_forces"])
     expected = (seen - seen.mean(axis=0)) / seen.std(axis=0)
     assert_allclose(inputs(drawn(300)), expected.clip(-5.0, 5.0), atol=1e-5)
 
