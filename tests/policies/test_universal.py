@@ -101,6 +101,6 @@ def test_what_does_not_fit_is_one_line(trained, tmp_path):
         policies.trained(trained)
     single = Setup.of("leaper").definition
     layers = (network.Layer("linear", (np.zeros((single.size, 12), np.float32), np.zeros(12, np.float32))),)
-    network.save(tmp_path / "one.npz", network.Network(layers, Setup.of("leaper"), dict(single.blocks)))
+    network.save(tmp_path / "one.npz", network.Network(layers, Setup.of("leaper"), dict(single.sizes)))
     with pytest.raises(ValueError, match=r"one\.npz: expected one of many bodies, got one of leaper$"):
         universal.load(tmp_path / "one.npz")
