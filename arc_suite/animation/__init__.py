@@ -1,6 +1,6 @@
 """Animation: clips for engines, pages to play in, the studio, the search for creatures; the core does not import it."""
 
-__all__ = ["show"]
+__all__ = ["show"]  # noqa: F822  # made by __getattr__
 
 
 def __getattr__(name):

@@ -2,7 +2,6 @@
 
 import json
 import os
-import pathlib
 import subprocess
 import sys
 
@@ -15,7 +14,7 @@ from tiers import never, tiers
 from arc_suite import data, style
 
 SETTINGS = data.DatasetSettings(QUEEN, **SHORT)
-TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
+COLLECT = (sys.executable, "-m", "arc_suite", "collect")
 READERS = {"open": lambda dataset_id: list(data.open(dataset_id)), "verify": verify}
 
 STROLL = """
@@ -59,7 +58,7 @@ def test_metadata_import_nothing(root, module, change):
     edited(root, lambda metadata: metadata["arc_suite"].update(change))
     for use in (*READERS.values(), style.source):
         refused(use, "files import nothing; import 'strolling' first")
-    done = subprocess.run([sys.executable, TOOL, f"--verify={ID}"], capture_output=True, text=True)
+    done = subprocess.run([*COLLECT, f"--verify={ID}"], capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.count("\n") == 1 and "import 'strolling' first" in done.stderr
     assert not module.exists()
@@ -68,7 +67,7 @@ def test_metadata_import_nothing(root, module, change):
 @pytest.mark.long
 def test_what_the_caller_names_is_imported(module):
     def run(*arguments):
-        command = [sys.executable, TOOL, f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments]
+        command = [*COLLECT, f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments]
         return subprocess.run(command, capture_output=True, text=True)
 
     named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")

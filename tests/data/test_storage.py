@@ -20,7 +20,7 @@ from arc_suite import data, files
 from arc_suite.data.storage import Storage
 from arc_suite.envs.setup import Setup
 
-TOOL = pathlib.Path(__file__).parents[2] / "tools" / "collect.py"
+COLLECT = (sys.executable, "-m", "arc_suite", "collect")
 ID = "arc_suite/test/some-v0"
 PARTS = "arc_suite/test/.some-v0.parts"
 slowly = functools.partial(pytest.param, marks=pytest.mark.slow)
@@ -139,7 +139,7 @@ def test_killed_at_any_change_of_files_the_dataset_opens_and_the_same_command_co
 
 
 def run(*arguments, **kwargs):
-    command = [sys.executable, TOOL, "--robot=tick", f"--id={ID}", "--steps=20", *arguments]
+    command = [*COLLECT, "--robot=tick", f"--id={ID}", "--steps=20", *arguments]
     return subprocess.run(command, capture_output=True, text=True, **kwargs)
 
 

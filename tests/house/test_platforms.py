@@ -1,6 +1,5 @@
 """The suite on other platforms: what Windows does not have, and texts whose encoding depends on the machine."""
 
-import ast
 import os
 import pathlib
 import subprocess
@@ -9,7 +8,6 @@ import sys
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[2]
-SOURCES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
 
 # Takes from Python what Windows does not have, and gives it a lock on a range of bytes as msvcrt has.
 WINDOWS = """
@@ -89,32 +87,3 @@ def test_files_do_not_depend_on_the_encoding_of_the_machine(tmp_path):
     (tmp_path / "other.py").write_text(OTHER)
     done = run(strict + USE, tmp_path, "-X", "warn_default_encoding")
     assert done.returncode == 0, done.stderr
-
-
-NO_TEXT = ("os.open(", "data.open(", "open(dataset_id)")  # what opens no text
-
-
-def without_encoding(text):
-    """Return the calls that read or write text and name no encoding."""
-    calls = [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Call)]
-    found = []
-    for call in calls:
-        name, given = ast.unparse(call.func).rpartition(".")[2], {keyword.arg for keyword in call.keywords}
-        modes = [node.value for node in ast.walk(call) if isinstance(node, ast.Constant)]
-        binary = any(isinstance(mode, str) and "b" in mode and set(mode) <= set("abrwx+") for mode in modes)
-        opens = name == "open" and not binary and not ast.unparse(call).startswith(NO_TEXT)
-        if (opens or name in ("read_text", "write_text") or "text" in given) and "encoding" not in given:
-            found.append(ast.unparse(call))
-    return found
-
-
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_every_text_names_its_encoding(path):
-    assert without_encoding(path.read_text(encoding="utf-8")) == []
-
-
-@pytest.mark.parametrize(
-    "call", ["open(path)", "path.open('w')", "path.read_text()", "path.write_text('b')", "subprocess.run(a, text=True)"]
-)
-def test_the_check_of_encodings_finds_what_it_looks_for(call):
-    assert without_encoding(f"with files.writing('a') as path:\n    {call}") == [call]

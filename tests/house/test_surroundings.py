@@ -1,6 +1,5 @@
-"""The suite keeps to itself: no files, no network, no side effects, nothing executed that a file holds."""
+"""The suite keeps to itself: no files, no network, no side effects."""
 
-import ast
 import os
 import pathlib
 import subprocess
@@ -73,57 +72,3 @@ def test_import_has_no_side_effect_but_registration():
     environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
     done = subprocess.run([sys.executable, "-c", IMPORT], env=environ, capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
-
-
-# Calls that execute what they are given, or read what can execute: none in the package and its tools.
-FORBIDDEN = {
-    "eval",
-    "exec",
-    "compile",
-    "__import__",
-    "pickle",
-    "cPickle",
-    "dill",
-    "joblib",
-    "marshal",
-    "shelve",
-    "yaml",
-}
-FILES = sorted([*(ROOT / "arc_suite").rglob("*.py"), *(ROOT / "tools").rglob("*.py")])
-
-
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_files_are_read_as_data(path):
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            assert not FORBIDDEN & {alias.name.split(".")[0] for alias in node.names}, ast.unparse(node)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.module.split(".")[0] not in FORBIDDEN, ast.unparse(node)
-        elif isinstance(node, ast.Call):
-            call = ast.unparse(node.func)
-            assert call not in FORBIDDEN, ast.unparse(node)
-            if call in ("np.load", "numpy.load"):
-                given = {keyword.arg: ast.unparse(keyword.value) for keyword in node.keywords}
-                assert given.get("allow_pickle") == "False", ast.unparse(node)
-            if call.split(".")[-1] in ("run", "Popen", "call", "check_output"):
-                assert "shell" not in {keyword.arg for keyword in node.keywords}, ast.unparse(node)
-        elif isinstance(node, (ast.Constant, ast.JoinedStr)):
-            # XML is built by PyMJCF, which escapes what a spec says; never by strings.
-            text = node.value if isinstance(node, ast.Constant) else ast.unparse(node)
-            assert not (isinstance(text, str) and any(tag in text for tag in ("<mujoco", "<body", "<geom", "</")))
-
-
-def test_the_check_of_files_finds_what_it_looks_for(tmp_path):
-    for text in (
-        "import pickle",
-        "from yaml import load",
-        "eval('1')",
-        "np.load('a')",
-        "np.load('a', allow_pickle=True)",
-        "subprocess.run('ls', shell=True)",
-        "x = f'<geom name={y}/>'",
-    ):
-        path = tmp_path / "bad.py"
-        path.write_text(text)
-        with pytest.raises(AssertionError):
-            test_files_are_read_as_data(path)

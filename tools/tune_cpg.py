@@ -1,4 +1,0 @@
-from arc_suite.cli.main import main
-
-if __name__ == "__main__":
-    main("tune_cpg")
