@@ -29,7 +29,7 @@ from arc_suite.cli.flags import (
 )
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
-from arc_suite.evaluation import anchors, entries
+from arc_suite.evaluation import anchors, provenance
 
 FLAGS = flags.FLAGS
 define_body()
@@ -85,7 +85,7 @@ def main() -> None:
                 header = line("robot".ljust(width), names, *heads)
                 print(header, "-" * len(header), sep="\n")
             reports[robot] = {
-                "provenance": entries.provenance(asked[robot]),
+                "provenance": provenance.of_setup(asked[robot]),
                 "preset": presets.get(robot),
                 **report(episodes, stood, experts[robot], None if known is None else anchors.of_returns(known)),
             }
@@ -94,7 +94,7 @@ def main() -> None:
             task=setup.task,
             task_kwargs=setup.task_kwargs,
             policy=chosen,
-            policy_sha256=entries.policy_sha256(chosen),
+            policy_sha256=provenance.policy_sha256(chosen),
             seed=FLAGS.seed,
             robots=reports,
             versions=versions.recorded(),

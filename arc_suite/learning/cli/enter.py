@@ -13,8 +13,7 @@ from absl import flags
 
 from arc_suite.cli.flags import define_policy, define_task, policy_name, task
 from arc_suite.cli.program import progress
-from arc_suite.evaluation import entries
-from arc_suite.learning.studies import leaderboard
+from arc_suite.learning.studies import entries, leaderboard
 
 FLAGS = flags.FLAGS
 define_policy()

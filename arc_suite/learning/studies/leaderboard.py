@@ -15,7 +15,7 @@ import numpy as np
 
 from arc_suite import files
 from arc_suite.evaluation import anchors
-from arc_suite.evaluation.entries import Entry
+from arc_suite.learning.studies.entries import Entry
 
 PAGE, TABLE, ENTRIES = "README.md", "leaderboard.csv", "entries"
 STYLE = ("gait compliance", "heading error, rad", "torso pitch, rad")

@@ -1,6 +1,5 @@
 """Entries of a leaderboard: files of `arc-suite evaluate --json`, checked by playing their episodes again."""
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -8,11 +7,10 @@ from typing import Any, NamedTuple
 
 from arc_suite import checks, files, policies, registry, versions
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import protocol
+from arc_suite.evaluation import protocol, provenance
 from arc_suite.evaluation.protocol import EPISODES
 
 _MAX_BYTES = 1 << 20
-_OF_SETUP = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "model_sha256")
 
 
 class Entry(NamedTuple):
@@ -31,18 +29,6 @@ class Entry(NamedTuple):
     preset: str | None
     policy_sha256: str | None
     episodes: list[protocol.EpisodeResult]
-
-
-def provenance(setup: Setup) -> dict[str, Any]:
-    """Return, JSON-able, what a setup's results depend on: names, settings, and hashes of body, model and task."""
-    settings = repr(setup.definition.settings)
-    known = setup.provenance() | {"task_sha256": hashlib.sha256(settings.encode()).hexdigest()}
-    return {name: known[name] for name in _OF_SETUP}
-
-
-def policy_sha256(policy: str) -> str | None:
-    """Return the hash of a policy's files; None for one without files, such as a demonstrator."""
-    return policies.digest(policy) if policies.is_file(policy) or policy.endswith(".npz") else None
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -85,7 +71,7 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
     name = found["policy"] if policy is None else policy
     if policy is None and name not in policies.POLICIES:
         raise ValueError(f"{path}: policy {checks.quoted(name)!r}: expected --policy with its file, got none")
-    _same(path, "policy_sha256", found["policy_sha256"], policy_sha256(name))
+    _same(path, "policy_sha256", found["policy_sha256"], provenance.policy_sha256(name))
     if found["policy_sha256"] is None:  # files may lie elsewhere; without them the name alone tells policies apart
         _same(path, "policy", found["policy"], name)
     if found["seed"] != 0:
@@ -94,9 +80,9 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
     if not found["robots"]:
         raise ValueError(f"{path}: expected robots, got none")
     for report in found["robots"].values():
-        told = report["provenance"]
+        stated = report["provenance"]
         try:
-            setup, preset = Setup.from_dict(told), report.get("preset")
+            setup, preset = Setup.from_dict(stated), report.get("preset")
             if preset is not None:
                 checks.name(checks.quoted(preset), policies.preset_names(), "preset")
         except (ValueError, registry.NotImported) as error:
@@ -104,9 +90,9 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
         totals = _totals(report)
         if len(totals) != EPISODES:
             raise ValueError(f"{path}: expected {EPISODES} episodes of {setup.body.name}, got {len(totals)}")
-        known = provenance(setup)
-        for field in _OF_SETUP:
-            _same(path, field, told.get(field), known[field])
+        known = provenance.of_setup(setup)
+        for field in provenance.FIELDS:
+            _same(path, field, stated.get(field), known[field])
         environment = setup.load()
         player = policies.policy(name, setup.body, preset, task=environment.task.definition)
         episodes = protocol.episodes(environment, player, progress(range(EPISODES)))
