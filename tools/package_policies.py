@@ -5,9 +5,6 @@ Example:
   python tools/package_policies.py runs/varied.0-511-steer-dagger_bodies-0
 """
 
-import dataclasses
-import json
-import shlex
 from pathlib import Path
 
 import numpy as np
@@ -23,17 +20,9 @@ INDEX = PACKAGED / "policies.json"
 
 
 def command(run: configuration.Configuration) -> str:
-    """Return the command that trains a policy again, without what are defaults."""
-    defaults = dataclasses.asdict(run.definition.hyperparameters.__class__())
-    values = dataclasses.asdict(run.hyperparameters)
-    hyperparameters = {name: value for name, value in values.items() if value != defaults[name]}
-    flags = [f"--robot={run.setup.robot}", f"--task={run.setup.task}", f"--algorithm={run.algorithm}"]
-    flags += [f"--steps={run.steps}", f"--seed={run.seed}", f"--evaluate_every={run.evaluate_every}"]
-    flags += [f"--hp={name}={value}" for name, value in hyperparameters.items()]
-    flags += [f"--set={name}={json.dumps(value)}" for name, value in run.setup.task_kwargs.items()]
-    trained = shlex.join(["arc-suite", "train", *flags])
-    start = Path(hyperparameters.get("start", ""), run_folder.CONFIG)
-    return f"{command(configuration.read(start))} -o {start.parent} && {trained}" if start.exists() else trained
+    """Return the command that trains a policy again, after that of the run from which it starts."""
+    start = Path(getattr(run.hyperparameters, "start", ""), run_folder.CONFIG)
+    return f"{command(configuration.read(start))} -o {start.parent} && {run.command}" if start.exists() else run.command
 
 
 def returns(path: Path) -> list[float]:

@@ -1,14 +1,13 @@
 """Committed returns as tables: of standing, demonstrators and learners."""
 
-import csv
 import itertools
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.evaluation.published import DEMONSTRATORS, FINALS
+from arc_suite.learning.studies import csv_files, leaderboard
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.policies.network import PACKAGED
 from arc_suite.robots import ROBOTS
@@ -35,20 +34,9 @@ def _anchors(setup: Setup, known: anchors.Returns) -> tuple[str, str, str, str]:
 def learners(robots=tuple(ROBOTS), tasks=tuple(TASKS)) -> str:
     """Return the table of learners in committed studies; empty where there are none."""
     places = {str(Setup.of(robot, task)) for task in tasks for robot in robots}
-    lines = [line for line in _learners() if line["robot, task"] in places]
-    lines.sort(key=lambda line: (line["robot, task"], -float(line["return"])))
+    rows = leaderboard.ranked(csv_files.read(ROOT / "studies" / leaderboard.TABLE, leaderboard.HEADS))
+    lines = [row | {"study": leaderboard.link(row, "../../studies/")} for row in rows if row["robot, task"] in places]
     return table(_LEARNER_HEADS, ([line[head] for head in _LEARNER_HEADS] for line in lines)) if lines else ""
-
-
-def _learners() -> Iterator[dict[str, str]]:
-    """The rows of all studies, each configuration once, with links from a page in a folder of docs/."""
-    seen = set()
-    for path in sorted(ROOT.glob("studies/*/leaderboard.csv")):
-        with path.open(newline="", encoding="utf-8") as file:
-            for line in csv.DictReader(file):
-                if line["configuration"] not in seen:
-                    seen.add(line["configuration"])
-                    yield line | {"study": line["study"].replace("](", "](../../studies/")}
 
 
 def published(robot: str) -> str:

@@ -1,6 +1,8 @@
 """Configurations of runs: one value, read and written as JSON, from the flags or a study to the training."""
 
 import dataclasses
+import json
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -10,6 +12,9 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.learner import MOST_SEEDS
 
+# Names in the file of a configuration.
+_OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior")
+CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
 # Names in the record of a run that follow from its configuration, the data and the installed packages.
 PRIOR_SHA256 = "prior_sha256"
 PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", PRIOR_SHA256, "versions")
@@ -81,6 +86,17 @@ class Configuration:
         """Name of the run's folder, if no other is given."""
         return f"{self.setup.name}-{self.setup.kind.name}-{self.algorithm}-{self.seed}".replace(":", ".")
 
+    @property
+    def command(self) -> str:
+        """Command line that trains the same policy; hyperparameters that are the algorithm's own are left out."""
+        usual = dataclasses.asdict(algorithms.algorithm(self.algorithm).hyperparameters)
+        changed = {n: v for n, v in dataclasses.asdict(self.hyperparameters).items() if v != usual[n]}
+        names = ("task", "algorithm", "steps", "seed", "evaluate_every", *["prior"] * (self.prior is not None))
+        flags = [f"--{name}={getattr(self.setup if name == 'task' else self, name)}" for name in names]
+        for flag, values in (("set", self.setup.task_kwargs), ("hp", changed)):
+            flags += [f"--{flag}={n}={v if isinstance(v, str) else json.dumps(v)}" for n, v in values.items()]
+        return shlex.join(["arc-suite", "train", f"--robot={self.setup.robot}", *flags])
+
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as files hold it, JSON-able."""
         own = {"algorithm": self.algorithm, "hyperparameters": dataclasses.asdict(self.hyperparameters)}
@@ -98,14 +114,13 @@ class Configuration:
             ValueError: an unknown field, or a value that does not fit.
             OSError: the file of a body cannot be read.
         """
-        own = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior")
         for name in fields:
-            checks.name(name, ("robot", "task", "task_kwargs", *own, *PROVENANCE), "field of a configuration")
+            checks.name(name, (*CONFIGURATION, *PROVENANCE), "field of a configuration")
         if "robot" not in fields:
             raise ValueError("expected a robot, got none")
         checks.mapping("hyperparameters", fields.get("hyperparameters"))
         setup = Setup.of(fields["robot"], fields.get("task", "walk"), fields.get("task_kwargs"))
-        return cls.of(setup, **{name: fields[name] for name in own if name in fields})
+        return cls.of(setup, **{name: fields[name] for name in _OWN if name in fields})
 
     def record(self) -> dict[str, Any]:
         """Return, JSON-able, `to_dict` with hashes and versions of all that computes.

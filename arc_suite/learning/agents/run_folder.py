@@ -161,8 +161,8 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
             )
 
 
-def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
-    """Return a table of a run's folder: columns by name, none before the first line.
+def lines(path: str | os.PathLike, name: str) -> list[dict[str, str]]:
+    """Return the lines of a table of a run's folder as text by column; none where there is no table.
 
     A line that is still being written is left out.
 
@@ -172,13 +172,23 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
     path = Path(path) / f"{name}.csv"
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else ""
-        header, *lines = text[: text.rfind("\n") + 1].splitlines() or [""]
-        if not lines:
-            return {}
-        columns = np.array([line.split(",") for line in lines], float).T
-        return dict(zip(header.split(","), columns, strict=True))
+        header, *others = text[: text.rfind("\n") + 1].splitlines() or [""]
+        return [dict(zip(header.split(","), line.split(","), strict=True)) for line in others]
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: no table of a run: {checks.quoted(error)}") from None
+
+
+def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
+    """Return a table of a run's folder: columns by name, none before the first line; see `lines`.
+
+    Raises:
+        ValueError: a damaged table.
+    """
+    found = lines(path, name)
+    try:
+        return {column: np.array([line[column] for line in found], float) for column in (found or [{}])[0]}
+    except ValueError as error:
+        raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quoted(error)}") from None
 
 
 def is_begun(path: str | os.PathLike) -> bool:

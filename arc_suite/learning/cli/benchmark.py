@@ -17,10 +17,10 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks, files
+from arc_suite import checks
 from arc_suite.cli.program import marked_page, progress
 from arc_suite.envs.vector import usable_cores
-from arc_suite.learning.studies import benchmark, leaderboard, report, results, runner, tables
+from arc_suite.learning.studies import benchmark, leaderboard, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
 
 FLAGS = flags.FLAGS
@@ -54,15 +54,16 @@ def learned(division: str, places: list[str]) -> int:
     Raises:
         ValueError: an algorithm that the division does not take.
     """
-    study = tables.benchmark(division, FLAGS.algorithm)
-    name = f"{division}-{tables.folder_name(FLAGS.algorithm)}"
+    study, learner = tables.benchmark(division, FLAGS.algorithm), tables.folder_name(FLAGS.algorithm)
+    name = f"{division}-{learner}"
     runs = [each for each in study.runs if _is_asked(each, places)]
     folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
-    states = runner.make_and_show(runs, folder, published, FLAGS.jobs or usable_cores(), progress)
+    status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
+    publication.publish(study.runs, folder, published)
     if found := results.results(study.runs, published):
         print(report.write(name, study, published))
-        benchmark.write(published, benchmark.of_results(found))
-    return int(any(each.word == "failed" for each in states))
+        benchmark.write(published.parent, division, learner, benchmark.of_results(found))
+    return status
 
 
 def scored(division: str) -> int:
@@ -76,7 +77,7 @@ def scored(division: str) -> int:
     policies = Path(FLAGS.policies)
     name = leaderboard.checked_name(FLAGS.name or policies.resolve().name)
     scores = benchmark.of_policies(policies, progress)
-    benchmark.write(files.folder(Path(FLAGS.results, f"{division}-{name}")), scores)
+    benchmark.write(Path(FLAGS.results), division, name, scores)
     return 0
 
 

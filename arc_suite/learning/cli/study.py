@@ -1,8 +1,8 @@
 """Make the runs of a study, or write its report.
 
 A study is a table of runs: robots, tasks, algorithms, seeds, steps. Each run is a process of one thread. Finished
-runs are skipped, and the others resume. Results of finished runs are copied into a folder that is small enough to be
-committed, and the report is made from that folder alone.
+runs are skipped, and the others resume. Configurations, episodes, times and style of all runs become two tables, which
+are small enough to be committed, and the report is made from these tables alone.
 
   arc-suite study first-steps
   arc-suite study first-steps --report
@@ -45,7 +45,7 @@ def main(name: str | None = None) -> int:
     folder = Path(FLAGS.runs or Path("runs", tables.folder_name(name)))
     results = Path(FLAGS.results or Path("studies", tables.folder_name(name)))
     if FLAGS.report:
-        publication.publish_all(runs, folder, results)
+        publication.publish(study.runs, folder, results)
         print(report.write(name, study, results))
         return 0
     if FLAGS.jobs is not None and FLAGS.submit is not None:
@@ -54,8 +54,9 @@ def main(name: str | None = None) -> int:
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(name, min(FLAGS.submit, len(runs)), folder, results)
-    states = runner.make_and_show(runs, folder, results, FLAGS.jobs or usable_cores(), progress)
-    return int(any(each.word == "failed" for each in states))
+    status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
+    publication.publish(study.runs, folder, results)
+    return status
 
 
 def submit(name: str, jobs: int, folder: Path, results: Path) -> int:

@@ -6,10 +6,10 @@ rule of arc-suite survey. Families: random and varied, 50 bodies of seeds that n
 motors sized anew; 20 mutants of them; and 10 random bodies a quarter, and ten times, as large.
 
   arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
-  arc-suite transfer --policy universal --task steer --families varied,robots -o steer.csv
+  arc-suite transfer --policy universal --task steer --families varied,robots -o bodies.csv
   arc-suite transfer --page docs/any_body.md
 
-With --page nothing is played: the tables of episodes in studies/bodies become the table of a page.
+With --page nothing is played: the episodes in studies/bodies.csv become the table of a page.
 """
 
 from pathlib import Path
@@ -28,10 +28,11 @@ FLAGS = flags.FLAGS
 define_task()
 flags.DEFINE_string("policy", "universal", "Folder of a run of many bodies, a policy file, or universal.")
 flags.DEFINE_list("families", list(transfer.FAMILIES), "Families to play with.")
-flags.DEFINE_string("output", None, "File to write every episode to, as CSV.", short_name="o")
+flags.DEFINE_string("output", None, "Table to add every episode to, CSV; those of before are replaced.", short_name="o")
+flags.DEFINE_string("name", None, "Of the policy in this table. [default: the stem of its path]")
 
 flags.DEFINE_string("page", None, "Page to write a table into, between the lines <!-- table --> and <!-- end -->.")
-flags.DEFINE_string("results", "studies/bodies", "Folder of the tables of episodes for --page.")
+flags.DEFINE_string("results", "studies/bodies.csv", "Table of episodes for --page.")
 
 
 def main() -> None:
@@ -51,4 +52,4 @@ def main() -> None:
         print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in transfer.result(played)), flush=True)
         every[family] = played
     if FLAGS.output:
-        bodies.write(Path(FLAGS.output), every)
+        bodies.write(Path(FLAGS.output), FLAGS.name or Path(FLAGS.policy).stem, name, every)

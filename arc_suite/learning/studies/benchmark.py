@@ -1,11 +1,8 @@
 """The benchmark: scores of runs on its divisions, see `divisions`, and of policies of other libraries.
 
-studies/<division>-<learner>/scores.csv    a line for each run, by `write`
-
-The table of all learners is made from these files alone.
+studies/scores.csv holds a row for each run, by `write`. The table of all learners is made from this file alone.
 """
 
-import csv
 import difflib
 import itertools
 import os
@@ -18,7 +15,7 @@ import numpy as np
 from arc_suite import checks, evaluation, files, policies, style
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
-from arc_suite.learning.studies import results
+from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.studies.results import Result
@@ -58,6 +55,9 @@ class Score(NamedTuple):
     minutes: float
     gait_compliance: float
     heading_error: float
+
+
+COLUMNS = ("division", "learner", *Score._fields)  # of `SCORES`
 
 
 def of_results(found: Iterable[Result]) -> list[Score]:
@@ -138,47 +138,48 @@ def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
     return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup))
 
 
-def write(folder: Path, scores: Sequence[Score]) -> None:
-    """Write the scores of a learner on a division into its folder.
+def write(studies: Path, division: str, learner: str, scores: Iterable[Score]) -> None:
+    """Replace the scores of a learner in a division.
 
     Raises:
-        OSError: the file cannot be written.
+        ValueError: a damaged table of scores.
+        OSError: it cannot be written.
     """
-    with files.writing(folder / SCORES) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([Score._fields, *scores])
+    owner = {"division": division, "learner": learner}
+    others = [row for row in csv_files.read(studies / SCORES, COLUMNS) if not owner.items() <= row.items()]
+    csv_files.write(studies / SCORES, COLUMNS, [*others, *(owner | each._asdict() for each in scores)])
 
 
-def read(path: Path) -> list[Score]:
-    """Return the scores of a file.
+def read(studies: Path) -> dict[tuple[str, str], list[Score]]:
+    """Return the scores in a folder of studies by division and learner.
 
     Raises:
-        ValueError: a damaged file.
+        ValueError: a damaged table.
         OSError: it cannot be read.
     """
-    with path.open(newline="", encoding="utf-8") as file:
-        heads, *lines = csv.reader(file)
-    if tuple(heads) != Score._fields or any(len(line) != len(Score._fields) for line in lines):
-        raise ValueError(f"{path}: expected lines of {', '.join(Score._fields)}")
-    return [Score(robot, task, int(seed), *map(float, others)) for robot, task, seed, *others in lines]
+    found: dict[tuple[str, str], list[Score]] = {}
+    for row in csv_files.read(studies / SCORES, COLUMNS):
+        division, learner, robot, task, seed, *others = row.values()
+        checks.name(division, DIVISIONS, "division")
+        found.setdefault((division, learner), []).append(Score(robot, task, int(seed), *map(float, others)))
+    return found
 
 
 def text(studies: Path) -> str:
     """Return the table of the benchmark in Markdown: all learners in a folder of studies, by division and score.
 
     Raises:
-        ValueError: no scores, a damaged file of them, or a folder of a name that begins with no division.
-        OSError: a file cannot be read.
+        ValueError: no scores, or a damaged table of them.
+        OSError: the table cannot be read.
     """
     lines = []
-    for path in studies.glob(f"*/{SCORES}"):
-        division, _, learner = path.parent.name.partition("-")
-        order = tuple(DIVISIONS).index(checks.name(division, DIVISIONS, "division"))
-        if scores := read(path):
-            groups = _by_place(scores)
-            middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
-            lines.append((order, not all(groups), -middle, division, learner, *_cells(groups)))
+    for (division, learner), scores in read(studies).items():
+        groups = _by_place(scores)
+        middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
+        order = tuple(DIVISIONS).index(division), not all(groups), -middle
+        lines.append((*order, division, learner, *_cells(groups)))
     if not lines:
-        raise ValueError(f"{studies}: holds no scores of the benchmark; run one, or name its folder by --results")
+        raise ValueError(f"{studies}: no scores of the benchmark; run a division, or name another folder by --results")
     places = [" ".join(each) for each in PLACES]
     heads = ["division", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
     return table(heads, [line[3:] for line in sorted(lines)])

@@ -1,20 +1,20 @@
-"""The leaderboard: rows of studies and of entries, each in a table of its own folder, and one page of all.
+"""The leaderboard: a table of all studies and entries, and its page.
 
-studies/<study>/leaderboard.csv     rows of a study, by `report.write`
-studies/entries/leaderboard.csv     rows of entries, by `enter`; next to it the entries themselves
-studies/README.md                   the page
+studies/leaderboard.csv     rows of studies, by `report.write`, and of entries, by `enter`
+studies/entries             the entries
+studies/README.md           the page
 """
 
-import csv
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from arc_suite import files
 from arc_suite.evaluation import anchors
+from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.entries import Entry
 
 PAGE, TABLE, ENTRIES = "README.md", "leaderboard.csv", "entries"
@@ -34,30 +34,49 @@ _TEXT = (
 )
 
 
-def write(folder: Path, lines: Sequence[Sequence[str]]) -> None:
-    """Write the rows of a folder, and the page of all rows one folder above.
+def write(studies: Path, study: str, lines: Iterable[dict[str, str]]) -> None:
+    """Replace the lines of a study, and write the page.
 
     Args:
-        folder: of a study, or of entries.
+        studies: folder of the leaderboard.
+        study: its name.
         lines: cells by `HEADS`.
 
     Raises:
-        ValueError: a damaged table of rows.
+        ValueError: a damaged table.
         OSError: a file cannot be written.
     """
-    with files.writing(folder / TABLE) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows([HEADS, *lines])
-    every = [row for path in sorted(folder.parent.glob(f"*/{TABLE}")) for row in _rows(path)]
-    once: dict[str, dict[str, str]] = {}
-    for row in (dict(zip(HEADS, cells, strict=True)) for cells in every):
-        known = once.get(row["configuration"])
-        if known is None or int(row["seeds"]) > int(known["seeds"]):
-            once[row["configuration"]] = row
-    shown = sorted(once.values(), key=lambda row: (row["robot, task"], -float(row["return"])))
-    heads = HEADS[:-1]  # the configuration is for this choice alone
-    page = table(heads, [[row[head] for head in heads] for row in shown])
-    with files.writing(folder.parent / PAGE) as temporary:
+    _write(studies, [*(line for line in _lines(studies) if line["study"] != study), *lines])
+
+
+def _lines(studies: Path) -> list[dict[str, str]]:
+    return csv_files.read(studies / TABLE, HEADS)
+
+
+def _write(studies: Path, lines: Iterable[dict[str, str]]) -> None:
+    lines = sorted(lines, key=lambda line: line["study"].partition("/")[0])
+    csv_files.write(studies / TABLE, HEADS, lines)
+    linked = [line | {"study": link(line)} for line in ranked(lines)]
+    heads = HEADS[:-1]  # the configuration only tells lines apart
+    page = table(heads, [[line[head] for head in heads] for line in linked])
+    with files.writing(studies / PAGE) as temporary:
         temporary.write_text(f"# Leaderboard\n\n{_TEXT}\n\n{page}\n", encoding="utf-8")
+
+
+def ranked(lines: Iterable[dict[str, str]]) -> list[dict[str, str]]:
+    """Return each configuration once, with the most seeds, by robot and task, and then by return."""
+    once: dict[str, dict[str, str]] = {}
+    for line in lines:
+        known = once.get(line["configuration"])
+        if known is None or int(line["seeds"]) > int(known["seeds"]):
+            once[line["configuration"]] = line
+    return sorted(once.values(), key=lambda line: (line["robot, task"], -float(line["return"])))
+
+
+def link(line: Mapping[str, str], folder: str = "") -> str:
+    """Return the link from a page to the report of a line, or to its entry; `folder` is the way to the studies."""
+    study = line["study"]
+    return f"[entry]({folder}{study})" if study.startswith(f"{ENTRIES}/") else f"[{study}]({folder}{study}/{PAGE})"
 
 
 def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> Path:
@@ -77,7 +96,7 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
     """
     checked_name(name)
     folder = files.folder(studies / ENTRIES)
-    rows = {(row[0], row[1]): row for row in (_rows(folder / TABLE) if (folder / TABLE).exists() else ())}
+    lines: dict[str, dict[str, str]] = {}
     for entry in entries:
         place = str(entry.setup)
         copied = folder / f"{entry.setup.body.name}-{entry.setup.kind.name}-{name}.json"
@@ -88,7 +107,7 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
         figures = {key: np.mean([each.progress[key] for each in entry.episodes]) for key in entry.episodes[0].progress}
         figure = next(iter(figures))
         compliance = f"{figures['gait_compliance']:.3f}" if "gait_compliance" in figures else "-"
-        cells = dict.fromkeys(HEADS, "-") | {
+        lines[copied.name] = dict.fromkeys(HEADS, "-") | {
             "robot, task": place,
             "algorithm": name,
             "seeds": "1",
@@ -96,12 +115,12 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
             "score": f"{score:z.2f}" if np.isfinite(score) else "-",
             "metric": f"{figure} {figures[figure]:.3f}",
             STYLE[0]: compliance,
-            "study": f"[entry]({ENTRIES}/{copied.name})",
+            "study": f"{ENTRIES}/{copied.name}",
             "command of seed 0": _command(entry),
             "configuration": copied.name,
         }
-        rows[place, name] = list(cells.values())
-    write(folder, list(rows.values()))
+    others = [line for line in _lines(studies) if line["configuration"] not in lines]
+    _write(studies, [*others, *lines.values()])
     return studies / PAGE
 
 
@@ -127,11 +146,3 @@ def _command(entry: Entry) -> str:
     words = ["arc-suite evaluate", f"--robot={setup.body.name}", f"--task={setup.task}", f"--policy={entry.policy}"]
     settings += [f"--preset={entry.preset}"] * (entry.preset is not None)
     return f"`{' '.join([*words, *settings])}`"
-
-
-def _rows(path: Path) -> list[list[str]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        heads, *rows = csv.reader(file)
-    if tuple(heads) != HEADS or any(len(row) != len(HEADS) for row in rows):
-        raise ValueError(f"{path}: expected rows of {', '.join(HEADS)}")
-    return rows

@@ -1,25 +1,21 @@
-"""Publication: copies the results of runs that are committed, with the style of their latest policies."""
+"""Publication: the tables of a study from the folders of its runs, with the style of their latest policies."""
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from arc_suite import evaluation, files, policies, style
 from arc_suite.cpg.selection import presets_of
-from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning.agents import run_folder
-from arc_suite.learning.agents.run_folder import table
-from arc_suite.learning.studies import results
+from arc_suite.learning.studies import csv_files, results
+from arc_suite.learning.studies.results import RUN_COLUMNS, STYLE, TIMES
 from arc_suite.learning.studies.tables import Run
-from arc_suite.policies import Policy, checkpoints, network
-from arc_suite.simulation.opengl import RenderingUnavailable
-from arc_suite.style import strips
-
-PUBLISHED = (run_folder.CONFIG, "evaluations.csv", "times.csv")
+from arc_suite.policies import checkpoints, network
 
 # Metrics of `arc_suite.style` by which the final policies are compared.
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
@@ -27,72 +23,109 @@ METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "
 # Presets of demonstrators whose returns are published, in `walk`, and in tasks with a command; and the best one.
 PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
 
+_EPISODE = ("run", "step", "seed", "return", "length")  # first columns of an episode
+_STYLE = tuple(STYLE + name for name in METRICS)
 
-def publish(run: Run, folder: Path, published: Path) -> None:
-    """Copy the tables of a run that has been evaluated, and measure and draw the style of its latest policy.
 
-    Existing style and strip of the same policy stay. Without OpenGL no strip is drawn.
+def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
+    """Write the tables of all evaluated runs of a study, and the returns of standing still and of demonstrators.
+
+    Rows of runs that have no folder stay.
 
     Args:
-        run: of the study.
+        runs: of the study.
         folder: of the study, with a folder for each run.
-        published: folder of the copies, with a folder for each run.
+        published: folder of the tables.
 
     Raises:
+        ValueError: a damaged table.
         OSError: a file cannot be written.
     """
-    source, target = folder / run.name, published / run.name
-    steps = results.evaluated(table(source, "evaluations"))
-    if not len(steps):
-        return
-    files.folder(target)
-    config = target / run_folder.CONFIG
-    if config.exists() and config.read_bytes() != (source / run_folder.CONFIG).read_bytes():
-        (target / "style.csv").unlink(missing_ok=True)  # of another run
-    for name in PUBLISHED:
-        with files.writing(target / name) as temporary:
-            temporary.write_bytes((source / name).read_bytes())
-    training = table(source, "training")
-    if np.any(training.get("phase_updates", 0)):
-        with files.writing(target / "phases.csv") as temporary:
-            temporary.write_text(_phases(training), encoding="utf-8")
-    step = int(steps[-1])
-    measured, drawn = table(target, "style"), target / results.STRIP
-    up_to_date = bool(measured) and measured["step"][-1] == step
-    if not up_to_date:
-        drawn.unlink(missing_ok=True)  # before the style is written: then both are of the same policy
-    if not drawn.exists():
-        with contextlib.suppress(RenderingUnavailable), _played(run, source, step) as (environment, policy):
-            if (picture := strips.strip(environment, policy)) is not None:
-                with files.writing(drawn) as temporary:
-                    strips.write(temporary, picture)
-    if not up_to_date:
-        text = _style(run, source, step)  # slow; a kill meanwhile leaves no temporary file
-        with files.writing(target / "style.csv") as temporary:
-            temporary.write_text(text, encoding="utf-8")
-
-
-def _phases(training: Mapping[str, np.ndarray]) -> str:
-    """Return a table of the updates of stabilisation phases by environment step."""
-    pairs = zip(training["step"].astype(int), training["phase_updates"].astype(int), strict=True)
-    return "\n".join(["step,updates", *(f"{step},{updates}" for step, updates in pairs if updates)]) + "\n"
-
-
-def publish_all(runs: Sequence[Run], folder: Path, published: Path) -> None:
-    """Publish all evaluated runs of a study, and what standing still and demonstrators earn in the same tasks.
-
-    Raises:
-        OSError: a file cannot be written.
-    """
+    configurations = {row["run"]: row for row in csv_files.read(published / results.RUNS, RUN_COLUMNS)}
+    episodes = results.episodes_of(published)
     for run in runs:
-        publish(run, folder, published)
+        if found := _evaluated(folder / run.name):
+            configurations[run.name] = _configuration(run, folder / run.name)
+            episodes[run.name] = _with_style(run, folder / run.name, found)
+    names = [run.name for run in runs if run.name in episodes]
+    if not names:
+        return
+    fixed = {*_EPISODE, *TIMES, *_STYLE}
+    progress = _merged([name for name in episodes[each][0] if name not in fixed] for each in names)
+    rows = [row for name in names for row in episodes[name]]
+    csv_files.write(published / results.EVALUATIONS, (*_EPISODE, *progress, *TIMES, *_STYLE), rows)
+    csv_files.write(published / results.RUNS, RUN_COLUMNS, [configurations[name] for name in names])
+    _publish_demonstrators(runs, published)
+
+
+def _evaluated(folder: Path) -> list[dict[str, str]]:
+    """Return the rows of the whole evaluations in the folder of a run, with their times."""
+    rows = run_folder.lines(folder, "evaluations")
+    times = {row.pop("step"): row for row in run_folder.lines(folder, "times")}
+    counts = Counter(row["step"] for row in rows)
+    whole = {step for step, count in counts.items() if count == evaluation.EPISODES and step in times}
+    return [{"run": folder.name, **row, **times[row["step"]]} for row in rows if row["step"] in whole]
+
+
+def _configuration(run: Run, folder: Path) -> dict[str, str]:
+    """Return the row of a run in the table of runs."""
+    training = run_folder.lines(folder, "training")
+    phases = {row["step"]: int(float(row["phase_updates"])) for row in training if float(row.get("phase_updates", 0))}
+    fields = {"run": run.name, "kind": run.kind, **run_folder.config_of(folder), "phases": phases or None}
+    return {name: cell(value) for name, value in fields.items()}
+
+
+def cell(value: Any) -> str:
+    """Return a field of a configuration as a table holds it: text as it is, nothing for None, else JSON."""
+    return "" if value is None else value if isinstance(value, str) else json.dumps(value)
+
+
+def _merged(orders: Iterable[Sequence[str]]) -> list[str]:
+    """Return the names of all sequences, each before those that follow it in its sequence."""
+    found: list[str] = []
+    for names in orders:
+        place = len(found)
+        for name in reversed(names):
+            if name in found:
+                place = found.index(name)
+            else:
+                found.insert(place, name)
+    return found
+
+
+def _with_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Return rows of episodes, those of the latest evaluation with metrics of style, which the folder keeps."""
+    latest = rows[-1]["step"]
+    measured = run_folder.lines(folder, "style")
+    if not measured or measured[-1]["step"] != latest:
+        _measure(run, folder, latest)
+        measured = run_folder.lines(folder, "style")
+    metrics = {
+        row["seed"]: {STYLE + name: row[name] for name in row if name not in ("step", "seed")} for row in measured
+    }
+    return [row | metrics[row["seed"]] if row["step"] == latest else row for row in rows]
+
+
+def _measure(run: Run, folder: Path, step: str) -> None:
+    """Write a table of the style of the policy at a step, as a later one may exist already; slow."""
+    path, setup = folder / checkpoints.FOLDER / step / network.FILE, run.configuration.validation
+    lines = []
+    with contextlib.closing(setup.load()) as environment:
+        policy = policies.policy(path, setup.body, task=environment.task.definition)
+        for seed in range(evaluation.EPISODES):
+            measured = style.measure(style.record(environment, policy, seed))
+            metrics = {name: repr(measured[name].value) for name in METRICS if name in measured}
+            lines.append({"step": step, "seed": seed} | metrics)
+    csv_files.write(folder / "style.csv", list(lines[0]), lines)
+
+
+def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:
     known = results.demonstrators(published)
     setups = {run.place: run.configuration.validation for run in runs}
-    if setups.keys() <= known.keys() or not published.exists():
-        return
     measured = {place: _demonstrated(setup) for place, setup in setups.items() if place not in known}
-    with files.writing(published / results.DEMONSTRATORS) as temporary:
-        anchors.write(temporary, known | measured)
+    if measured:
+        with files.writing(published / results.DEMONSTRATORS) as temporary:
+            anchors.write(temporary, known | measured)
 
 
 def _demonstrated(setup: Setup) -> anchors.Returns:
@@ -101,22 +134,3 @@ def _demonstrated(setup: Setup) -> anchors.Returns:
     usual = COMMANDED if "command" in setup.definition.blocks else PRESETS
     missing = [preset for preset in usual if preset in presets_of(setup.body) and preset not in found]
     return found | {preset: anchors.played(setup, preset) for preset in missing}
-
-
-@contextlib.contextmanager
-def _played(run: Run, folder: Path, step: int) -> Iterator[tuple[Environment, Policy]]:
-    """Open the environment of a run, and its policy at a step, as a later one may exist already."""
-    path, setup = folder / checkpoints.FOLDER / str(step) / network.FILE, run.configuration.validation
-    with contextlib.closing(setup.load()) as environment:
-        yield environment, policies.policy(path, setup.body, task=environment.task.definition)
-
-
-def _style(run: Run, folder: Path, step: int) -> str:
-    """Return a table of the metrics of the episodes of the evaluation protocol."""
-    lines = []
-    with _played(run, folder, step) as (environment, policy):
-        for seed in range(evaluation.EPISODES):
-            measured = style.measure(style.record(environment, policy, seed))
-            metrics = {name: measured[name].value for name in METRICS if name in measured}
-            lines.append(",".join(map(repr, (step, seed, *metrics.values()))))
-    return "\n".join([",".join(("step", "seed", *metrics)), *lines]) + "\n"

@@ -3,19 +3,17 @@
 import hashlib
 import itertools
 import json
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from arc_suite import checks, evaluation, files
+from arc_suite import evaluation, files
 from arc_suite.evaluation import anchors
 from arc_suite.evaluation.published import FINALS as PAPER
-from arc_suite.learning.agents import run_folder
-from arc_suite.learning.studies import claims, leaderboard, results, tables
+from arc_suite.learning.studies import claims, leaderboard, results
 from arc_suite.learning.studies.leaderboard import table
-from arc_suite.learning.studies.results import STRIP, Result
+from arc_suite.learning.studies.results import Result
 from arc_suite.learning.studies.tables import Run, Study
 
 REPORT, CURVES = "README.md", "curves.png"
@@ -49,14 +47,14 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups, demonstrators)],
         **({"Probability of improvement": [_IMPROVEMENT, compared]} if (compared := _improvements(groups)) else {}),
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
-        "Style": [_STYLE, _style(groups), *_strips(name, groups, published)],
+        "Style": [_STYLE, _style(groups)],
         **({"Claims of the paper": [claims.TEXT, claims.checked(found)]} if any(map(claims.is_papers, found)) else {}),
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
     with files.writing(published / REPORT) as temporary:
         temporary.write_text(_page(sections), encoding="utf-8")
-    leaderboard.write(published, _rows(published.name, groups, demonstrators))
+    leaderboard.write(published.parent, published.name, _rows(published.name, groups, demonstrators))
     return published / REPORT
 
 
@@ -86,11 +84,6 @@ _STYLE = (
     "Mean size over ten episodes of the latest policy of each seed; `pydoc arc_suite.style.metrics` explains each. "
     "Heading and drift are relative to the x axis, which is not the direction of a command that turns."
 )
-_STRIPS = (
-    "Frames of the latest policy in the episode of seed 0, at equal phases of one gait cycle. It is the fifth cycle, "
-    "or the latest whole one before a fall. The camera moves along and keeps its direction; in tasks with a command it "
-    "looks straight ahead. The command line makes a page that plays the policy."
-)
 
 
 def _page(sections: Mapping[str, Sequence[str]]) -> str:
@@ -109,8 +102,9 @@ def _reached(found: Sequence[Result]) -> str:
     for each in found:
         run, configuration = each.run, each.run.configuration
         reached = f"{each.steps[-1]:,} of {configuration.steps:,}"
-        lines.append((run.place, run.kind, str(configuration.seed), reached, f"{each.cpu[-1] / 60.0:.1f}"))
-    return table(("robot, task", "algorithm", "seed", "steps", "CPU min"), lines)
+        minutes, command = f"{each.cpu[-1] / 60.0:.1f}", f"`{configuration.command}`"
+        lines.append((run.place, run.kind, str(configuration.seed), reached, minutes, command))
+    return table(("robot, task", "algorithm", "seed", "steps", "CPU min", "command"), lines)
 
 
 def _curves(groups: Groups, demonstrators):
@@ -234,30 +228,7 @@ def _size(name: str, seeds: Sequence[Result]) -> str:
     return "-" if np.isnan(size) else f"{size:.3f}"
 
 
-def _strips(name: str, groups: Groups, published: Path) -> list[str]:
-    """Return the strips of a study as Markdown paragraphs: for each kind that of the first seed which has one."""
-    found = []
-    for place, kinds in groups.items():
-        for kind, seeds in kinds.items():
-            for run in [each.run for each in seeds if (published / each.run.name / STRIP).exists()][:1]:
-                setup, folder = run.configuration.validation, Path("runs", tables.folder_name(name), run.name)
-                command = ["arc-suite", "render", f"--robot={setup.body.name}", f"--task={setup.task}"]
-                command += [
-                    f"--policy={folder}",
-                    *map(_setting, setup.task_kwargs.items()),
-                    f"--output={run.name}.html",
-                ]
-                found.append(f"**{place}: {kind}**, seed {run.configuration.seed}: `{shlex.join(command)}`")
-                found.append(f"![{place}: {kind}]({run.name}/{STRIP})")
-    return [_STRIPS, *found] if found else []
-
-
-def _setting(item: tuple[str, object]) -> str:
-    name, value = item
-    return f"--set={name}={value if isinstance(value, str) else checks.json_text(name, value)}"
-
-
-def _rows(name: str, groups: Groups, demonstrators) -> list[tuple[str, ...]]:
+def _rows(name: str, groups: Groups, demonstrators) -> list[dict[str, str]]:
     """Return the rows of a study in the leaderboard, by `leaderboard.HEADS`."""
     rows = []
     for seeds in (seeds for kinds in groups.values() for seeds in kinds.values()):
@@ -278,11 +249,11 @@ def _rows(name: str, groups: Groups, demonstrators) -> list[tuple[str, ...]]:
             **dict(zip(leaderboard.STYLE, style, strict=True)),
             "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
             "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
-            "study": f"[{name}]({name}/{REPORT})",
-            "command of seed 0": f"`arc-suite train --config studies/{name}/{run.name}/{run_folder.CONFIG}`",
+            "study": name,
+            "command of seed 0": f"`{run.configuration.command}`",
             "configuration": _identity(run),
         }
-        rows.append(tuple(cells[head] for head in leaderboard.HEADS))
+        rows.append(cells)
     return rows
 
 

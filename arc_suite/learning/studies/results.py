@@ -1,18 +1,25 @@
 """Results of studies: the published tables of their runs, and statistics over them."""
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import evaluation
+from arc_suite import checks, evaluation
 from arc_suite.evaluation import anchors
-from arc_suite.learning.agents import run_folder
+from arc_suite.learning.agents.configuration import CONFIGURATION, PROVENANCE
+from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
 
-DEMONSTRATORS = "demonstrators.csv"
-STRIP = "strip.png"  # of a run: frames of its latest policy, see `style.strips`
+RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators.csv"
+
+# Columns of the table of runs: the configuration, then the updates of stabilisation phases by environment step.
+RUN_COLUMNS = ("run", "kind", *CONFIGURATION, *PROVENANCE, "phases")
+TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
+STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
+_OTHERS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode that are not the task's metrics
 
 
 class Result(NamedTuple):
@@ -47,28 +54,39 @@ def results(runs: Sequence[Run], published: Path) -> list[Result]:
 
     Raises:
         ValueError: a damaged table.
+        OSError: a table cannot be read.
     """
-    return [_result(run, published / run.name) for run in runs if (published / run.name / "style.csv").exists()]
+    episodes = episodes_of(published)
+    phases = {row["run"]: row["phases"] for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
+    try:
+        return [_result(run, episodes[run.name], phases[run.name]) for run in runs if run.name in episodes]
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{published / EVALUATIONS}: damaged: {checks.quoted(error)}") from None
 
 
-def evaluated(evaluations: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the steps (evaluations,) of the complete evaluations in a table."""
-    marks, counts = np.unique(evaluations.get("step", ()), return_counts=True)
-    return marks[counts == evaluation.EPISODES]
+def episodes_of(published: Path) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of the table of episodes by run, without the columns that a row leaves empty."""
+    found: dict[str, list[dict[str, str]]] = {}
+    for row in csv_files.read(published / EVALUATIONS):
+        found.setdefault(row["run"], []).append({name: text for name, text in row.items() if text})
+    return found
 
 
-def _result(run: Run, folder: Path) -> Result:
-    evaluations, times, style = (run_folder.table(folder, name) for name in ("evaluations", "times", "style"))
-    whole = evaluated(evaluations)
-    returns = np.array([evaluations["return"][evaluations["step"] == step] for step in whole])
-    last = evaluations["step"] == whole[-1]
-    progress = {
-        name: evaluations[name][last] for name in evaluations if name not in ("step", "seed", "return", "length")
-    }
-    cpu = np.array([times["cpu_seconds"][times["step"] <= step].max() for step in whole])
-    metrics = {name: style[name] for name in style if name not in ("step", "seed")}
-    phases = run_folder.table(folder, "phases").get("updates", np.empty(0))
-    return Result(run, whole.astype(int), returns, progress, cpu, metrics, phases)
+def _result(run: Run, rows: Sequence[Mapping[str, str]], phases: str) -> Result:
+    def column(name):
+        return np.array([row[name] for row in rows], float).reshape(-1, evaluation.EPISODES)
+
+    latest = rows[-evaluation.EPISODES :]
+    metrics = {name: np.array([row[name] for row in latest], float) for name in latest[0] if name not in _OTHERS}
+    return Result(
+        run=run,
+        steps=column("step")[:, 0].astype(int),
+        returns=column("return"),
+        progress={name: values for name, values in metrics.items() if not name.startswith(STYLE)},
+        cpu=column("cpu_seconds")[:, 0],
+        style={name.removeprefix(STYLE): values for name, values in metrics.items() if name.startswith(STYLE)},
+        phases=np.array(list(json.loads(phases or "{}").values())),
+    )
 
 
 def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:

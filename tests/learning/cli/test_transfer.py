@@ -23,13 +23,17 @@ def transfer(*arguments):
 
 @pytest.mark.long
 def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
-    done = transfer(f"--policy={policy}", "--families=robots", "-o", tmp_path / "table.csv")
+    done = transfer(f"--policy={policy}", "--families=robots", "-o", tmp_path / "table.csv", "--name=mine")
     assert (done.returncode, done.stderr) == (0, "")
     heads, row = (line.split() for line in done.stdout.splitlines())
     assert heads[:4] == ["family", "count", "walk", "demonstrated"] and row[:4] == ["robots", "4", "0", "1"]
     with (tmp_path / "table.csv").open() as file:
         lines = list(csv.DictReader(file))
-    assert len(lines) == 12 and {line["who"] for line in lines} == {"policy", "demonstrator", "zero"}
+    assert (
+        len(lines) == 12
+        and {(line["policy"], line["task"]) for line in lines} == {("mine", "walk")}
+        and {line["who"] for line in lines} == {"policy", "demonstrator", "zero"}
+    )
     assert all(line["walked"] == str(int(line["who"] == "demonstrator")) for line in lines)
 
 

@@ -12,8 +12,7 @@ import pytest
 
 from arc_suite import evaluation
 from arc_suite.evaluation import anchors
-from arc_suite.learning.agents import configuration, run_folder
-from arc_suite.learning.studies import benchmark, results, tables
+from arc_suite.learning.studies import benchmark, csv_files, results, tables
 from arc_suite.learning.studies.benchmark import Score
 from arc_suite.learning.studies.divisions import FAR, PLACES, SEEDS
 from arc_suite.learning.studies.results import Result
@@ -116,10 +115,10 @@ def test_the_table_says_what_was_not_run(tmp_path):
     """One seed has no interval, and a part of the places no total."""
     whole = [score(place, 0, 0.1 * index) for index, place in enumerate(PLACES)]
     again = [score(place, 1, 0.1 * index + 0.02, np.inf) for index, place in enumerate(PLACES)]
-    for name, scores in (("top-one", whole), ("samples-two", [*whole, *again]), ("samples-part", whole[2:3])):
-        (tmp_path / name).mkdir()
-        benchmark.write(tmp_path / name, scores)
-        assert benchmark.read(tmp_path / name / benchmark.SCORES) == scores
+    written = {("samples", "part"): whole[2:3], ("samples", "two"): [*whole, *again], ("top", "one"): whole}
+    for owner, scores in ((("top", "one"), again), *written.items()):  # the last replaces the first
+        benchmark.write(tmp_path, *owner, scores)
+    assert benchmark.read(tmp_path) == written
     page = benchmark.text(tmp_path)
     assert [line.split(" | ")[:2] for line in page.splitlines()[2:]] == [
         ["| top", "one"],
@@ -138,9 +137,8 @@ def test_the_table_says_what_was_not_run(tmp_path):
 def test_places_with_more_seeds_weigh_no_more(tmp_path):
     whole = [score(place, 0, 0.1 * index) for index, place in enumerate(PLACES)]
     more = [score(PLACES[-1], seed, 0.0, np.inf) for seed in (2, 1)]
-    for name, scores in (("top-once", whole), ("top-more", [*more, *whole])):
-        (tmp_path / name).mkdir()
-        benchmark.write(tmp_path / name, scores)
+    for name, scores in (("once", whole), ("more", [*more, *whole])):
+        benchmark.write(tmp_path, "top", name, scores)
     once, uneven = (row(benchmark.text(tmp_path), name) for name in ("once", "more"))
     assert uneven[3:-1] == once[3:-1]
     assert (once[2], uneven[2]) == ("1", "1 to 3")
@@ -148,9 +146,8 @@ def test_places_with_more_seeds_weigh_no_more(tmp_path):
 
 
 def test_damaged_scores_are_one_line(tmp_path):
-    (tmp_path / "top-mine").mkdir()
-    (tmp_path / "top-mine" / benchmark.SCORES).write_text("robot,task\n")
-    with pytest.raises(ValueError, match=r"scores.csv: expected lines of robot, task, seed, result, "):
+    (tmp_path / benchmark.SCORES).write_text("robot,task\n")
+    with pytest.raises(ValueError, match=r"scores.csv: expected lines of division, learner, robot, task, "):
         benchmark.text(tmp_path)
 
 
@@ -169,8 +166,8 @@ def run(*arguments, cwd):
         (["top", "--policies=none"], "cannot read none: no such file or directory"),
         (["--page=none.md"], "cannot read none.md: no such file or directory"),
         (["--page=plain.md"], "--page=plain.md: expected the lines <!-- table --> and <!-- end -->, got none"),
-        (["--page=page.md"], "studies: holds no scores of the benchmark; run one, or name its folder by "),
-        ([], "studies: holds no scores of the benchmark; run one, or name its folder by --results"),
+        (["--page=page.md"], "studies: no scores of the benchmark; run a division, or name another folder by "),
+        ([], "studies: no scores of the benchmark; run a division, or name another folder by --results"),
     ],
 )
 def test_errors_are_one_line(tmp_path, arguments, line):
@@ -235,7 +232,7 @@ def test_policies_of_others_are_scored(tmp_path):
     (tmp_path / "page.md").write_text("# Mine\n\n<!-- table -->\n<!-- end -->\n")
     done = run("samples", "--policies=theirs", "--page=page.md", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
-    (found,) = benchmark.read(tmp_path / "studies" / "samples-theirs" / benchmark.SCORES)
+    (found,) = benchmark.read(tmp_path / "studies")["samples", "theirs"]
     assert (found.robot, found.task, found.seed) == ("tick", "walk", 1)
     assert found.score == pytest.approx(scale().score(found.result)) and found.score > 0.9
     assert np.isnan(found.minutes) and found.gait_compliance > 0.95 and found.heading_error < 0.2
@@ -269,23 +266,22 @@ def test_a_track_is_run_and_resumed(tmp_path):
         return done.stdout
 
     printed = go()
+    (found,) = benchmark.read(tmp_path / "studies")["samples", "tiny_studies.CLIMB"]
     folder = tmp_path / "studies" / "samples-tiny_studies.CLIMB"
-    (found,) = benchmark.read(folder / benchmark.SCORES)
-    (config,) = folder.glob("*/config.json")
-    assert configuration.read(config).steps == 300
-    returns = run_folder.latest_returns(run_folder.table(config.parent, "evaluations"))
-    assert found.result == pytest.approx(returns.mean())
+    (row,) = csv_files.read(folder / results.RUNS)
+    assert row["steps"] == "300"
+    returns = [float(each["return"]) for each in csv_files.read(folder / results.EVALUATIONS) if each["step"] == "300"]
+    assert found.result == pytest.approx(np.mean(returns)) and len(returns) == 10
     assert (folder / "README.md").is_file() and printed.count("not run") == 9
-    times = (config.parent / "times.csv").read_bytes()
+    episodes = (folder / results.EVALUATIONS).read_bytes()
     go()
-    assert (config.parent / "times.csv").read_bytes() == times
+    assert (folder / results.EVALUATIONS).read_bytes() == episodes
 
 
-@pytest.mark.parametrize("path", sorted(COMMITTED.glob(f"*/{benchmark.SCORES}")), ids=lambda path: path.parent.name)
-def test_committed_scores_are_those_of_committed_results(path):
-    study = tables.study(path.parent.name)
-    expected = benchmark.of_results(results.results(study.runs, path.parent))
-    for one, other in zip(benchmark.read(path), expected, strict=True):
+@pytest.mark.parametrize("name", [f"{division}-{learner}" for division, learner in benchmark.read(COMMITTED)])
+def test_committed_scores_are_those_of_committed_results(name):
+    expected = benchmark.of_results(results.results(tables.study(name).runs, COMMITTED / name))
+    for one, other in zip(benchmark.read(COMMITTED)[tuple(name.split("-", 1))], expected, strict=True):
         assert one[:3] == other[:3] and one[3:] == pytest.approx(other[3:], nan_ok=True)
 
 

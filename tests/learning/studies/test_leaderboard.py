@@ -34,13 +34,13 @@ def test_an_entry_is_played_again_and_added(entry, tmp_path):
 
 
 def test_rows_of_studies_stay(entry, tmp_path):
-    study = tmp_path / "studies" / "mine"
-    study.mkdir(parents=True)
     cells = dict.fromkeys(leaderboard.HEADS, "-")
     cells |= {"robot, task": "tick, walk", "algorithm": "own", "seeds": "1", "return": "99.0"}
-    leaderboard.write(study, [tuple(cells.values())])
+    for study in ("mine", "others", "mine"):  # the third replaces the first
+        leaderboard.write(tmp_path / "studies", study, [cells | {"study": study, "configuration": study}])
     assert enter(tmp_path, entry, "--name=noise").returncode == 0
     page = (tmp_path / "studies" / "README.md").read_text()
+    assert page.count("| tick, walk | own | ") == 2 and "| [mine](mine/README.md) |" in page
     assert page.index("| tick, walk | own | ") < page.index("| tick, walk | noise | ")  # the higher return first
 
 

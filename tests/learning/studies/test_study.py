@@ -7,6 +7,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,9 +24,8 @@ from arc_suite.envs.dm import load
 from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
-from arc_suite.learning.studies import publication, results, runner, tables
+from arc_suite.learning.studies import csv_files, publication, results, runner, tables
 from arc_suite.learning.studies.publication import METRICS
-from arc_suite.learning.studies.runner import State
 from arc_suite.learning.studies.tables import Prior, run
 from arc_suite.robots import generator
 
@@ -71,11 +71,11 @@ def wait_for(count, pattern, folder, process):
 
 
 def contents(folder):
-    """Everything that must not depend on jobs and kills, by its path."""
+    """Everything that must not depend on jobs and kills: rows of tables without times, and arrays by path."""
     found = {}
-    for path in sorted(folder.glob("results/*/[!.]*")):  # a kill may leave a temporary file
-        if path.name != "times.csv":
-            found[str(path.relative_to(folder))] = path.read_bytes()
+    for path in sorted(folder.glob("results/*.csv")):
+        for number, row in enumerate(csv_files.read(path)):
+            found[f"{path.name}/{number}"] = {name: cell for name, cell in row.items() if name not in results.TIMES}
     for path in sorted(folder.glob("runs/*/[cp]*.npz")):
         with np.load(path) as stored:
             for name in stored.files:
@@ -87,23 +87,20 @@ def contents(folder):
 @pytest.mark.release
 @pytest.mark.parametrize("name", ["WITH_NUMPY", "WITH_JAX"])
 def test_killed_twice(name, tmp_path, begun):
-    """First with all its processes, then alone, so that its runs go on; two jobs make what one makes."""
+    """Two jobs make what one makes."""
     if name == "WITH_JAX":
         pytest.importorskip("jax", reason="of the extra agents: make check-agents")
     assert begun(name, tmp_path / "whole", 1).wait() == 0
 
-    process = begun(name, tmp_path / "killed", 2)
-    wait_for(1, "runs/*/checkpoint.npz", tmp_path / "killed", process)
-    os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    process = begun(name, tmp_path / "killed", 2)
-    wait_for(3, "results/*/style.csv", tmp_path / "killed", process)
-    process.kill()
-    process.wait()
+    for count in (1, 3):
+        process = begun(name, tmp_path / "killed", 2)
+        wait_for(count, "runs/*/checkpoint.npz", tmp_path / "killed", process)
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
     assert begun(name, tmp_path / "killed", 2).wait() == 0
 
     whole, killed = contents(tmp_path / "whole"), contents(tmp_path / "killed")
-    assert len([path for path in whole if path.endswith("evaluations.csv")]) == 8
+    assert len([path for path in whole if path.startswith("runs.csv")]) == 8
     assert whole.keys() == killed.keys()
     assert [path for path in whole if whole[path] != killed[path]] == []
 
@@ -126,31 +123,49 @@ def test_what_is_finished_is_skipped_and_shards_share(tmp_path, surroundings):
     first, folder = tiny_studies.WITH_NUMPY.runs[0], tmp_path / "runs"
     assert configuration.read(folder / first.name / "config.json") == first.configuration
     before = (folder / first.name / "checkpoint.npz").stat().st_mtime_ns
-    states = runner.make([first], folder, tmp_path / "results", 1, lambda states: None)
-    assert [each.word for each in states] == ["finished"]
+    assert runner.make([first], folder, 1) == 0
     assert (folder / first.name / "checkpoint.npz").stat().st_mtime_ns == before
-    assert states[0].step == 300
 
     other = tiny_studies.tiny("tiny_studies:CLIMB", 0, hyperparameters={"spread": 0.3})
     with pytest.raises(ValueError, match=r"of another run, whose hyperparameters.spread is 0.02, and not 0.3; write "):
         runner.is_finished(other, folder / first.name)
 
-    # Of another run nothing that was measured stays.
-    published = tmp_path / "results" / first.name
-    measured = (published / "style.csv").read_text()
-    (published / "config.json").write_text("{}")
-    (published / "style.csv").write_text(measured.replace(",0.", ",1."))
-    publication.publish(first, folder, tmp_path / "results")
-    assert (published / "style.csv").read_text() == measured
-
-    # What is published of the policy's style is what the style room measures of it.
-    table = run_folder.table(published, "style")
+    # What is published of the policy's style is what the style room measures of it, also a second time.
+    tables_of = {name: (tmp_path / "results" / name).read_bytes() for name in ("runs.csv", "evaluations.csv")}
+    publication.publish(tiny_studies.WITH_NUMPY.runs, folder, tmp_path / "results")
+    assert {name: (tmp_path / "results" / name).read_bytes() for name in tables_of} == tables_of
+    published = results.results(tiny_studies.WITH_NUMPY.runs, tmp_path / "results")
+    assert [each.run.name for each in published] == [names[0], names[1], names[7]]
     environment = load("tick", "walk", tiny_studies.SHORT)
     policy = policies.policy(folder / first.name, "tick")
     for seed in (0, 7):
         measured = style.measure(style.record(environment, policy, seed))
         for name in METRICS:
-            assert np.array_equal(table[name][seed], measured[name].value, equal_nan=True)
+            assert np.array_equal(published[0].style[name][seed], measured[name].value, equal_nan=True)
+
+    # Rows of runs whose folders are gone stay.
+    shutil.rmtree(folder / names[0])
+    publication.publish(tiny_studies.WITH_NUMPY.runs, folder, tmp_path / "results")
+    assert {name: (tmp_path / "results" / name).read_bytes() for name in tables_of} == tables_of
+
+
+@pytest.mark.slow
+def test_the_style_is_that_of_the_latest_whole_evaluation(tmp_path):
+    """A later policy is there already while its episodes are still played."""
+    each = tiny_studies.WITH_NUMPY.runs[0]
+    each = each._replace(configuration=dataclasses.replace(each.configuration, steps=100))
+    folder = tmp_path / "runs" / each.name
+    assert train(each.configuration, folder)
+    publication.publish([each], tmp_path / "runs", tmp_path / "results")
+    before = (tmp_path / "results" / "evaluations.csv").read_text()
+    (folder / "policy.npz").write_bytes(b"another")
+    with (folder / "evaluations.csv").open("a") as file:
+        file.write((folder / "evaluations.csv").read_text().splitlines()[1].replace("100,", "200,", 1) + "\n")
+    (folder / "style.csv").unlink()
+    publication.publish([each], tmp_path / "runs", tmp_path / "results")
+    assert (tmp_path / "results" / "evaluations.csv").read_text() == before
+    (found,) = results.results([each], tmp_path / "results")
+    assert found.steps.tolist() == [100]
 
 
 @pytest.mark.long
@@ -174,7 +189,7 @@ def test_prior_data_are_those_of_the_study(tmp_path, monkeypatch):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     each = run("tick", "sacfd", 100, task_kwargs=tiny_studies.SHORT, prior=Prior(episodes=2))
     dataset = each.configuration.prior
-    assert runner.prepare([each], tmp_path / "runs", 1) == {each.name: "waiting"}
+    assert runner.prepare([each], tmp_path / "runs", 1) == [each]
     data.collect(dataset, each.prior.settings(each.configuration.setup), 3)
     with pytest.raises(ValueError) as error:
         runner.prepare([each], tmp_path / "runs", 1)
@@ -188,8 +203,9 @@ def test_a_curriculum_is_judged_at_the_difficulty(tmp_path):
     assert each.place == 'tick, gaps, {"time_limit": 2.0}'
     folder, published = tmp_path / "runs", tmp_path / "results"
     assert train(each.configuration, folder / each.name)
-    publication.publish_all([each], folder, published)
-    assert configuration.read(published / each.name / "config.json").setup.task_kwargs == settings
+    publication.publish([each], folder, published)
+    (row,) = csv_files.read(published / results.RUNS)
+    assert json.loads(row["task_kwargs"]) == settings
     table = run_folder.table(folder / each.name, "evaluations")
     assert "distance" in table and "level" not in table
     assert results.demonstrators(published).keys() == {each.place}
@@ -203,7 +219,7 @@ def test_the_page_counts_runs():
     assert {name for name, *_ in rows} == tables.STUDIES.keys()
     for name, runs, committed in rows:
         assert len(tables.study(name).runs) == int(runs), name
-        assert len(list((ROOT / "studies" / name).glob("*/config.json"))) == int(committed), name
+        assert len(csv_files.read(ROOT / "studies" / name / results.RUNS)) == int(committed), name
 
 
 def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
@@ -221,66 +237,16 @@ def test_robots_of_other_packages_and_unknown_ones(monkeypatch):
 def test_phases_are_published(tmp_path):
     lines = ["step,phase_updates", "1000,0", "2000,300", "3000,0", "4000,75000"]
     (tmp_path / "training.csv").write_text("\n".join(lines) + "\n")
-    text = publication._phases(run_folder.table(tmp_path, "training"))
-    assert text == "step,updates\n2000,300\n4000,75000\n"
+    each = run("tick", "speq", 5000)
+    (tmp_path / "config.json").write_text(json.dumps(each.configuration.to_dict()))
+    row = publication._configuration(each, tmp_path)
+    assert row["phases"] == '{"2000": 300, "4000": 75000}'
+    assert row["robot"] == "tick" and row["prior"] == "" and row["seed"] == "0"
 
 
-def test_a_run_that_another_process_makes_is_waited_for(tmp_path):
-    """It is not started twice, whatever process makes it."""
-    log = tmp_path / "a.log"
-    held = runner.claim(log)
-    assert runner.claim(log) is None
-    child = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE, stdout=held)
-    held.close()
-    assert runner.claim(log) is None, "the process of the run holds it too"
-    child.communicate(b"\n")
-    runner.claim(log).close()
-
-
-def test_remaining_time():
-    """By a run's own pace, that of its kind, or that of all."""
-    sac, sope = (run("tick", name, 1000) for name in ("sac", "sope_eo"))
-
-    def state(each, word, step, wall):
-        return State(each, word, step, None, wall, wall)
-
-    assert runner.remaining([state(sac, "waiting", 0, 0.0)], 1) is None
-    begun = [state(sac, "finished", 1000, 100.0), state(sac, "running", 500, 100.0), state(sac, "waiting", 0, 0.0)]
-    assert runner.remaining(begun, 1) == pytest.approx(100.0 + 150.0)
-    assert runner.remaining([*begun, state(sope, "waiting", 0, 0.0)], 2) == pytest.approx(200.0)
-
-
-def test_tables_that_cannot_have_grown_are_not_read_again(tmp_path, monkeypatch):
-    runs = [run("tick", "sac", 1000, seed) for seed in range(3)]
-    names = [each.name for each in runs]
-    words = dict(zip(names, ("finished", "running", "waiting"), strict=True))
-    read, table = [], run_folder.table
-    monkeypatch.setattr(run_folder, "table", lambda *place: read.append(place[0].name) or table(*place))
-    known = runner.states(runs, tmp_path, words)
-    assert [(each.word, each.step) for each in known.values()] == [("finished", 0), ("running", 0), ("waiting", 0)]
-    read.clear()
-    (tmp_path / names[1]).mkdir()
-    (tmp_path / names[1] / "times.csv").write_text("step,wall_seconds,cpu_seconds\n500,1.0,1.0\n")
-    words[names[2]] = "running"
-    known = runner.states(runs, tmp_path, words, known)
-    assert [(each.word, each.step) for each in known.values()] == [("finished", 0), ("running", 500), ("running", 0)]
-    assert set(read) == set(names[1:])
-
-
-@pytest.mark.long
-def test_a_terminal_shows_a_table_in_its_place(tmp_path, surroundings):
-    """Which is no higher than the terminal; at its end stand all runs, once."""
-    outer, inner = os.openpty()
-    os.set_blocking(outer, False)
-    command = [sys.executable, "-m", "arc_suite", "study", "tiny_studies:BROKEN", "--jobs=1"]
-    screen = surroundings | {"LINES": "4", "COLUMNS": "100"}
-    done = subprocess.run(command, env=screen, stdin=inner, stdout=inner, stderr=subprocess.PIPE, cwd=tmp_path)
-    os.close(inner)
-    tables = os.read(outer, 100_000).decode().replace("\r\n", "\n").split("\x1b[3A\x1b[J")
-    os.close(outer)
-    assert done.returncode == 1 and len(tables) > 2
-    assert all(text.startswith("run ") and text.count("\n") == 3 for text in tables[:-1])
-    assert tables[-1].count("\n") == 4 and tables[-1].endswith("\n1 of 2 finished, 1 failed\n")
+def test_columns_stay_in_the_order_of_each_task():
+    tasks = ["tracking", "fell"], ["distance", "tracking", "sank"], ["goals", "tracking", "fell", "hits"]
+    assert publication._merged(tasks) == ["distance", "goals", "tracking", "fell", "sank", "hits"]
 
 
 @pytest.mark.parametrize(
@@ -377,6 +343,6 @@ def test_without_submitit_it_says_what_to_install(tmp_path):
 )
 def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_path, task, presets):
     each = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
-    publication.publish_all([each], tmp_path / "runs", tmp_path)
+    publication._publish_demonstrators([each], tmp_path)
     found = results.demonstrators(tmp_path)[each.place]
     assert set(found) == presets and all(len(totals) == 10 for totals in found.values())

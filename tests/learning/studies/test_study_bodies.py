@@ -12,7 +12,7 @@ from arc_suite.learning.studies import bodies
 from arc_suite.learning.transfer import Comparison, Judged
 
 ROOT = pathlib.Path(__file__).parents[3]
-STUDY = ROOT / "studies" / "bodies"
+STUDY = ROOT / "studies" / "bodies.csv"
 
 
 def compared(policy, tracking=math.nan):
@@ -21,17 +21,20 @@ def compared(policy, tracking=math.nan):
 
 def test_episodes_are_read_as_they_were_written(tmp_path):
     played = {"robots": [compared(15.0, 0.4), compared(20.0, 0.6)], "small": [compared(10.0, 0.2)]}
-    bodies.write(tmp_path / "one-steer.csv", played)
-    assert bodies.read(tmp_path / "one-steer.csv") == played
-    table = bodies.text(tmp_path).splitlines()
+    path = tmp_path / "bodies.csv"
+    for each in ({"small": []}, {"robots": [compared(1.0, 0.1)]}, played):  # the latest replaces the others
+        bodies.write(path, "one", "steer", each)
+    bodies.write(path, "two", "steer", played)
+    assert bodies.read(path) == {("one", "steer"): played, ("two", "steer"): played}
+    table = bodies.text(path).splitlines()
     assert table[0].split(" | ")[1:3] == ["task", "random"]
     assert table[2] == (
         "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | not run | not run | 0.00, tracking 0.25 |"
         " not run |"
     )
-    (tmp_path / "one-steer.csv").write_text("family,body\n")
-    with pytest.raises(ValueError, match=r"one-steer\.csv: expected the columns family, body, who, return, walked, "):
-        bodies.text(tmp_path)
+    path.write_text("family,body\n")
+    with pytest.raises(ValueError, match=r"bodies\.csv: expected lines of policy, task, family, "):
+        bodies.text(path)
 
 
 def test_the_page_holds_the_committed_table(tmp_path):
@@ -41,18 +44,20 @@ def test_the_page_holds_the_committed_table(tmp_path):
     copy.write_text(re.sub(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", "", page, flags=re.DOTALL))
     done = programs.arc_suite("transfer", f"--page={copy}", f"--results={STUDY}")
     assert (done.returncode, done.stderr) == (0, "") and copy.read_text() == page
-    done = programs.arc_suite("transfer", f"--page={copy}", f"--results={tmp_path}")
+    done = programs.arc_suite("transfer", f"--page={copy}", f"--results={tmp_path / 'none.csv'}")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1) and copy.read_text() == page
-    assert done.stderr.startswith(f"arc-suite transfer: {tmp_path}: holds no tables of episodes; write one by -o, or ")
+    assert done.stderr.startswith(
+        f"arc-suite transfer: {tmp_path / 'none.csv'}: holds no episodes; add some by -o, or "
+    )
 
 
 def test_what_ships_is_in_the_table_and_is_good():
     """Most bodies walk that nobody trained with, robots and their mutants among them."""
-    found = bodies.read(STUDY / "universal-walk.csv")
+    found = bodies.read(STUDY)["universal", "walk"]
     assert list(found) == list(transfer.FAMILIES)
     results = {name: transfer.result(each) for name, each in found.items()}
     assert all(result.demonstrated == 1.0 for result in results.values())
     assert results["random"].walk == 1.0 and results["random"].score > 0.95
     assert min(results["robots"].walk, results["mutants"].walk) >= 0.8
-    steer = {name: transfer.result(each) for name, each in bodies.read(STUDY / "universal-steer.csv").items()}
+    steer = {name: transfer.result(each) for name, each in bodies.read(STUDY)["universal", "steer"].items()}
     assert steer["robots"].tracking > 0.8

@@ -1,34 +1,37 @@
 """Reports of studies: every number comes from published tables, and says what it should."""
 
 import csv
+import json
 import pathlib
 import re
 import shutil
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from arc_suite import evaluation
 from arc_suite.evaluation import anchors, published
-from arc_suite.learning.agents import configuration
-from arc_suite.learning.studies import claims, report, results, tables
+from arc_suite.learning.agents.configuration import CONFIGURATION, Configuration
+from arc_suite.learning.studies import claims, csv_files, publication, report, results, tables
 from arc_suite.learning.studies.tables import Study, run
 
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
 STEPS = (1000, 2000)
 
 
-def publish(folder, each, returns, style=0.1):
-    """Tables of a run: returns are (evaluations, episodes)."""
-    path = folder / each.name
-    path.mkdir(parents=True)
-    lines = ["step,seed,return,length,speed,gait_compliance"]
-    for step, episodes in zip(STEPS, returns, strict=True):
-        lines += [f"{step},{seed},{total!r},1000,0.3,0.9" for seed, total in enumerate(np.asarray(episodes).tolist())]
-    (path / "evaluations.csv").write_text("\n".join(lines) + "\n")
-    (path / "times.csv").write_text("step,wall_seconds,cpu_seconds\n1000,90.0,60.0\n2000,200.0,180.0\n")
-    lines = [f"step,seed,{','.join(METRICS)}", *(f"2000,{seed}" + f",{style}" * 6 for seed in range(10))]
-    (path / "style.csv").write_text("\n".join(lines) + "\n")
+def publish(folder, each, returns, style=0.1, phases=""):
+    """Add rows of a run to the tables: returns are (evaluations, episodes)."""
+    runs, episodes = (csv_files.read(folder / name) for name in (results.RUNS, results.EVALUATIONS))
+    measured = {f"style_{name}": style for name in METRICS}
+    columns = ("run", "step", "seed", "return", "length", "speed", "gait_compliance", *results.TIMES, *measured)
+    for step, totals, times in zip(STEPS, returns, ((90.0, 60.0), (200.0, 180.0)), strict=False):
+        for seed, total in enumerate(np.asarray(totals).tolist()):
+            row = dict(zip(columns, (each.name, step, seed, total, 1000, 0.3, 0.9, *times), strict=False))
+            episodes.append(row | (measured if step == STEPS[len(returns) - 1] else {}))
+    csv_files.write(folder / results.EVALUATIONS, columns, episodes)
+    csv_files.write(folder / results.RUNS, results.RUN_COLUMNS, [*runs, {"run": each.name, "phases": phases}])
 
 
 def constant(*levels):
@@ -62,7 +65,8 @@ def test_report(made):
     study, folder = made
     page = report.write("mine", study, folder).read_text()
     assert (folder / "curves.png").stat().st_size > 10_000
-    assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0"]
+    command = "`arc-suite train --robot=tick --task=walk --algorithm=sope --steps=2000 --seed=0 --evaluate_every=10000`"
+    assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0", command]
     # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
     final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610"]
     assert cells(page, "tick, walk", "sope", "2,000")[3:] == final
@@ -101,22 +105,14 @@ def test_claims(made):
     assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
 
 
-@pytest.mark.slow
-def test_commands_name_the_folder_of_the_runs(made):
-    """In which no colon stands."""
-    study, folder = made
-    (folder / study.runs[0].name / "strip.png").write_bytes(b"")
-    page = report.write("my_studies:MINE", study, folder).read_text()
-    assert f"--policy=runs/my_studies.MINE/{study.runs[0].name} " in page
-
-
 @pytest.mark.long
 def test_phases_are_told_where_they_are_published(made):
     study, folder = made
     assert "## Phases" not in report.write("mine", study, folder).read_text()
-    for each, lengths in zip(study.runs, ((300, 700), (1100,)), strict=False):
-        lines = ["step,updates", *(f"{10_000 * place},{updates}" for place, updates in enumerate(lengths, 1))]
-        (folder / each.name / "phases.csv").write_text("\n".join(lines) + "\n")
+    rows = csv_files.read(folder / results.RUNS)
+    for row, phases in zip(rows, ('{"10000": 300, "20000": 700}', '{"10000": 1100}'), strict=False):
+        row["phases"] = phases
+    csv_files.write(folder / results.RUNS, results.RUN_COLUMNS, rows)
     page = report.write("mine", study, folder).read_text()
     first = study.runs[0]
     assert cells(page, first.place, first.kind, "3") == [first.place, first.kind, "3", "700", "300", "1,100"]
@@ -137,24 +133,31 @@ def test_claims_need_what_they_compare(made):
 
 
 def test_unfinished_evaluations_do_not_count(tmp_path):
-    each = run("tick", "sac", 5000)
-    publish(tmp_path, each, constant(100.0, 200.0))
-    with (tmp_path / each.name / "evaluations.csv").open("a") as file:
-        file.write("3000,0,900.0,1000,0.3,0.9\n")
-    (result,) = results.results([each], tmp_path)
-    assert result.steps.tolist() == [1000, 2000]
-    assert result.final == 204.5
-    assert result.progress["speed"].shape == (10,)
+    lines = [f"{step},{seed},900.0" for step in (1000, 2000, 3000) for seed in range(10)][:-9]
+    (tmp_path / "evaluations.csv").write_text("\n".join(["step,seed,return", *lines]) + "\n")
+    (tmp_path / "times.csv").write_text("step,cpu_seconds\n1000,1.0\n1500,2.0\n2000,3.0\n3000,4.0\n")
+    found = publication._evaluated(tmp_path)
+    assert [(row["step"], row["seed"], row["cpu_seconds"]) for row in found[9:11]] == [
+        ("1000", "9", "1.0"),
+        ("2000", "0", "3.0"),
+    ]
+    assert len(found) == 20
+
+
+def test_damaged_tables_are_one_line(tmp_path):
+    each = run("tick", "sac", 2000)
+    publish(tmp_path, each, constant(100.0))
+    path = tmp_path / results.EVALUATIONS
+    path.write_text(path.read_text() + f"{each.name},2000,0,1.0,1000,0.3,0.9,1.0,1.0" + 6 * "," + "\n")
+    with pytest.raises(ValueError, match=r"evaluations.csv: damaged: "):
+        results.results([each], tmp_path)
 
 
 def test_runs_are_compared_where_both_have_been(tmp_path):
     """At the latest step that all have reached, and where both have several seeds."""
     runs = [run("tick", name, 2000, seed) for seed in range(2) for name in ("sac", "speq")]
     for each in runs:
-        publish(tmp_path, each, constant(100.0, 900.0) if each.kind == "sac" else constant(500.0, 600.0))
-        if each.kind == "speq":
-            path = tmp_path / each.name / "evaluations.csv"
-            path.write_text("\n".join(path.read_text().splitlines()[:11]) + "\n")
+        publish(tmp_path, each, constant(100.0, 900.0) if each.kind == "sac" else constant(500.0))
     groups = results.grouped(results.results(runs, tmp_path))
     probability, interval = results.improvement(groups, "speq", "sac")
     assert probability == 1.0 and interval == (1.0, 1.0)
@@ -209,25 +212,52 @@ def test_nothing_published_is_one_line(tmp_path):
 COMMITTED = pathlib.Path(__file__).parents[3] / "studies"
 
 
-@pytest.mark.parametrize("path", sorted(COMMITTED.glob("*/*/config.json")), ids=lambda path: path.parent.name)
-def test_committed_configurations_are_those_of_the_studies(path):
+NAMES = sorted(path.parent.name for path in COMMITTED.glob(f"*/{results.RUNS}"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_committed_configurations_are_those_of_the_studies(name):
     """Today's code reads each, and trains the same run."""
-    study = tables.study(path.parts[-3])
-    (each,) = (each for each in study.runs if each.name == path.parts[-2])
-    assert configuration.read(path) == each.configuration
+    runs = {each.name: each for each in tables.study(name).runs}
+    for row in csv_files.read(COMMITTED / name / results.RUNS, results.RUN_COLUMNS):
+        fields = {field: row[field] or None for field in CONFIGURATION}
+        fields |= {each: json.loads(row[each]) for each in ("task_kwargs", "hyperparameters", "seed", "steps")}
+        fields["evaluate_every"] = int(row["evaluate_every"])
+        assert Configuration.from_dict(fields) == runs[row["run"]].configuration
+        assert row["kind"] == runs[row["run"]].kind
+
+
+REPEATED = """
+import json, shlex, sys
+from absl.testing import flagsaver
+from arc_suite.learning.cli import train
+for command in json.load(sys.stdin):
+    with flagsaver.flagsaver():
+        train.FLAGS(shlex.split(command)[1:])
+        print(json.dumps(train.configured().to_dict()))
+"""
+
+
+def test_commands_repeat_runs():
+    """Those of all runs of all studies, with settings, hyperparameters and prior data."""
+    studies = [*tables.STUDIES.values(), tables.study("top-ppo"), tables.study("demonstrations-sope")]
+    runs = [each.configuration for study in studies for each in study.runs]
+    commands = json.dumps([each.command for each in runs])
+    done = subprocess.run([sys.executable, "-c", REPEATED], input=commands, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for each, line in zip(runs, done.stdout.splitlines(), strict=True):
+        assert json.loads(line) == json.loads(json.dumps(each.to_dict())), each.command
 
 
 @pytest.mark.long
 def test_committed_reports_are_made_of_committed_tables(tmp_path):
     """By the one command, and nobody has changed a number."""
-    committed = COMMITTED
-    shutil.copytree(committed, tmp_path / "studies")
-    names = sorted({path.parts[-3] for path in committed.glob("*/*/config.json")})
-    assert names
-    for name in names:
+    shutil.copytree(COMMITTED, tmp_path / "studies")
+    assert NAMES
+    for name in NAMES:
         report.write(name, tables.study(name), tmp_path / "studies" / name)
-    for path in (*(f"{name}/README.md" for name in names), "README.md"):
-        assert (tmp_path / "studies" / path).read_text() == (committed / path).read_text(), path
+    for path in (*(f"{name}/README.md" for name in NAMES), "README.md", "leaderboard.csv"):
+        assert (tmp_path / "studies" / path).read_text() == (COMMITTED / path).read_text(), path
 
 
 def test_the_papers_table_has_every_robot_and_algorithm():
