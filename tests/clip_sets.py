@@ -1,4 +1,4 @@
-"""Clips of robots, examples and random bodies: `make clip-sets`, half an hour.
+"""Clips of robots, examples and random bodies: `make check-clip-sets`, half an hour.
 
 python tests/clip_sets.py [NUMBER OF RANDOM BODIES]
 

@@ -1,4 +1,4 @@
-"""Damages files at random and reads them: specs, tracks and datasets; `make fuzz`, some minutes.
+"""Damages files at random and reads them: specs, tracks and datasets; `make check-fuzz`, some minutes.
 
 `python tests/fuzz.py` prints, for each kind of file, how many damaged ones were read all the same,
 refused in one line, ended in a traceback, crashed, or took too long. Each is read in a process of its

@@ -1,4 +1,4 @@
-"""Searches for policies that earn reward and fail at a task: `make loopholes`, some ten minutes.
+"""Searches for policies that earn reward and fail at a task: `make check-loopholes`, some ten minutes.
 
 For each task the search, CMA-ES, changes a body that steps by a constant command and sways. It maximizes the
 return over standing still, as a share of what a failing policy may earn. The best candidate is played once more

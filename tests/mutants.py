@@ -1,7 +1,7 @@
 """Plants mistakes on purpose, one at a time, in a copy of the project, and tells which test catches each.
 
 `python tests/mutants.py` runs all, or those whose names hold the words given; exit status 1 if one
-survives. It takes long: `make mutants`. With `--check` it only finds where each would be planted.
+survives. It takes long: `make check-mutants`. With `--check` it only finds where each would be planted.
 """
 
 import concurrent.futures

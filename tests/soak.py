@@ -1,4 +1,4 @@
-"""Endurance: what memory, threads and file descriptors do in the long run; `make soak`, minutes.
+"""Endurance: what memory, threads and file descriptors do in the long run; `make check-soak`, minutes.
 
 `python tests/soak.py` steps environments two million times, single ones and rows of a vector
 environment in turn, with resets and a frame of each every 10,000 steps; then it makes, steps,

@@ -1,4 +1,4 @@
-"""How well random bodies follow commands: `make obedience`, minutes.
+"""How well random bodies follow commands: `make check-following`, minutes.
 
 Prints the mean error of each body over the ten commands of the test of steering, in the body's own
 units, and whether it fell; then how many of all fell, and how many err by 0.15 at most. Fails if one
