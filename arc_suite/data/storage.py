@@ -13,7 +13,7 @@ import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import h5py
 from minari.dataset.minari_dataset import parse_dataset_id
@@ -35,7 +35,8 @@ class Storage:
 
     def __init__(self, dataset_id: str, overwrite: bool):
         """Read what is there; see `opened`."""
-        self.id, self.metadata = dataset_id, None
+        self.id = dataset_id
+        self.metadata: dict[str, Any] | None = None
         self._data, self._parts = ids.folder(dataset_id) / "data", ids.parts(dataset_id)
         self._overwrite = overwrite
         self._continues = False  # whether the parts belong to this collection

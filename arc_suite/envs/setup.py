@@ -180,8 +180,8 @@ class Setup:
         """Open a Gymnasium environment; for the options see `gymnasium.make`."""
         return gymnasium.make(self.spec(), **options)
 
-    def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options) -> VectorEnv | BodiesEnv:
-        """Open a vector environment, of several bodies with flat observations.
+    def make_vec(self, num_envs: int = 1, *, seed: int | None = None, **options) -> Any:
+        """Open a `VectorEnv`; of several bodies a `BodiesEnv` with flat observations.
 
         Args:
             num_envs: number of environments; environment i has body i, and so on from the first after the last.
