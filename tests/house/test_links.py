@@ -3,8 +3,6 @@
 import pathlib
 import re
 
-import pytest
-
 ROOT = pathlib.Path(__file__).parents[2]
 PAGES = [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/*.md"), *ROOT.glob("studies/**/*.md")]
 LINK = re.compile(r"\]\(([^):#]*)(?:#([^)]*))?\)")
@@ -18,15 +16,19 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_links_of_pages(page):
+def missing_links(page):
     text = page.read_text()
     missing = [name for name in NAMED.findall(text) if not (ROOT / name).exists()]
     for link, anchor in LINK.findall(text):
         target = page.parent / link if link else page
         if not target.exists() or (anchor and anchor not in anchors(target)):
             missing.append(f"{link}#{anchor}")
-    assert missing == []
+    return missing
+
+
+def test_links_of_pages():
+    found = {str(page.relative_to(ROOT)): missing_links(page) for page in PAGES}
+    assert {page: missing for page, missing in found.items() if missing} == {}
 
 
 def test_the_index_lists_every_page():
