@@ -108,7 +108,7 @@ MUTANTS = (
     Mutant("gait clock advances too late", "phases[tick - 1] + turn", "phases[tick - 1] + 0.5 * turn"),
     Mutant("a long episode's clock jumps", "np.argmin(np.abs(np.sin(0.5 * phases[ends])))", "-1"),
     Mutant("previous action forgotten", "previous_action=memory.action", "previous_action=action"),
-    Mutant("quaternion not normalised", "    qpos[3:7] /= np.linalg.norm(qpos[3:7])\n", ""),
+    Mutant("quaternion not normalised", "qpos[3:7] /= np.linalg.norm(qpos[3:7])", "pass"),
     Mutant("reset noise to one side", "random.uniform(-widths, widths)", "random.uniform(0.0 * widths, widths)"),
     Mutant(
         "speed of the state in place of the frame's",
@@ -126,8 +126,8 @@ MUTANTS = (
     ),
     Mutant(
         "blocks declared in another order",
-        '{"posture": 5 + joints, "velocities": 6 + joints,',
-        '{"velocities": 6 + joints, "posture": 5 + joints,',
+        '"posture": posture(body),\n        "velocities": velocities(body),',
+        '"velocities": velocities(body),\n        "posture": posture(body),',
     ),
     Mutant("blocks cut one too early", "slice(end - size, end)", "slice(max(end - size - 1, 0), end - 1)"),
     Mutant("blocks joined unchecked", "for name, block in blocks.items()] != self._declared", "for name, block in ()]"),
@@ -251,7 +251,7 @@ MUTANTS = (
     Mutant("the mouse pulls at nothing", "data.xfrc_applied[:] = forces", "data.xfrc_applied[:] = 0.0"),
     # Studies and datasets of agents.
     Mutant("medium agents are the best", ">= MEDIUM * best", ">= best"),
-    Mutant("evaluations under way count", "marks[counts == evaluation.EPISODES]", "marks"),
+    Mutant("evaluations under way count", "if count == evaluation.EPISODES and step in times", "if step in times"),
     Mutant(
         "runs compared wherever they are", "int(np.flatnonzero(each.steps == max(common))[0]) + 1", "len(each.steps)"
     ),

@@ -27,7 +27,6 @@ from arc_suite.policies.network import Network
 from arc_suite.policies.universal import Universal
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
-from arc_suite.tasks.modified import Modified
 
 GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
 
@@ -111,9 +110,8 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
         task: of the policy.
         steer: of the same body, whose units and health hold where the task has none.
     """
-    inner = task.task if isinstance(task, Modified) else task
-    headed = "command" in inner.commands
-    context, health = (inner if headed else steer).context, steer.health  # type: ignore[attr-defined]  # of commands
+    headed = "command" in task.commands
+    context, health = (task if headed else steer).context, steer.health  # type: ignore[attr-defined]  # of commands
     scene, (force_unit,) = steer.scene, context.force_unit
     return {
         "headed": headed,

@@ -110,8 +110,96 @@ class Inputs(NamedTuple):
     kick: np.ndarray | None = None
 
 
+class Observed(ABC):
+    """What follows from the blocks of the observation that a task declares.
+
+    Attributes:
+        name: of the task.
+        scene: of the task.
+    """
+
+    name: ClassVar[str]
+    scene: Scene
+
+    @property
+    @abstractmethod
+    def blocks(self) -> Mapping[str, Block]:
+        """The blocks of the observation by name, in the order of the vector."""
+
+    @functools.cached_property
+    def sizes(self) -> dict[str, int]:
+        """The size of every block of the observation by name, in the order of the vector."""
+        return {name: block.size for name, block in self.blocks.items()}
+
+    @functools.cached_property
+    def symmetry(self) -> Symmetry:
+        """The mirror maps of observations and actions.
+
+        A walk and its mirror image, from the mirrored start by the mirrored actions, earn the same, the
+        clock of the gait half a cycle later where left and right take turns. On ground that is not level
+        the image walks on mirrored ground.
+
+        Raises:
+            ValueError: the body, the gait or its default angles are not symmetric, or a block declares no mirror.
+        """
+        image = mirror.image(self.scene.body)
+        if undeclared := [name for name, block in self.blocks.items() if block.mirror is None]:
+            raise ValueError(f"task {self.name}: block {undeclared[0]!r} declares no mirror")
+        observation = mirrors.joined(block.map(image) for block in self.blocks.values())
+        return Symmetry(observation, mirrors.joints(image))
+
+    @functools.cached_property
+    def size(self) -> int:
+        """Of the observation as a vector."""
+        return sum(self.sizes.values())
+
+    def vector(self, blocks: Mapping[str, np.ndarray], dtype=None) -> np.ndarray:
+        """Return observed blocks as one vector (..., size), in new memory.
+
+        Raises:
+            ValueError: they are not those that the task declares.
+        """
+        self._check(blocks)
+        arrays = list(blocks.values())
+        return arrays[0].__array_namespace__().concatenate(arrays, axis=-1, dtype=dtype)
+
+    def named(self, blocks: Mapping[str, np.ndarray]) -> collections.OrderedDict:
+        """Return observed blocks by name, in new memory.
+
+        Raises:
+            ValueError: they are not those that the task declares.
+        """
+        self._check(blocks)
+        return collections.OrderedDict({name: block.copy() for name, block in blocks.items()})
+
+    def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
+        if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
+            observed = {name: block.shape[-1] for name, block in blocks.items()}
+            raise ValueError(f"observation of {self.name}: expected blocks {self.sizes}, got {observed}")
+
+    def split(self, vector: np.ndarray) -> collections.OrderedDict:
+        """Return an observation vector (..., size) as named blocks, views of it.
+
+        Raises:
+            ValueError: a vector of another size.
+        """
+        if vector.shape[-1:] != (self.size,):
+            raise ValueError(f"observation: expected {self.size} numbers, got shape {vector.shape}")
+        return collections.OrderedDict((name, vector[..., part]) for name, part in self._parts.items())
+
+    @functools.cached_property
+    def _declared(self) -> list[tuple[str, int]]:
+        return list(self.sizes.items())
+
+    @functools.cached_property
+    def _parts(self) -> dict[str, slice]:
+        """Where each block lies in the vector."""
+        ends = itertools.accumulate(self.sizes.values())
+        return {name: slice(end - size, end) for (name, size), end in zip(self.sizes.items(), ends, strict=True)}
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class Task(ABC):
+class Task(Observed):
     """Definition of what a body has to do: a frozen value, checked when it is made.
 
     Attributes:
@@ -164,19 +252,14 @@ class Task(ABC):
         """Return where the task takes place; a caller may choose another arena unless the task has its own."""
         return FLAT
 
-    @property
-    @abstractmethod
-    def blocks(self) -> Mapping[str, Block]:
-        """The blocks of the observation by name, in the order of the vector."""
-
-    @functools.cached_property
-    def sizes(self) -> dict[str, int]:
-        """The size of every block of the observation by name, in the order of the vector."""
-        return {name: block.size for name, block in self.blocks.items()}
-
     def phase(self, memory) -> Any:
         """Return the phase (...) of the prescribed gait, rad in [0, 2 pi); None where the task prescribes none."""
         return None
+
+    @property
+    def unwrapped(self) -> "Task":
+        """The task itself, without the wrappers around it."""
+        return self
 
     @property
     def adapts(self) -> bool:
@@ -192,23 +275,6 @@ class Task(ABC):
     def target_velocity(self) -> float | None:
         """The constant target velocity along world x, m/s; None where it changes or there is none."""
         return None
-
-    @functools.cached_property
-    def symmetry(self) -> Symmetry:
-        """The mirror maps of observations and actions.
-
-        A walk and its mirror image, from the mirrored start by the mirrored actions, earn the same, the
-        clock of the gait half a cycle later where left and right take turns. On ground that is not level
-        the image walks on mirrored ground.
-
-        Raises:
-            ValueError: the body, the gait or its default angles are not symmetric, or a block declares no mirror.
-        """
-        image = mirror.image(self.scene.body)
-        if undeclared := [name for name, block in self.blocks.items() if block.mirror is None]:
-            raise ValueError(f"task {self.name}: block {undeclared[0]!r} declares no mirror")
-        observation = mirrors.joined(block.map(image) for block in self.blocks.values())
-        return Symmetry(observation, mirrors.joints(image))
 
     def first(self) -> Any:
         """Return the carry with which a new stream of episodes begins."""
@@ -304,52 +370,3 @@ class Task(ABC):
     def stream_state(self, memory) -> Any:
         """Return what the next episode of the stream starts from, given the memory at an episode's end."""
         return None
-
-    @functools.cached_property
-    def size(self) -> int:
-        """Of the observation as a vector."""
-        return sum(self.sizes.values())
-
-    def vector(self, blocks: Mapping[str, np.ndarray], dtype=None) -> np.ndarray:
-        """Return observed blocks as one vector (..., size), in new memory.
-
-        Raises:
-            ValueError: they are not those that the task declares.
-        """
-        self._check(blocks)
-        arrays = list(blocks.values())
-        return arrays[0].__array_namespace__().concatenate(arrays, axis=-1, dtype=dtype)
-
-    def named(self, blocks: Mapping[str, np.ndarray]) -> collections.OrderedDict:
-        """Return observed blocks by name, in new memory.
-
-        Raises:
-            ValueError: they are not those that the task declares.
-        """
-        self._check(blocks)
-        return collections.OrderedDict({name: block.copy() for name, block in blocks.items()})
-
-    def _check(self, blocks: Mapping[str, np.ndarray]) -> None:
-        if [(name, block.shape[-1]) for name, block in blocks.items()] != self._declared:
-            observed = {name: block.shape[-1] for name, block in blocks.items()}
-            raise ValueError(f"observation of {self.name}: expected blocks {self.sizes}, got {observed}")
-
-    def split(self, vector: np.ndarray) -> collections.OrderedDict:
-        """Return an observation vector (..., size) as named blocks, views of it.
-
-        Raises:
-            ValueError: a vector of another size.
-        """
-        if vector.shape[-1:] != (self.size,):
-            raise ValueError(f"observation: expected {self.size} numbers, got shape {vector.shape}")
-        return collections.OrderedDict((name, vector[..., part]) for name, part in self._parts.items())
-
-    @functools.cached_property
-    def _declared(self) -> list[tuple[str, int]]:
-        return list(self.sizes.items())
-
-    @functools.cached_property
-    def _parts(self) -> dict[str, slice]:
-        """Where each block lies in the vector."""
-        ends = itertools.accumulate(self.sizes.values())
-        return {name: slice(end - size, end) for (name, size), end in zip(self.sizes.items(), ends, strict=True)}

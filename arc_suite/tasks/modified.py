@@ -22,6 +22,7 @@ from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
 from arc_suite.tasks.readings import Readings
+from arc_suite.tasks.wrapper import Wrapper
 
 KICKS, SHORTEST, LONGEST = 25, 40, 121  # of a schedule, and control steps from one to the next
 
@@ -113,7 +114,7 @@ def draw(random: np.random.RandomState, legs: int) -> Draws:
     )
 
 
-def modified(task: Task, settings: Mapping[str, Any]) -> "Modified":
+def modified(task: Task, settings: Mapping[str, Any]) -> Task:
     """Return a task with modifiers.
 
     Args:
@@ -123,40 +124,26 @@ def modified(task: Task, settings: Mapping[str, Any]) -> "Modified":
     Raises:
         ValueError: an unknown name, or a value that does not fit.
     """
-    changes = checked(settings, task.scene.body, task.blocks)
-    return Modified(task.scene, task.settings, task.step_limit, task=task, changes=changes)
+    # A task by registration, which type checkers do not see.
+    return Modified(task, checked(settings, task.scene.body, task.blocks))  # type: ignore[return-value]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Modified(Task):
-    """A task around another.
+class Modified(Wrapper):
+    """A task with modifiers.
 
     Attributes:
-        task: the other.
         changes: what is changed of it.
     """
 
     from_body = ("gains", "reach", "noises")
 
-    task: Task = dataclasses.field(kw_only=True)
-    changes: Modifiers = dataclasses.field(kw_only=True)
+    changes: Modifiers
 
-    name = property(lambda self: self.task.name)
-    version = property(lambda self: self.task.version)
-    reads = property(lambda self: self.task.reads)
-    commands = property(lambda self: self.task.commands)
-    weights = property(lambda self: self.task.weights)
-    cost_limit = property(lambda self: self.task.cost_limit)
-    demonstrators = property(lambda self: self.task.demonstrators)
-    adapts = property(lambda self: self.task.adapts)
-    actions = property(lambda self: self.changes.actions)
-    parameters = property(lambda self: self.task.parameters)
-    target_velocity = property(lambda self: self.task.target_velocity)
-
-    @classmethod
-    def settings_for(cls, body, overrides):
-        """Refuse, as the other task fits its own settings."""
-        raise TypeError("a modified task is made by tasks.modified.modified, of a task that is fitted")
+    @property
+    def actions(self) -> str:
+        """What an action asks of a motor."""
+        return self.changes.actions
 
     @functools.cached_property
     def symmetry(self) -> Symmetry:
@@ -203,10 +190,6 @@ class Modified(Task):
                     noises[name] = slice(first, last), levels[name] * block.widths
         return noises
 
-    def first(self) -> Any:
-        """Return the other task's."""
-        return self.task.first()
-
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the other task's start, then what is random in the modifiers; see `Draws`."""
         start, body, changes = self.task.start(random, stream), self.scene.body, self.changes
@@ -237,14 +220,6 @@ class Modified(Task):
             if span != (1.0, 1.0):
                 model |= {name: _within(span, share) * model.get(name, self.scene.model[name]) for name in names}
         return start._replace(memory=Memory(start.memory, own), model=model)
-
-    def read(self, data) -> Readings:
-        """Take the other task's readings."""
-        return self.task.read(data)
-
-    def clear_spawn(self, memory: Memory, readings: Readings) -> np.ndarray | None:
-        """Return the other task's qpos (..., nq) of the start, or None."""
-        return self.task.clear_spawn(memory.task, readings)
 
     def begin(self, memory: Memory, readings: Readings) -> Memory:
         """Return the other task's memory, and the state of the joints."""
@@ -291,14 +266,6 @@ class Modified(Task):
         # With the leading axes of the memory, even where the task returns one boolean for all environments.
         return Memory(inner, own._replace(terminated=(own.terminated & False) | terminated))
 
-    def commanded(self, memory: Memory, name: str, value) -> Memory:
-        """Return the memory with a live command of the other task."""
-        return memory._replace(task=self.task.commanded(memory.task, name, value))
-
-    def terms(self, memory: Memory, readings: Readings) -> dict:
-        """Return the other task's terms."""
-        return self.task.terms(memory.task, readings)
-
     def observe(self, memory: Memory, readings: Readings) -> dict:
         """Return the other task's blocks with noise, without those that are left out."""
         observed, own = self.task.observe(memory.task, readings), memory.changes
@@ -309,18 +276,10 @@ class Modified(Task):
             blocks |= {name: blocks[name] + widths * drawn[..., part] for name, (part, widths) in self.noises.items()}
         return blocks
 
-    def ended(self, memory: Memory, readings: Readings) -> tuple:
-        """Return whether the other task has ended."""
-        return self.task.ended(memory.task, readings)
-
     def progress(self, memory: Memory) -> dict:
         """Return the other task's metrics, and whether the body `fell`, 0 or 1."""
         metrics = self.task.progress(memory.task)
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
-
-    def resampled(self, memory: Memory) -> Any:
-        """Return whether the latest step began another drawn command."""
-        return self.task.resampled(memory.task)
 
     def markers(self, memory: Memory, readings: Readings) -> list[Marker]:
         """Return the other task's, and for `SHOWN` steps a red arrow against the torso for a kick."""
@@ -352,14 +311,6 @@ class Modified(Task):
         if own.elapsed[0] <= FAILS_FROM:
             return ()
         return tuple(leg.name for leg, joints in zip(legs, self.members, strict=True) if own.failing[joints].any())
-
-    def phase(self, memory: Memory):
-        """Return the other task's phase (...) of the gait, rad."""
-        return self.task.phase(memory.task)
-
-    def stream_state(self, memory: Memory) -> Any:
-        """Return the other task's."""
-        return self.task.stream_state(memory.task)
 
     def _sensed(self, changes: Changes, readings: Readings) -> Changes:
         if self.changes.actions == "torque":

@@ -13,7 +13,6 @@ import numpy as np
 from arc_suite.envs import trees
 from arc_suite.tasks.clock import Clock, Clocks
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.modified import Modified
 
 _EQUAL = ("weights",)  # fields that tasks of one kind share
 _AGAINST_FEET = ("stance_threshold",)  # numbers that are compared with those of every foot
@@ -21,7 +20,7 @@ _AGAINST_FEET = ("stance_threshold",)  # numbers that are compared with those of
 
 def kind(task: Task) -> Hashable | None:
     """Return what tasks have in common that can be stacked; None for a task that cannot."""
-    inner = task.task if isinstance(task, Modified) else task
+    inner = task.unwrapped
     if not all(vars(type(each)).get("from_body") for each in (task, inner)):  # of the class itself
         return None
     scene = task.scene
@@ -46,8 +45,8 @@ def part(task: Task, indices: np.ndarray) -> Task:
 
 
 def _names(task: Task) -> tuple[str, ...]:
-    inner = ("task",) if isinstance(task, Modified) else ()
-    return ("settings", "step_limit", "standing", "control_timestep", *inner, *task.from_body)
+    own = ("settings", "step_limit", "standing", "control_timestep") if task.unwrapped is task else ("task",)
+    return (*own, *task.from_body)
 
 
 def _value(task: Task, name: str) -> Any:
@@ -55,9 +54,12 @@ def _value(task: Task, name: str) -> Any:
 
 
 def _with_values(task: Task, values: dict[str, Any]) -> Task:
-    scene = task.scene._replace(**{name: value for name, value in values.items() if name in task.scene._fields})
     fields = {field.name for field in dataclasses.fields(task)}
-    made = dataclasses.replace(task, scene=scene, **{name: values[name] for name in values if name in fields})
+    changed = {name: values[name] for name in values if name in fields}
+    if "scene" in fields:
+        scene = {name: value for name, value in values.items() if name in task.scene._fields}
+        changed["scene"] = task.scene._replace(**scene)
+    made = dataclasses.replace(task, **changed)
     # In the places of cached properties, which would follow from one body.
     made.__dict__.update({name: values[name] for name in task.from_body})
     return made
