@@ -102,7 +102,7 @@ MUTANTS = (
         "contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),",
         "contact_forces=forces.reshape(forces.shape[:-2] + (-1,)),",
     ),
-    Mutant("sign of a weight", '"smoothness": -0.02', '"smoothness": 0.02'),
+    Mutant("sign of a weight", '        "smoothness": -0.02', '        "smoothness": 0.02'),
     Mutant("yaw rate penalised in place of pitch rate", "i) for i in (2, 3, 4))", "i) for i in (2, 3, 5))"),
     Mutant("stance and swing exchanged", "% TWO_PI < TWO_PI", "% TWO_PI > TWO_PI"),
     Mutant("gait clock advances too late", "phases[tick - 1] + turn", "phases[tick - 1] + 0.5 * turn"),
