@@ -1,6 +1,6 @@
 """The same bits everywhere: `python tests/determinism.py` prints digests of 500 steps of every robot and task.
 
-One of the observations and one of the rewards, of a single environment and of a row among others,
+One of the observations and one of the rewards, of a single environment and of one among others,
 on each number of threads given (1, 2 and 8 by default); `--steps 100` is quicker, with digests of its own.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 import arc_suite
 from arc_suite import registry
 
-ROW, SEED = 1, 40  # the row that is looked at, and its seed
+INDEX, SEED = 1, 40  # the environment that is looked at, and its seed
 
 Step = tuple[np.ndarray, float | None]  # observation and reward; a reset of the environment has none
 
@@ -54,7 +54,7 @@ def single(robot: str, task: str, steps: int) -> Iterator[Step]:
     yield env.reset(seed=SEED)[0], None
     ended = False
     for action in actions(robot, steps):
-        if ended:  # as rows of a vector environment do
+        if ended:  # as vector environments do
             observation, reward, ended = env.reset()[0], 0.0, False
         else:
             observation, reward, terminated, truncated, _ = env.step(action)
@@ -63,13 +63,13 @@ def single(robot: str, task: str, steps: int) -> Iterator[Step]:
     env.close()
 
 
-def row(robot: str, task: str, threads: int, steps: int) -> Iterator[Step]:
-    """Step three rows, and show one of them."""
+def batched(robot: str, task: str, threads: int, steps: int) -> Iterator[Step]:
+    """Step three environments, and show one of them."""
     envs = gymnasium.make_vec(env_id(robot, task), num_envs=3, num_threads=threads)
-    yield envs.reset(seed=SEED - ROW)[0][ROW], None
+    yield envs.reset(seed=SEED - INDEX)[0][INDEX], None
     for action in actions(robot, steps):
         observations, rewards, *_ = envs.step(np.stack([action] * 3))
-        yield observations[ROW], rewards[ROW]
+        yield observations[INDEX], rewards[INDEX]
     envs.close()
 
 
@@ -82,7 +82,7 @@ def main() -> None:
     print(f"{'robot':<10}{'task':<10}{'way':<16}{'observations':<18}rewards")
     for robot, task in arc_suite.ALL_TASKS:
         ways = {"single": single(robot, task, given.steps)}
-        ways |= {f"row, threads={count}": row(robot, task, count, given.steps) for count in given.threads}
+        ways |= {f"batch, threads={count}": batched(robot, task, count, given.steps) for count in given.threads}
         for way, episode in ways.items():
             found = digests(episode)
             print(f"{robot:<10}{task:<10}{way:<16}{found.observations:<18}{found.rewards}", flush=True)

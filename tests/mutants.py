@@ -81,7 +81,7 @@ MUTANTS = (
     # Simulations.
     Mutant("no sensors, so no contact forces", "option.disableflags = flags\n", "pass\n"),
     Mutant("one substep too few", "mj_step(model, data, nstep - 1)", "mj_step(model, data, nstep - 2)"),
-    Mutant("one substep of rows too few", "simulations.step(mask, nstep - 1)", "simulations.step(mask, nstep - 2)"),
+    Mutant("one substep of batches too few", "simulations.step(mask, nstep - 1)", "simulations.step(mask, nstep - 2)"),
     Mutant("margin of a pair not summed", "model.geom_margin[both].sum()", "model.geom_margin[both].max()"),
     Mutant("friction of a pair not mixed", "friction.max(axis=0)", "friction[0]"),
     Mutant("Euler without damping", "        and model.dof_damping.any()\n", ""),
@@ -163,7 +163,7 @@ MUTANTS = (
     ),
     Mutant("a changed model stays so", "if self._unchanged:", "if False:"),
     Mutant(
-        "the last substep of rows on the compiled model",
+        "the last substep of batches on the compiled model",
         "set_models(self._own)\n            simulations.step(mask)",
         "set_models(None)\n            simulations.step(mask)",
     ),
@@ -178,7 +178,7 @@ MUTANTS = (
         "value, self.definition.first(), False",
     ),
     Mutant(
-        "a new stream of a row carries on the old one",
+        "a new stream of an environment carries on the old one",
         "self._streams_begin[index] = seeds[index], True",
         "self._streams_begin[index] = seeds[index], False",
     ),
@@ -189,17 +189,19 @@ MUTANTS = (
         "self._observation = observation",
     ),
     Mutant(
-        "a command for all rows",
+        "a command for all environments",
         "memory = changed if mask is None else trees.chosen(mask, changed, memory)",
         "memory = changed",
     ),
-    Mutant("commands of rows replace one another", "value, mask = np.where(mask[:, None], value, before)", "mask"),
+    Mutant(
+        "commands of environments replace one another", "value, mask = np.where(mask[:, None], value, before)", "mask"
+    ),
     Mutant(
         "a copy resets the shared model",
         "        if share_model:\n            self._shared",
         "        if False:\n            self._shared",
     ),
-    Mutant("kicks forgotten in rows", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
+    Mutant("kicks forgotten in batches", "data.qvel[stepping] += inputs.kick[stepping]", "pass"),
     Mutant("two threads in one environment", "not lock.acquire(False)", "False"),
     # Demonstrators and policies.
     Mutant("sign of the sweep", "= -1.0 if leg.side", "= 1.0 if leg.side"),
@@ -207,11 +209,13 @@ MUTANTS = (
     Mutant("damping has the wrong sign", "- damping * velocities", "+ damping * velocities"),
     Mutant("no crouch", "steps < self.settle", "steps < 0"),
     Mutant(
-        "a row walks by another's preset",
+        "an environment walks by another's preset",
         "np.atleast_1d(value) for value in values]",
         "np.atleast_1d(value) for value in values[::-1]]",
     ),
-    Mutant("presets take turns from row to row", "= np.asarray(seeds) % len", "= np.asarray(rows) % len"),
+    Mutant(
+        "presets take turns from environment to environment", "= np.asarray(seeds) % len", "= np.asarray(rows) % len"
+    ),
     Mutant("the same noise in all episodes", "default_rng((seed, 1))", "default_rng(1)"),
     # Style.
     Mutant("feet in the air slip", " * track.contacts", ""),

@@ -1,6 +1,6 @@
 """Endurance: what memory, threads and file descriptors do in the long run; `make check-soak`, minutes.
 
-`python tests/soak.py` steps environments two million times, single ones and rows of a vector
+`python tests/soak.py` steps environments two million times, single ones and environments of a vector
 environment in turn, with resets and a frame of each every 10,000 steps; then it makes, steps,
 renders and closes 500 environments. Exit status 1 if memory grows faster or threads or file
 descriptors become more than the targets of docs/reliability.md allow. Linux only.
@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 import arc_suite  # noqa: F401 (registers)
 
-ROWS = 8
+NUM_ENVS = 8
 GROWTH = 20.0  # MB, that 500 lives may cost
 WARM_UP = 0.1  # share of the samples that come before the memory's slope
 
@@ -40,10 +40,10 @@ def soak(steps: int, block: int) -> tuple[float, set[tuple[int, int]], int]:
         descriptors seen at the end of a block; and the number of resets.
     """
     single = gymnasium.make("arc_suite/queen-walk-v0", render_mode="rgb_array")
-    rows = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=ROWS, render_mode="rgb_array")
+    envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=NUM_ENVS, render_mode="rgb_array")
     random = np.random.default_rng(0)
     single.reset(seed=0)
-    rows.reset(seed=0)
+    envs.reset(seed=0)
     samples, seen, resets = [], set(), 0
     for _ in tqdm(range(steps // block), unit="block", smoothing=0.0):
         for _ in range(block // 2):
@@ -51,16 +51,16 @@ def soak(steps: int, block: int) -> tuple[float, set[tuple[int, int]], int]:
             if terminated or truncated:
                 single.reset()
                 resets += 1
-        for _ in range(block // 2 // ROWS):
-            _, _, terminated, truncated, _ = rows.step(random.uniform(-1, 1, (ROWS, 18)).astype(np.float32))
+        for _ in range(block // 2 // NUM_ENVS):
+            _, _, terminated, truncated, _ = envs.step(random.uniform(-1, 1, (NUM_ENVS, 18)).astype(np.float32))
             resets += int((terminated | truncated).sum())
-        single.render(), rows.render([0])
+        single.render(), envs.render([0])
         samples.append(memory())
         seen.add(handles())
     first = int(WARM_UP * len(samples)) + 1
     million = np.arange(len(samples)) * block / 1e6
     slope = np.polyfit(million[first:], samples[first:], 1)[0]
-    single.close(), rows.close()
+    single.close(), envs.close()
     return float(slope), seen, resets
 
 

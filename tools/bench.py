@@ -25,7 +25,9 @@ flags.DEFINE_list("robots", list(ROBOTS), "Whose walks.")
 flags.DEFINE_list("num_envs", ["1", "16", "64", "256", "1024"], "Numbers of environments of the vector environment.")
 flags.DEFINE_list("workers", None, "Numbers of processes of AsyncVectorEnv; 1, 2 and 4 for each thread by default.")
 flags.DEFINE_integer("rounds", 9, "How often everything is measured in turn.", lower_bound=1)
-flags.DEFINE_integer("steps", 60, "Control steps of one turn; a third of it where there are many rows.", lower_bound=1)
+flags.DEFINE_integer(
+    "steps", 60, "Control steps of one turn; a third of it where there are many environments.", lower_bound=1
+)
 flags.DEFINE_string("json", "out/bench.json", "Where to write all measurements.")
 flags.DEFINE_string("plot", "out/bench.png", "Where to write the plot.")
 flags.DEFINE_string("document", None, "A Markdown file between whose <!-- benchmark --> marks to put the tables.")

@@ -14,7 +14,7 @@ from arc_suite.envs.vector import VectorEnv
 
 
 class VecEnv(vec_env.VecEnv):
-    """Rows of one task as stable-baselines3's vector environment.
+    """Environments of one task as stable-baselines3's vector environment.
 
     `VecEnv(gymnasium.make_vec("arc_suite/queen-walk-v0", num_envs=16, autoreset_mode="SameStep"))`
     gives the same bits as a `DummyVecEnv` of as many single environments, on all cores.

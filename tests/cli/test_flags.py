@@ -130,17 +130,17 @@ def test_gymnasium_takes_a_body_where_a_robot_stands(body):
     made.close()
 
 
-def test_rows_of_a_body_are_bit_equal_to_single_environments():
+def test_environments_of_a_body_are_bit_equal_to_single_environments():
     body = load_body(SPIDER)
-    rows = gymnasium.make_vec("arc_suite/queen-walk-v0", num_envs=2, domain_name=body)
+    envs = gymnasium.make_vec("arc_suite/queen-walk-v0", num_envs=2, domain_name=body)
     singles = [Env(body, "walk") for _ in range(2)]
-    batch, _ = rows.reset(seed=3)
+    batch, _ = envs.reset(seed=3)
     np.testing.assert_array_equal(batch, [env.reset(seed=3 + i)[0] for i, env in enumerate(singles)])
     random = np.random.default_rng(0)
     for _ in range(5):
-        actions = random.uniform(-1.0, 1.0, rows.action_space.shape).astype(np.float32)
-        batch, rewards, *_ = rows.step(actions)
+        actions = random.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
+        batch, rewards, *_ = envs.step(actions)
         steps = [env.step(action) for env, action in zip(singles, actions, strict=True)]
         np.testing.assert_array_equal(batch, [step[0] for step in steps])
         np.testing.assert_array_equal(rewards, [step[1] for step in steps])
-    rows.close()
+    envs.close()

@@ -22,8 +22,8 @@ def fitted(body):
 @pytest.mark.parametrize(("task", "difficulty", "further"), [("rough", 1.0 / 3.0, 0.05), ("slopes", 2.0 / 3.0, 0.2)])
 def test_balance_takes_leaper_further(task, difficulty, further):
     ground = {"difficulty": difficulty, "terrain_seed": 1}
-    before, _ = crossed("leaper", "surefooted", task, ground, rows=6)
-    after, fell = crossed("leaper", "balanced", task, ground, rows=6)
+    before, _ = crossed("leaper", "surefooted", task, ground, num_envs=6)
+    after, fell = crossed("leaper", "balanced", task, ground, num_envs=6)
     assert after >= before + further and not fell, (before, after, fell)
 
 

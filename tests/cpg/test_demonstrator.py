@@ -1,4 +1,4 @@
-"""Demonstrators: the published law, rows and single ones, any control step."""
+"""Demonstrators: the published law, environments and single ones, any control step."""
 
 import math
 import warnings
@@ -112,21 +112,21 @@ def test_action_is_the_published_law(robot):
         assert_allclose(action[sure], expected[sure], atol=1e-12, err_msg=f"step {step}")
 
 
-def test_time_steps_blocks_and_rows_give_the_same_action():
+def test_time_steps_blocks_and_environments_give_the_same_action():
     environment = arc_suite.load("bastion", "walk", {"random": 0})
     timestep = environment.reset()
-    single, act, rows = Demonstrator("bastion"), alone(Demonstrator("bastion")), Demonstrator("bastion")
+    single, act, batch = Demonstrator("bastion"), alone(Demonstrator("bastion")), Demonstrator("bastion")
     for _ in range(30):
         blocks = timestep.observation
         action = single(timestep)
         assert_array_equal(action, act(timestep))
-        for row in rows.act({name: np.stack([block, block]) for name, block in blocks.items()}):
-            assert_array_equal(action, row)
+        for found in batch.act({name: np.stack([block, block]) for name, block in blocks.items()}):
+            assert_array_equal(action, found)
         timestep = environment.step(action)
 
 
 @pytest.mark.filterwarnings("ignore:.*another robot")  # what is felt here is drawn at random
-def test_batch_rows_are_single_demonstrators_and_restart_alone():
+def test_batches_are_single_demonstrators_and_restart_alone():
     rng = np.random.default_rng(0)
     batch, singles = Demonstrator("tick"), [Demonstrator("tick") for _ in range(3)]
     split = arc_suite.load("tick", "walk").task.definition.split
@@ -134,11 +134,11 @@ def test_batch_rows_are_single_demonstrators_and_restart_alone():
         observations = rng.normal(0, 0.3, (3, 199))
         restarting = {25: [1], 40: [0, 2]}.get(step, [])
         batch.reset(restarting)
-        for row in restarting:
-            singles[row].reset([0])
+        for index in restarting:
+            singles[index].reset([0])
         actions = batch.act(split(observations))
-        for row, single in enumerate(singles):
-            assert_array_equal(actions[row], single.act(split(observations[row])))
+        for index, single in enumerate(singles):
+            assert_array_equal(actions[index], single.act(split(observations[index])))
 
 
 def test_first_timestep_restarts_the_clock():
@@ -248,9 +248,9 @@ def test_stacked_controls_are_single_ones():
         quaternions = rotations.turned(UPRIGHT, random.uniform(-1.0, 1.0, len(presets)))
         angles, velocities = random.normal(0.0, 0.3, (2, len(presets), 18))
         actions = stacked(np.full(len(presets), clock), quaternions, angles, velocities)
-        for row, control in enumerate(controls):
-            alone = control(np.array(clock), quaternions[row], angles[row], velocities[row])
-            assert_array_equal(actions[row], alone)
+        for index, control in enumerate(controls):
+            alone = control(np.array(clock), quaternions[index], angles[index], velocities[index])
+            assert_array_equal(actions[index], alone)
 
 
 def test_torques_ahead_are_harmonics_of_the_legs_phase_and_steering_by_yaw():

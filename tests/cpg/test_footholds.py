@@ -19,7 +19,7 @@ def scan(*trenches, moved=0.0):
 
 
 def view(*scans):
-    """A view of one row from (heights, moved) of scans."""
+    """A view of one environment from (heights, moved) of scans."""
     heights, moved = zip(*scans, strict=True)
     return View(np.stack(heights)[None], np.array([[(way, 0.0) for way in moved]]), REACH)
 

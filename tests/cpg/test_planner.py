@@ -89,18 +89,18 @@ def test_commands_turn_to_where_they_lead():
     assert toward(-2.0, PLAN) == (forward, -left, -turn)
 
 
-def test_rows_act_as_each_alone():
-    rows = VectorEnv("tick", "navigate", 3, 1)
+def test_environments_act_as_each_alone():
+    envs = VectorEnv("tick", "navigate", 3, 1)
     together, alone = Demonstrator("tick", "planned"), [Demonstrator("tick", "planned") for _ in range(3)]
-    observations, _ = rows.reset(seed=0)
+    observations, _ = envs.reset(seed=0)
     for _ in range(40):
-        blocks = rows.task.split(observations.astype(float))
+        blocks = envs.task.split(observations.astype(float))
         actions = together.act(blocks)
-        for row, demonstrator in enumerate(alone):
-            single = {name: block[row : row + 1] for name, block in blocks.items()}
-            assert_array_equal(demonstrator.act(single)[0], actions[row])
-        observations, *_ = rows.step(actions)
-    rows.close()
+        for index, demonstrator in enumerate(alone):
+            single = {name: block[index : index + 1] for name, block in blocks.items()}
+            assert_array_equal(demonstrator.act(single)[0], actions[index])
+        observations, *_ = envs.step(actions)
+    envs.close()
 
 
 def test_another_task_is_refused_in_one_line():
@@ -113,12 +113,12 @@ def test_another_task_is_refused_in_one_line():
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_robots_reach_goals_and_hit_nothing(robot):
     """At least four goals in 1000 steps, fewer than one collision in twenty."""
-    rows, demonstrator = VectorEnv(robot, "navigate", 8), Demonstrator(robot, "planned")
-    observations, _ = rows.reset(seed=100)
+    envs, demonstrator = VectorEnv(robot, "navigate", 8), Demonstrator(robot, "planned")
+    observations, _ = envs.reset(seed=100)
     for _ in range(999):
-        observations, _, terminated, _, infos = rows.step(demonstrator.act(rows.task.split(observations)))
+        observations, _, terminated, _, infos = envs.step(demonstrator.act(envs.task.split(observations)))
         assert not terminated.any()
     goals, collisions = infos["progress_goals"], infos["progress_collisions"]
-    rows.close()
+    envs.close()
     assert goals.mean() >= 4.0
     assert collisions.sum() < 0.05 * goals.sum()

@@ -30,17 +30,17 @@ COMMANDS = np.array(
 
 def obeyed(body, preset="steered", steps=300):
     """Mean motion (commands, 3) over the steps after the first hundred, and who fell."""
-    rows = VectorEnv(body, "steer", len(COMMANDS))
+    envs = VectorEnv(body, "steer", len(COMMANDS))
     policy = Demonstrator(body, preset)
-    rows.reset(seed=0)
-    rows.command("command", COMMANDS)
-    observations, fell, motions = rows.step(np.zeros(rows.action_space.shape))[0], np.zeros(len(COMMANDS), bool), []
+    envs.reset(seed=0)
+    envs.command("command", COMMANDS)
+    observations, fell, motions = envs.step(np.zeros(envs.action_space.shape))[0], np.zeros(len(COMMANDS), bool), []
     for step in range(steps):
-        observations, _, terminated, *_ = rows.step(policy.act(rows.task.split(observations)))
+        observations, _, terminated, *_ = envs.step(policy.act(envs.task.split(observations)))
         fell |= terminated
         if step >= 100:
-            motions.append(rows.task.split(observations)["command"][:, 3:])
-    rows.close()
+            motions.append(envs.task.split(observations)["command"][:, 3:])
+    envs.close()
     return np.mean(motions, axis=0), fell
 
 
@@ -75,28 +75,28 @@ def test_an_open_loop_does_not():
         ("leaper", "rough", "balanced", 40),
     ],
 )
-def test_rows_are_single_demonstrators(robot, task, preset, steps):
-    rows, policy = VectorEnv(robot, task, 3), Demonstrator(robot, preset)
+def test_environments_are_single_demonstrators(robot, task, preset, steps):
+    envs, policy = VectorEnv(robot, task, 3), Demonstrator(robot, preset)
     single, alone = arc_suite.load(robot, task), Demonstrator(robot, preset)
-    observations, timestep = rows.reset(seed=4)[0], single.reset(5)
+    observations, timestep = envs.reset(seed=4)[0], single.reset(5)
     for step in range(steps):
-        actions = policy.act({name: block.astype(float) for name, block in rows.task.split(observations).items()})
+        actions = policy.act({name: block.astype(float) for name, block in envs.task.split(observations).items()})
         blocks = {name: block.astype(np.float32) for name, block in timestep.observation.items()}
         assert_array_equal(actions[1], alone(timestep._replace(observation=blocks)), err_msg=f"step {step}")
-        observations, *_ = rows.step(actions)
+        observations, *_ = envs.step(actions)
         timestep = single.step(actions[1])
 
 
 @pytest.mark.parametrize(("robot", "task", "preset"), [("tick", "gaps", "sighted"), ("leaper", "rough", "balanced")])
-def test_a_row_that_begins_again_does_as_the_first_time(robot, task, preset):
-    rows, policy = VectorEnv(robot, task, 2), Demonstrator(robot, preset)
+def test_an_environment_that_begins_again_does_as_the_first_time(robot, task, preset):
+    envs, policy = VectorEnv(robot, task, 2), Demonstrator(robot, preset)
 
     def walked():
-        observations = rows.reset(seed=4)[0]
+        observations = envs.reset(seed=4)[0]
         policy.reset([0, 1])
         for _ in range(20):
-            actions = policy.act(rows.task.split(observations))
-            observations = rows.step(actions)[0]
+            actions = policy.act(envs.task.split(observations))
+            observations = envs.step(actions)[0]
         return actions
 
     assert_array_equal(walked(), walked())

@@ -159,8 +159,8 @@ def test_episodes_depend_on_seed_and_settings_alone(name):
     settings = COLLECTED[name]
     collect(ID, settings, 7, num_envs=7, threads=1)
     expected = digests()
-    for other, rows, threads in (("a", 1, 1), ("b", 3, 2), ("c", 100, 4)):
-        collect(f"{ID[:-3]}-{other}-v0", settings, 7, num_envs=rows, threads=threads)
+    for other, num_envs, threads in (("a", 1, 1), ("b", 3, 2), ("c", 100, 4)):
+        collect(f"{ID[:-3]}-{other}-v0", settings, 7, num_envs=num_envs, threads=threads)
         assert digests(f"{ID[:-3]}-{other}-v0") == expected
     later = settings._replace(seed=settings.seed + 4)
     collect(f"{ID[:-3]}-later-v0", later, 3)

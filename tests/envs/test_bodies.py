@@ -87,7 +87,7 @@ def assert_infos_equal(info, expected, index, env):
             assert same(np.asarray(info[name][index]), np.asarray(value[0])), name
 
 
-def assert_rows(bodies, task, mode, threads, settings=SHORT, steps=40):
+def assert_environments(bodies, task, mode, threads, settings=SHORT, steps=40):
     env = make(bodies, task, autoreset_mode=mode, num_threads=threads, task_kwargs=settings)
     singles = alone(env, task, mode, settings)
     env.reset(seed=3)
@@ -98,18 +98,18 @@ def assert_rows(bodies, task, mode, threads, settings=SHORT, steps=40):
 
 @pytest.mark.parametrize(("task", "mode"), [("walk", "NextStep"), ("steer", "SameStep")])
 def test_each_is_that_of_its_body_alone(task, mode):
-    assert assert_rows(FEW, task, mode, threads=2).sum() > 0
+    assert assert_environments(FEW, task, mode, threads=2).sum() > 0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_modifiers_change_the_model_of_each(task):
-    assert_rows([*FEW, FEW[0]], task, "NextStep", 2, SHORT | MODIFIED)
+    assert_environments([*FEW, FEW[0]], task, "NextStep", 2, SHORT | MODIFIED)
 
 
 @pytest.mark.slow
 def test_tasks_with_a_ground_have_a_batch_for_each_body():
-    assert assert_rows(FEW[:2], "rough", "SameStep", 1, {"time_limit": 0.3}, steps=20).sum() > 0
+    assert assert_environments(FEW[:2], "rough", "SameStep", 1, {"time_limit": 0.3}, steps=20).sum() > 0
 
 
 @pytest.mark.release
@@ -117,14 +117,14 @@ def test_tasks_with_a_ground_have_a_batch_for_each_body():
 @pytest.mark.parametrize("task", ["walk", "steer", "shoved", "limp", "walk with modifiers"])
 def test_each_of_all_layouts(task, mode):
     settings, threads = SHORT | (MODIFIED if "modifiers" in task else {}), 1 + MODES.index(mode)
-    ends = assert_rows([*LAYOUTS, *TWINS], task.split()[0], mode, threads, settings, steps=25)
+    ends = assert_environments([*LAYOUTS, *TWINS], task.split()[0], mode, threads, settings, steps=25)
     assert ends.sum() > 0
 
 
 @pytest.mark.release
 @pytest.mark.parametrize("task", ["slopes", "stairs", "gaps", "course", "roam", "navigate"])
 def test_each_on_other_grounds(task):
-    assert_rows(FEW, task, "NextStep", 1, steps=25)
+    assert_environments(FEW, task, "NextStep", 1, steps=25)
 
 
 def test_other_commands_of_each(monkeypatch):

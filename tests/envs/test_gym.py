@@ -160,7 +160,7 @@ def test_numpy_seeds(seed):
     assert env.unwrapped.np_random_seed == 5
 
 
-def test_largest_seed_works_and_resets_in_a_row_differ():
+def test_largest_seed_works_and_resets_in_an_environment_differ():
     env = gymnasium.make(IDS[3])
     first, second = env.reset(seed=2**32 - 1)[0], env.reset()[0]
     assert not np.array_equal(first, second)
@@ -523,20 +523,20 @@ def rollout(envs, seed, steps=25):
 
 
 @EVERY_ID
-def test_vector_env_is_its_rows(env_id):
+def test_vector_env_is_its_environments(env_id):
     envs = gymnasium.make_vec(env_id, num_envs=2, vectorization_mode="sync")
     assert envs.observation_space.shape == (2, SIZES[robot(env_id)][0]) and envs.metadata["render_fps"] == 20
     collected = rollout(envs, seed=[7, 8])
-    for row, seed in enumerate((7, 8)):
+    for index, seed in enumerate((7, 8)):
         env = gymnasium.make(env_id)
         observation, _ = env.reset(seed=seed)
-        assert_same(collected[0][row], observation)
+        assert_same(collected[0][index], observation)
         drawn = np.random.default_rng(0).uniform(-1, 1, (25, 2, *env.action_space.shape)).astype(np.float32)
-        for step, action in enumerate(drawn[:, row]):
+        for step, action in enumerate(drawn[:, index]):
             observation, reward, terminated, _, info = env.step(action)
-            assert_same(collected[3 * step + 1][row], observation)
-            assert collected[3 * step + 2][row] == reward
-            assert collected[3 * step + 3][row] == info["reward_forward"]
+            assert_same(collected[3 * step + 1][index], observation)
+            assert collected[3 * step + 2][index] == reward
+            assert collected[3 * step + 3][index] == info["reward_forward"]
             if terminated:
                 break
 

@@ -1,4 +1,4 @@
-"""Rows for stable-baselines3: what its own vector environment makes of single environments."""
+"""Environments for stable-baselines3: what its own vector environment makes of single environments."""
 
 import gymnasium
 import numpy as np
@@ -22,23 +22,23 @@ SETTINGS = {
 
 @pytest.fixture
 def both():
-    rows = sb3.VecEnv(gymnasium.make_vec(ID, num_envs=3, autoreset_mode="SameStep", **SETTINGS))
+    envs = sb3.VecEnv(gymnasium.make_vec(ID, num_envs=3, autoreset_mode="SameStep", **SETTINGS))
     dummy = vec_env.DummyVecEnv([lambda: gymnasium.make(ID, **SETTINGS)] * 3)
-    yield rows, dummy
-    rows.close(), dummy.close()
+    yield envs, dummy
+    envs.close(), dummy.close()
 
 
-def test_rows_are_stable_baselines_own(both):
-    rows, dummy = both
-    assert (rows.num_envs, rows.render_mode) == (dummy.num_envs, dummy.render_mode)
-    assert (rows.observation_space, rows.action_space) == (dummy.observation_space, dummy.action_space)
-    rows.seed(5), dummy.seed(5)
-    assert data_equivalence(rows.reset(), dummy.reset(), exact=True)
-    assert rows.reset_infos == dummy.reset_infos
+def test_environments_are_stable_baselines_own(both):
+    envs, dummy = both
+    assert (envs.num_envs, envs.render_mode) == (dummy.num_envs, dummy.render_mode)
+    assert (envs.observation_space, envs.action_space) == (dummy.observation_space, dummy.action_space)
+    envs.seed(5), dummy.seed(5)
+    assert data_equivalence(envs.reset(), dummy.reset(), exact=True)
+    assert envs.reset_infos == dummy.reset_infos
     random, ends, falls = np.random.RandomState(0), 0, 0
     for _ in range(70):
         actions = random.uniform(-1, 1, (3, 18)).astype(np.float32)
-        result, expected = rows.step(actions), dummy.step(actions)
+        result, expected = envs.step(actions), dummy.step(actions)
         assert data_equivalence(result[:3], expected[:3], exact=True)
         for info, wanted in zip(result[3], expected[3], strict=True):
             assert info.keys() == wanted.keys()
@@ -48,30 +48,30 @@ def test_rows_are_stable_baselines_own(both):
         ends += result[2].sum()
         falls += sum(done and not info["TimeLimit.truncated"] for done, info in zip(result[2], result[3], strict=True))
     assert ends > falls > 0
-    assert data_equivalence(rows.reset(), dummy.reset(), exact=True)
-    for image, wanted in zip(rows.get_images(), dummy.get_images(), strict=True):
+    assert data_equivalence(envs.reset(), dummy.reset(), exact=True)
+    for image, wanted in zip(envs.get_images(), dummy.get_images(), strict=True):
         np.testing.assert_array_equal(image, wanted)
     for name in ("render_mode", "np_random_seed", "action_space"):
-        assert rows.get_attr(name) == dummy.get_attr(name)
-        assert rows.get_attr(name, [2, 0]) == dummy.get_attr(name, [2, 0])
-    assert rows.env_is_wrapped(gymnasium.Wrapper) == [False] * 3
-    assert rows.has_attr("task") and not rows.has_attr("nothing")
+        assert envs.get_attr(name) == dummy.get_attr(name)
+        assert envs.get_attr(name, [2, 0]) == dummy.get_attr(name, [2, 0])
+    assert envs.env_is_wrapped(gymnasium.Wrapper) == [False] * 3
+    assert envs.has_attr("task") and not envs.has_attr("nothing")
 
 
 def test_agents_save_what_they_were_trained_for(both):
     """The space is that of single environments, with an attribute."""
-    rows, dummy = both
+    envs, dummy = both
     known = {"robot": "tick", "task": "walk", "task_kwargs": {"time_limit": 1.0}}
-    assert rows.observation_space.arc_suite == known
-    assert not hasattr(rows.environments.single_observation_space, "arc_suite")
+    assert envs.observation_space.arc_suite == known
+    assert not hasattr(envs.environments.single_observation_space, "arc_suite")
 
 
-def test_calls_of_rows(both):
-    rows, _ = both
-    rows.set_attr("note", 7)
-    assert rows.get_attr("note") == [7] * 3
-    assert len(rows.env_method("render", indices=[0, 1, 2])) == 3
-    for use in (lambda: rows.set_attr("note", 8, indices=0), lambda: rows.env_method("note", indices=[0])):
+def test_calls_of_environments(both):
+    envs, _ = both
+    envs.set_attr("note", 7)
+    assert envs.get_attr("note") == [7] * 3
+    assert len(envs.env_method("render", indices=[0, 1, 2])) == 3
+    for use in (lambda: envs.set_attr("note", 8, indices=0), lambda: envs.env_method("note", indices=[0])):
         with pytest.raises(ValueError, match=r"^note: environments share it; expected all 3, got "):
             use()
 
@@ -88,7 +88,7 @@ def test_stable_baselines_wrappers_take_them(both):
 
 def test_other_modes_are_one_line():
     message = "^stable-baselines3 resets at once: expected a vector environment of this suite with autoreset_mode='Same"
-    for rows in (gymnasium.make_vec(ID, num_envs=2), gymnasium.make(ID)):
+    for envs in (gymnasium.make_vec(ID, num_envs=2), gymnasium.make(ID)):
         with pytest.raises(ValueError, match=message) as error:
-            sb3.VecEnv(rows)
+            sb3.VecEnv(envs)
         assert "\n" not in str(error.value)

@@ -10,12 +10,12 @@ from tiers import tiers, turn
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.tasks import TASKS
 
-ROWS, LIMIT = 3, 1.5  # s: episodes end within a test
+NUM_ENVS, LIMIT = 3, 1.5  # s: episodes end within a test
 MODES = ("SameStep", "NextStep")
 
 
-def rows(task="walk", mode="SameStep", robot="tick", **settings):
-    return VectorEnv(robot, task, ROWS, 1, mode, task_kwargs={"time_limit": LIMIT} | settings)
+def envs(task="walk", mode="SameStep", robot="tick", **settings):
+    return VectorEnv(robot, task, NUM_ENVS, 1, mode, task_kwargs={"time_limit": LIMIT} | settings)
 
 
 def through_a_file(arrays):
@@ -41,10 +41,10 @@ def assert_equal_steps(one, other, actions):
     ),
 )
 def test_another_environment_goes_on_to_the_bit(task, mode):
-    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (100, ROWS, 18))
-    one, other = rows(task, mode, random=5), rows(task, mode)
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (100, NUM_ENVS, 18))
+    one, other = envs(task, mode, random=5), envs(task, mode)
     one.reset()
-    for action in actions[:40]:  # so that levels and models of rows are no longer those of the start
+    for action in actions[:40]:  # so that levels and models of environments are no longer those of the start
         one.step(action)
     arrays = through_a_file(one.snapshot())
     observations = one.step(actions[40])[0]
@@ -55,56 +55,56 @@ def test_another_environment_goes_on_to_the_bit(task, mode):
 
 
 def test_an_environment_goes_back():
-    environment = rows(random=1)
+    environment = envs(random=1)
     environment.reset()
-    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (60, ROWS, 18))
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (60, NUM_ENVS, 18))
     arrays = environment.snapshot()
     before = [environment.step(action)[0] for action in actions]
     environment.restore(arrays)
     np.testing.assert_array_equal([environment.step(action)[0] for action in actions], before)
 
 
-def test_rows_that_wait_or_rest():
-    one, other = rows(mode="Disabled", random=2), rows(mode="Disabled")
+def test_environments_that_wait_or_rest():
+    one, other = envs(mode="Disabled", random=2), envs(mode="Disabled")
     one.reset()
     one.rest(np.array([False, True, False]))
     for _ in range(10):
-        one.step(np.zeros((ROWS, 18)))
+        one.step(np.zeros((NUM_ENVS, 18)))
     other.restore(one.snapshot())
-    assert_equal_steps(one, other, np.zeros((30, ROWS, 18)))
+    assert_equal_steps(one, other, np.zeros((30, NUM_ENVS, 18)))
 
 
 def test_a_snapshot_does_not_change():
-    environment = rows(random=3)
+    environment = envs(random=3)
     environment.reset()
     arrays = environment.snapshot()
     before = {name: array.copy() for name, array in arrays.items()}
     for _ in range(5):
-        environment.step(np.ones((ROWS, 18)))
+        environment.step(np.ones((NUM_ENVS, 18)))
     assert all(np.array_equal(before[name], array, equal_nan=True) for name, array in arrays.items())
 
 
 def test_before_a_reset_there_is_none():
     with pytest.raises(ResetNeeded, match=r"^cannot take a snapshot: no episode has begun; call reset first$"):
-        rows().snapshot()
+        envs().snapshot()
 
 
 @pytest.mark.parametrize("other", [{"task": "steer"}, {"robot": "leaper"}])
 def test_of_another_task_or_body(other):
-    environment = rows()
+    environment = envs()
     environment.reset()
     with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: ") as caught:
-        rows(**other).restore(environment.snapshot())
+        envs(**other).restore(environment.snapshot())
     assert "\n" not in str(caught.value)
 
 
 def test_something_is_missing():
-    environment = rows()
+    environment = envs()
     environment.reset()
     arrays = environment.snapshot()
     del arrays["random/keys"]
     with pytest.raises(ValueError, match=r"^snapshot: of another task or number of environments: 'random/keys'$"):
-        rows().restore(arrays)
+        envs().restore(arrays)
 
 
 def changed(arrays, name, place, value):
@@ -117,10 +117,13 @@ def changed(arrays, name, place, value):
     ("change", "message"),
     [
         (
-            lambda arrays: {**arrays, "batch/model_jnt_qposadr": np.full((ROWS, 19), 10**8)},
+            lambda arrays: {**arrays, "batch/model_jnt_qposadr": np.full((NUM_ENVS, 19), 10**8)},
             "model_jnt_qposadr: no array",
         ),
-        (lambda arrays: {**arrays, "batch/model_body_mass": np.ones((ROWS, 2))}, "model_body_mass: expected float64"),
+        (
+            lambda arrays: {**arrays, "batch/model_body_mass": np.ones((NUM_ENVS, 2))},
+            "model_body_mass: expected float64",
+        ),
         (lambda arrays: changed(arrays, "batch/state", (1, 3), np.nan), "state: expected finite numbers"),
         (lambda arrays: changed(arrays, "batch/qpos", (0, 0), np.inf), "qpos: expected finite numbers"),
         (lambda arrays: {**arrays, "batch/qpos": arrays["batch/qpos"].astype(np.float32)}, "qpos: expected float64"),
@@ -134,14 +137,14 @@ def changed(arrays, name, place, value):
             "random/normals: expected numbers from -64",
         ),
         (lambda arrays: {**arrays, "random/keys": arrays["random/keys"][:, :5]}, "random/keys: expected uint32"),
-        (lambda arrays: {**arrays, "memory/0": np.zeros((ROWS, 7, 7))}, "memory: expected"),
+        (lambda arrays: {**arrays, "memory/0": np.zeros((NUM_ENVS, 7, 7))}, "memory: expected"),
     ],
 )
 def test_a_snapshot_from_elsewhere_is_refused_before_anything_changes(change, message):
-    environment = rows("shoved", random=4)
+    environment = envs("shoved", random=4)
     environment.reset()
     arrays = environment.snapshot()
-    environment.step(np.ones((ROWS, 18)))
+    environment.step(np.ones((NUM_ENVS, 18)))
     before = environment.snapshot()
     with pytest.raises(ValueError) as caught:
         environment.restore(change(arrays))

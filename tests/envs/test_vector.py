@@ -1,4 +1,4 @@
-"""The vector environment: its rows are single environments, to the last bit."""
+"""The vector environment: each of its environments is a single environment, to the last bit."""
 
 import copy
 import gc
@@ -62,7 +62,7 @@ def arrays(value):
         lambda robot, mode: turn(mode, MODES, ROBOTS.index(robot)),
     ),
 )
-def test_rows_are_single_environments_whatever_the_threads(robot, mode):
+def test_environments_are_single_environments_whatever_the_threads(robot, mode):
     singles = make_singles(robot, 5, mode, task_kwargs=SHORT[robot])
     batches = [
         make(robot, 5, num_threads=threads, autoreset_mode=mode, task_kwargs=SHORT[robot]) for threads in (1, 2, 3, 8)
@@ -139,7 +139,7 @@ def test_episode_that_ends_starts_anew_in_the_next_step_or_at_once():
 
 
 def test_episode_that_ends_rests_until_its_reset_where_there_is_no_autoreset():
-    """Gymnasium's contract of the mode: who asks for no autoreset resets the rows that have ended himself."""
+    """Gymnasium's contract of the mode: who asks for no autoreset resets those that have ended."""
     singles = make_singles("tick", 4, "Disabled", task_kwargs=SHORT["tick"])
     batch = make("tick", 4, autoreset_mode="Disabled", task_kwargs=SHORT["tick"])
     late = make("tick", 4, autoreset_mode="Disabled", task_kwargs=SHORT["tick"])
@@ -197,7 +197,7 @@ def test_copies_carry_on_bit_for_bit(duplicate, mode, task):
 
 
 @pytest.mark.slow
-def test_calls_and_attributes_of_rows_are_those_of_single_environments():
+def test_calls_and_attributes_of_environments_are_those_of_single_environments():
     settings = {"task_kwargs": {"time_limit": 1.0}, "render_mode": "rgb_array", "width": 32, "height": 24}
     batch, singles = make("tick", 3, **settings), make_singles("tick", 3, **settings)
     assert batch.np_random_seed == singles.np_random_seed == (-1, -1, -1)
@@ -246,7 +246,7 @@ def test_seeds_of_all_kinds():
 
 
 @pytest.mark.parametrize("mode", tiers(MODES, lambda mode: mode == "SameStep"))
-def test_rows_that_rest_stand_still_until_their_reset_and_the_others_notice_nothing(mode):
+def test_environments_that_rest_stand_still_until_their_reset_and_the_others_notice_nothing(mode):
     batch, awake = (make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"]) for _ in range(2))
     batch.reset(seed=0), awake.reset(seed=0)
     mask = np.array([True, False, True, False])
@@ -272,7 +272,7 @@ def test_rows_that_rest_stand_still_until_their_reset_and_the_others_notice_noth
 
 
 @pytest.mark.parametrize("mode", tiers(MODES, lambda mode: mode == "SameStep"))
-def test_reset_mask_restarts_some_rows(mode):
+def test_reset_mask_restarts_some_environments(mode):
     singles = make_singles("tick", 4, mode, task_kwargs=SHORT["tick"])
     batch = make("tick", 4, autoreset_mode=mode, task_kwargs=SHORT["tick"])
     assert same(batch.reset(seed=0), singles.reset(seed=0))
@@ -317,10 +317,10 @@ def test_what_is_handed_out_is_the_callers_own(mode):
 def test_nan_is_refused_before_anything_moves():
     batch, twin = make("leaper", 6), make("leaper", 6)
     batch.reset(seed=0), twin.reset(seed=0)
-    for row, actions in enumerate(random_actions(batch, 6)):
+    for env, actions in enumerate(random_actions(batch, 6)):
         poisoned = actions.copy()
-        poisoned[row, 2 * row] = np.nan
-        with pytest.raises(ValueError, match=rf"^action\[{row}, {2 * row}\]: expected a number from -1 to 1, got nan$"):
+        poisoned[env, 2 * env] = np.nan
+        with pytest.raises(ValueError, match=rf"^action\[{env}, {2 * env}\]: expected a number from -1 to 1, got nan$"):
             batch.step(poisoned)
         assert same(batch.step(actions), twin.step(actions))
     with pytest.raises(ValueError, match=r"^action: expected shape \(6, 12\), got \(12,\)$"):
@@ -371,12 +371,12 @@ def test_statistics_are_those_of_single_environments_in_both_modes(mode):
         assert ended.any() == ("episode" in info)
         for name in ("r", "l") if ended.any() else ():
             assert_array_equal(info["episode"][name], expected["episode"][name])
-        lengths += [info["episode"]["l"][row] for row in np.flatnonzero(ended)]
+        lengths += [info["episode"]["l"][env] for env in np.flatnonzero(ended)]
     assert len(lengths) > 3 and max(lengths) == 20
 
 
 @pytest.mark.slow
-def test_render_shows_each_row_and_disturbs_nothing():
+def test_render_shows_each_environment_and_disturbs_nothing():
     size = {"width": 80, "height": 60}
     batch, twin = make("queen", 2, render_mode="rgb_array", **size), make("queen", 2)
     single = gymnasium.make("arc_suite/queen-walk-v0", render_mode="rgb_array", **size)
@@ -452,7 +452,7 @@ def test_bad_seeds_are_one_line_errors(seed, message):
     assert str(error.value) == message
 
 
-def test_reset_of_some_rows_leaves_handed_out_observations_alone():
+def test_reset_of_some_environments_leaves_handed_out_observations_alone():
     environments = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=3)
     environments.reset(seed=0)
     observations, *_ = environments.step(np.zeros((3, 18), np.float32))

@@ -30,7 +30,7 @@ def test_episodes_are_seeded_and_sum_up_what_the_environment_says():
     assert third.progress["speed"] == pytest.approx((environment.physics.data.xpos[1, 0] - start) / 2.0)
 
 
-def test_policies_get_named_rows_and_the_reward_of_the_step_before():
+def test_policies_get_named_environments_and_the_reward_of_the_step_before():
     class Watching:
         def __init__(self):
             self.begun, self.rewards = [], []

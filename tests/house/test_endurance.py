@@ -19,7 +19,7 @@ ENVIRON = os.environ | {"PYTHONPATH": str(FOLDER.parent)}
 
 
 @pytest.mark.release
-def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_row():
+def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_an_environment():
     found = {}
     for threads in (["1", "8"], ["2"]):
         command = [sys.executable, FOLDER / "determinism.py", *threads, f"--steps={STEPS}"]
@@ -77,7 +77,7 @@ def test_500_divergences_of_a_single_environment_are_all_reported(on_divergence)
 
 @pytest.mark.release
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_1000_divergences_of_rows_are_all_reported(mode):
+def test_1000_divergences_of_environments_are_all_reported(mode):
     envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=50, autoreset_mode=mode)
     random, reported = np.random.RandomState(0), 0
     envs.reset(seed=0)

@@ -33,27 +33,27 @@ COMMAND = "command 'command': expected 3 numbers from -1e+06 to 1e+06, got"
 
 
 class World:
-    """A dm_env, a Gymnasium environment and rows, all in mid-episode."""
+    """A dm_env, a Gymnasium environment and a vector environment, all in mid-episode."""
 
     def __init__(self):
         self.dm = arc_suite.load("bastion", "walk", {"random": 0})
         self.env = gymnasium.make(ID, **PICTURE).unwrapped
-        self.rows = gymnasium.make_vec(ID, num_envs=3, num_threads=1, **PICTURE)
-        self.dm.reset(), self.env.reset(seed=0), self.rows.reset(seed=0)
+        self.envs = gymnasium.make_vec(ID, num_envs=3, num_threads=1, **PICTURE)
+        self.dm.reset(), self.env.reset(seed=0), self.envs.reset(seed=0)
         for _ in range(3):
-            self.dm.step(ZEROS), self.env.step(ZEROS), self.rows.step(np.zeros((3, 12)))
+            self.dm.step(ZEROS), self.env.step(ZEROS), self.envs.step(np.zeros((3, 12)))
         self.steer = arc_suite.load("bastion", "steer", {"random": 0})
         self.steer.reset(), self.steer.step(ZEROS)
         self.walker = Demonstrator("bastion")
 
     def state(self):
         """Everything that a call could have changed."""
-        rows = self.rows
-        streams = [stream.get_state() for stream in rows._randoms]
-        episodes = rows._memory, rows._streams, rows._steps, rows._ended, rows._resting, rows._streams_begin
+        envs = self.envs
+        streams = [stream.get_state() for stream in envs._randoms]
+        episodes = envs._memory, envs._streams, envs._steps, envs._ended, envs._resting, envs._streams_begin
         return (
             pickle.dumps((self.dm, self.env, self.steer, episodes, streams, self.walker._state)),
-            rows.batch._simulations.state.tobytes(),
+            envs.batch._simulations.state.tobytes(),
             pickle.dumps(np.random.get_state()),
             (dict(ROBOTS), dict(TASKS), set(gymnasium.registry), dict(os.environ), os.getcwd()),
             sorted(pathlib.Path().rglob("*")),
@@ -80,7 +80,7 @@ def make(**kwargs):
     return lambda world: gymnasium.make(ID, **kwargs)
 
 
-def rows(**kwargs):
+def envs(**kwargs):
     return lambda world: gymnasium.make_vec(ID, **{"num_envs": 2} | kwargs)
 
 
@@ -93,15 +93,15 @@ CASES = [
     (lambda w: w.env.step(np.zeros(0)), "action: expected shape (12,), got (0,)"),
     (lambda w: w.env.step(0.5), "action: expected shape (12,), got ()"),
     (lambda w: w.env.step(["a"] * 12), "action: expected 12 numbers, got list"),
-    (lambda w: w.rows.step(ZEROS), "action: expected shape (3, 12), got (12,)"),
-    (lambda w: w.rows.step(np.zeros((2, 12))), "action: expected shape (3, 12), got (2, 12)"),
-    (lambda w: w.rows.step([ZEROS, ZEROS, NAN]), "action[2, 7]: expected a number from -1 to 1, got nan"),
-    (lambda w: w.rows.step("walk"), "action: expected 3 x 12 numbers, got str"),
-    (lambda w: w.rows.step(None), "action: expected 3 x 12 numbers, got NoneType"),
+    (lambda w: w.envs.step(ZEROS), "action: expected shape (3, 12), got (12,)"),
+    (lambda w: w.envs.step(np.zeros((2, 12))), "action: expected shape (3, 12), got (2, 12)"),
+    (lambda w: w.envs.step([ZEROS, ZEROS, NAN]), "action[2, 7]: expected a number from -1 to 1, got nan"),
+    (lambda w: w.envs.step("walk"), "action: expected 3 x 12 numbers, got str"),
+    (lambda w: w.envs.step(None), "action: expected 3 x 12 numbers, got NoneType"),
     (lambda w: w.dm.step([10**400] * 12), "action: expected 12 numbers, got list"),
     (lambda w: w.env.step(np.zeros(12, complex)), "action: expected 12 numbers, got ndarray of complex128"),
-    (lambda w: w.rows.step(np.ma.zeros((3, 12))), "action: expected 3 x 12 numbers, got MaskedArray of float64"),
-    (lambda w: w.rows.step([["0"] * 12] * 3), "action: expected 3 x 12 numbers, got list"),
+    (lambda w: w.envs.step(np.ma.zeros((3, 12))), "action: expected 3 x 12 numbers, got MaskedArray of float64"),
+    (lambda w: w.envs.step([["0"] * 12] * 3), "action: expected 3 x 12 numbers, got list"),
     (lambda w: w.dm.physics.step(0), "nstep: expected an integer from 1, got 0"),
     # Commands.
     (lambda w: w.dm.command("command", [0.5, 0, 0]), "command 'command': task walk has no commands"),
@@ -116,20 +116,20 @@ CASES = [
     # Seeds.
     (lambda w: w.env.reset(seed=[1]), f"{SEED} [1]"),
     (lambda w: w.env.reset(seed=np.array([1, 2])), f"{SEED} array([1, 2])"),
-    (lambda w: w.rows.reset(seed=-1), f"{SEED} -1"),
-    (lambda w: w.rows.reset(seed=2**32 - 1), f"{SEED} 4294967296"),
-    (lambda w: w.rows.reset(seed=1.5), f"{SEED} 1.5"),
-    (lambda w: w.rows.reset(seed=[1, 2]), "seed: expected one for each of 3 environments, got 2"),
-    (lambda w: w.rows.reset(seed=[1, 2, "x"]), f"{SEED} 'x'"),
+    (lambda w: w.envs.reset(seed=-1), f"{SEED} -1"),
+    (lambda w: w.envs.reset(seed=2**32 - 1), f"{SEED} 4294967296"),
+    (lambda w: w.envs.reset(seed=1.5), f"{SEED} 1.5"),
+    (lambda w: w.envs.reset(seed=[1, 2]), "seed: expected one for each of 3 environments, got 2"),
+    (lambda w: w.envs.reset(seed=[1, 2, "x"]), f"{SEED} 'x'"),
     (
-        lambda w: w.rows.reset(options={"reset_mask": np.zeros(3, bool)}),
+        lambda w: w.envs.reset(options={"reset_mask": np.zeros(3, bool)}),
         "reset_mask: expected 3 booleans, at least one of them true, got array([False, False, False])",
     ),
     (
-        lambda w: w.rows.reset(seed=3, options={"reset_mask": np.array([1, 0, 1])}),
+        lambda w: w.envs.reset(seed=3, options={"reset_mask": np.array([1, 0, 1])}),
         "reset_mask: expected 3 booleans, at least one of them true, got array([1, 0, 1])",
     ),
-    (rows(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 environments, got 3"),
+    (envs(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 environments, got 3"),
     (lambda w: policies.alone(policies.policy("random", "queen"), seed=-1), f"{SEED} -1"),
     # Ids.
     (lambda w: arc_suite.load("Queen", "walk"), f"unknown robot 'Queen'; did you mean 'queen'? {DOMAINS}"),
@@ -157,7 +157,7 @@ CASES = [
         "task 'json:walk': walk is the suite's own, expected without a module",
     ),
     (make(domain_name="bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
-    (rows(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
+    (envs(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
     # Cameras and sizes.
     (lambda w: w.dm.physics.render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),
     (lambda w: w.dm.physics.render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 2, or one of {CAMERAS}"),
@@ -165,14 +165,14 @@ CASES = [
         make(camera_id="prtrait"),
         "unknown camera 'prtrait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
     ),
-    (rows(camera_id=9), f"no camera 9: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (envs(camera_id=9), f"no camera 9: expected -1 (free) to 2, or one of {CAMERAS}"),
     (lambda w: w.dm.physics.render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
     (lambda w: w.dm.physics.render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),
     (lambda w: w.dm.physics.render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),
     (make(width=-1), "width: expected an integer from 1 to 3840, got -1"),
-    (rows(height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
-    (lambda w: w.rows.render([5]), "indices: expected integers from 0 to 2, got 5"),
-    (lambda w: w.rows.render(["a"]), "indices: expected integers from 0 to 2, got 'a'"),
+    (envs(height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
+    (lambda w: w.envs.render([5]), "indices: expected integers from 0 to 2, got 5"),
+    (lambda w: w.envs.render(["a"]), "indices: expected integers from 0 to 2, got 'a'"),
     # Presets and policies.
     (
         lambda w: Demonstrator("bastion", "meduim"),
@@ -185,7 +185,7 @@ CASES = [
         lambda w: w.walker.act({"posture": np.zeros((2, 17)), "velocities": np.zeros((2, 24))}),
         "observation: expected those of 12 joints, got 12 angles and 18 velocities",
     ),
-    (lambda w: w.rows.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
+    (lambda w: w.envs.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
     (
         lambda w: policies.policy("cgp", "queen"),
         "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)",
@@ -247,21 +247,21 @@ CASES = [
         "(there are: flat_observation)",
     ),
     (walk(arena="bumpy"), f"unknown arena 'bumpy'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
-    (rows(num_envs=2.5), "num_envs: expected an integer from 1 to 1048576, got 2.5"),
-    (rows(num_envs=0), "num_envs: expected an integer from 1 to 1048576, got 0"),
-    (rows(num_envs="4"), "num_envs: expected an integer from 1 to 1048576, got '4'"),
-    (rows(num_envs=10**12), "num_envs: expected an integer from 1 to 1048576, got 1000000000000"),
-    (rows(num_threads="all"), "num_threads: expected an integer from 1 to 1024, got 'all'"),
-    (rows(num_threads=10**30), f"num_threads: expected an integer from 1 to 1024, got {10**30}"),
-    (rows(task_kwargs=[1]), "task_kwargs: expected a mapping of names to values, got [1]"),
-    (lambda w: w.rows.reset(options=[1]), "options: expected a mapping of names to values, got [1]"),
-    (rows(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
+    (envs(num_envs=2.5), "num_envs: expected an integer from 1 to 1048576, got 2.5"),
+    (envs(num_envs=0), "num_envs: expected an integer from 1 to 1048576, got 0"),
+    (envs(num_envs="4"), "num_envs: expected an integer from 1 to 1048576, got '4'"),
+    (envs(num_envs=10**12), "num_envs: expected an integer from 1 to 1048576, got 1000000000000"),
+    (envs(num_threads="all"), "num_threads: expected an integer from 1 to 1024, got 'all'"),
+    (envs(num_threads=10**30), f"num_threads: expected an integer from 1 to 1024, got {10**30}"),
+    (envs(task_kwargs=[1]), "task_kwargs: expected a mapping of names to values, got [1]"),
+    (lambda w: w.envs.reset(options=[1]), "options: expected a mapping of names to values, got [1]"),
+    (envs(max_episode_steps=0), "max_episode_steps: expected an integer from 1, got 0"),
     (
-        rows(autoreset_mode="SomeStep"),
+        envs(autoreset_mode="SomeStep"),
         "unknown autoreset_mode 'SomeStep'; did you mean 'SameStep'? (there are: NextStep, SameStep, Disabled)",
     ),
     (
-        rows(task_kwargs={"on_divergence": "raise"}),
+        envs(task_kwargs={"on_divergence": "raise"}),
         "unknown on_divergence of many environments 'raise' (there are: terminate)",
     ),
     (
@@ -287,7 +287,7 @@ def test_the_world_goes_on_as_one_that_met_nothing_bad(world):
     for _ in range(3):
         assert world.dm.step(ZEROS).reward == fresh.dm.step(ZEROS).reward
         np.testing.assert_array_equal(world.env.step(ZEROS)[0], fresh.env.step(ZEROS)[0])
-        np.testing.assert_array_equal(world.rows.step(np.zeros((3, 12)))[0], fresh.rows.step(np.zeros((3, 12)))[0])
+        np.testing.assert_array_equal(world.envs.step(np.zeros((3, 12)))[0], fresh.envs.step(np.zeros((3, 12)))[0])
 
 
 def test_there_are_enough():

@@ -34,18 +34,18 @@ ID = "arc_suite/tick-walk-v0"
 FACES = {
     "dm": lambda: arc_suite.load("tick", "walk", {"random": 0}),
     "env": lambda: gymnasium.make(ID, task_kwargs={"random": 0}).unwrapped,
-    "rows": lambda: gymnasium.make_vec(ID, num_envs=2, render_mode="rgb_array", task_kwargs={"random": 0}),
+    "vector": lambda: gymnasium.make_vec(ID, num_envs=2, render_mode="rgb_array", task_kwargs={"random": 0}),
 }
-CALLS = {"dm": ("step", "reset"), "env": ("step", "reset", "close"), "rows": ("step", "reset", "render", "close")}
+CALLS = {"dm": ("step", "reset"), "env": ("step", "reset", "close"), "vector": ("step", "reset", "render", "close")}
 
 
 @pytest.mark.parametrize(("face", "call"), [(face, call) for face, calls in CALLS.items() for call in calls])
 def test_two_threads_cannot_use_one_environment(face, call, monkeypatch):
     shared, twin = FACES[face](), FACES[face]()
-    actions = np.zeros((2, 18) if face == "rows" else 18)
+    actions = np.zeros((2, 18) if face == "vector" else 18)
     shared.reset(), twin.reset()
     inside, leave = threading.Event(), threading.Event()
-    simulation = shared.batch if face == "rows" else shared.physics
+    simulation = shared.batch if face == "vector" else shared.physics
     step = simulation.step
 
     def slow_step(*args):
@@ -67,13 +67,13 @@ def test_two_threads_cannot_use_one_environment(face, call, monkeypatch):
     shared.close()
 
 
-@pytest.mark.parametrize("face", ["dm", "rows"])
+@pytest.mark.parametrize("face", ["dm", "vector"])
 def test_a_thread_may_set_commands_without_end_while_another_steps(face):
     load = functools.partial(arc_suite.load, "tick", "steer", {"random": 0})
     make = functools.partial(gymnasium.make_vec, "arc_suite/tick-steer-v0", num_envs=2, task_kwargs={"random": 0})
     shared, twin = (load() if face == "dm" else make() for _ in range(2))
     shared.reset(), twin.reset()
-    actions, stop = np.zeros((2, 18) if face == "rows" else 18), threading.Event()
+    actions, stop = np.zeros((2, 18) if face == "vector" else 18), threading.Event()
 
     def command(environment, number):
         environment.command("command", (number, -number, 2.0 * number))

@@ -33,13 +33,13 @@ def test_starts_are_those_of_the_suite(task):
         pytest.importorskip("warp")
     env = mjx.load(ROBOT, task, None, impl, num_starts=5, first_seed=7)
     state = jax.vmap(env.start)(jnp.arange(7, 13))
-    rows = VectorEnv(ROBOT, task, 5, 1)
-    observation, _ = rows.reset(seed=7)
+    envs = VectorEnv(ROBOT, task, 5, 1)
+    observation, _ = envs.reset(seed=7)
     np.testing.assert_array_equal(state.obs[:5], observation)
     np.testing.assert_array_equal(state.obs[5], observation[0])  # they repeat
-    np.testing.assert_array_equal(state.data.qpos[:5], rows.batch.data.qpos.astype(np.float32))
-    np.testing.assert_array_equal(state.data.mocap_pos[:5], rows.batch.mocap_pos.astype(np.float32))
-    for ours, theirs in zip(arrays(state.info["memory"]), arrays(rows._memory), strict=True):
+    np.testing.assert_array_equal(state.data.qpos[:5], envs.batch.data.qpos.astype(np.float32))
+    np.testing.assert_array_equal(state.data.mocap_pos[:5], envs.batch.mocap_pos.astype(np.float32))
+    for ours, theirs in zip(arrays(state.info["memory"]), arrays(envs._memory), strict=True):
         np.testing.assert_array_equal(ours[:5], theirs.astype(ours.dtype))
 
 
@@ -64,11 +64,11 @@ def test_models_of_episodes_are_those_of_the_suite():
     settings = {"friction": (0.5, 1.0), "mass": (0.8, 1.2)}
     env = mjx.load(ROBOT, "walk", settings, num_starts=3)
     own = jax.vmap(env.start)(jnp.arange(3)).info["model"]
-    rows = VectorEnv(ROBOT, "walk", 3, 1, task_kwargs=settings)
-    rows.reset(seed=0)
+    envs = VectorEnv(ROBOT, "walk", 3, 1, task_kwargs=settings)
+    envs.reset(seed=0)
     assert {"pair_friction", "body_mass", "body_inertia", "body_subtreemass", "body_invweight0"} <= own.keys()
     for name, values in own.items():
-        np.testing.assert_allclose(values, [getattr(model, name) for model in rows.batch.models], rtol=1e-6)
+        np.testing.assert_allclose(values, [getattr(model, name) for model in envs.batch.models], rtol=1e-6)
 
 
 def test_interface():
@@ -86,16 +86,16 @@ def test_seeds_of_four_billion():
     first = 4_000_000_000
     env = mjx.load(ROBOT, "walk", num_starts=3, first_seed=first)
     found = jax.vmap(env.start)(np.arange(first, first + 3, dtype=np.uint32)).obs
-    rows = VectorEnv(ROBOT, "walk", 3, 1)
-    np.testing.assert_array_equal(found, rows.reset(seed=first)[0])
+    envs = VectorEnv(ROBOT, "walk", 3, 1)
+    np.testing.assert_array_equal(found, envs.reset(seed=first)[0])
     assert env.reset(jax.random.key(0)).obs in np.asarray(found)
 
 
 def test_pictures_are_those_of_the_suite():
     env, start, _ = compiled(ROBOT, "steer")
-    rows = VectorEnv(ROBOT, "steer", WORLDS, 1, render_mode="rgb_array", width=80, height=60)
-    rows.reset(seed=0)
-    (theirs,) = rows.render([2])
+    envs = VectorEnv(ROBOT, "steer", WORLDS, 1, render_mode="rgb_array", width=80, height=60)
+    envs.reset(seed=0)
+    (theirs,) = envs.render([2])
     (ours,) = env.render(start(np.arange(WORLDS)), height=60, width=80, index=2)
     assert ours.shape == (60, 80, 3) and ours.std() > 10.0
     assert abs(ours.astype(int) - theirs).mean() < 1.0
@@ -103,7 +103,7 @@ def test_pictures_are_those_of_the_suite():
         env.render([], scene_option=object())
 
 
-def test_a_row_that_diverges():
+def test_an_environment_that_diverges():
     _, start, step = compiled(ROBOT)
     state = start(np.arange(WORLDS))
     qvel = state.data.qvel.at[1, 3].set(jnp.nan).at[2, 0].set(1e11)

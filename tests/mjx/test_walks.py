@@ -11,11 +11,11 @@ ROBOTS = "leaper", "queen", "bastion", "tick"
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_hundred_steps(robot):
     env, start, step = compiled(robot)
-    state, rows, ours, theirs = walked(env, start, step, 100, "tuned")
+    state, envs, ours, theirs = walked(env, start, step, 100, "tuned")
     assert ours.sum(axis=0) == pytest.approx(theirs.sum(axis=0), rel=0.01)
     assert not np.asarray(state.done).any()
     np.testing.assert_array_equal(state.data.time, np.full(WORLDS, np.float32(100) * np.float32(env.dt)))
-    np.testing.assert_array_equal(state.info["memory"].tick, rows._memory.tick)
+    np.testing.assert_array_equal(state.info["memory"].tick, envs._memory.tick)
     np.testing.assert_array_equal(state.metrics["overflow"], np.zeros(WORLDS))
 
 
@@ -45,10 +45,10 @@ def test_a_whole_episode():
 @pytest.mark.parametrize("task", ["steer", "shoved", "limp", "navigate"])
 def test_tasks_with_a_command(task):
     env, start, step = compiled("leaper", task)
-    state, rows, ours, theirs = walked(env, start, step, 50, "steered")
+    state, envs, ours, theirs = walked(env, start, step, 50, "steered")
     assert ours.sum(axis=0).mean() == pytest.approx(theirs.sum(axis=0).mean(), rel=0.01)
     assert not np.asarray(state.done).any()
-    progress, expected = env.task.progress(state.info["memory"]), rows.task.progress
+    progress, expected = env.task.progress(state.info["memory"]), envs.task.progress
     assert progress.keys() == expected.keys()
     np.testing.assert_allclose(progress["gait_compliance"], expected["gait_compliance"], atol=0.05)
 
@@ -70,15 +70,15 @@ def test_modifiers():
     env, start, step = compiled("leaper", settings=settings)
     from arc_suite.envs.vector import VectorEnv
 
-    rows = VectorEnv("leaper", "walk", WORLDS, 1, task_kwargs=MODIFIERS)
-    rows.reset(seed=0)
+    envs = VectorEnv("leaper", "walk", WORLDS, 1, task_kwargs=MODIFIERS)
+    envs.reset(seed=0)
     state, random, apart = start(np.arange(WORLDS)), np.random.RandomState(0), []
     for _ in range(60):
         action = random.uniform(-0.3, 0.3, (WORLDS, 12))
         state = step(state, action)
-        observation, reward, *_ = rows.step(action)
+        observation, reward, *_ = envs.step(action)
         apart.append(abs(state.obs - observation).max(axis=0))
-    ours, theirs = state.info["memory"].changes, rows._memory.changes
+    ours, theirs = state.info["memory"].changes, envs._memory.changes
     for name in ("elapsed", "strength", "delay", "noise_key"):
         np.testing.assert_allclose(np.asarray(getattr(ours, name)), getattr(theirs, name), rtol=1e-6)
     np.testing.assert_allclose(np.asarray(ours.waiting), theirs.waiting, atol=1e-6)

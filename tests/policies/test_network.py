@@ -47,11 +47,11 @@ def test_what_layers_compute():
         np.testing.assert_allclose(found, expected, atol=2e-6)
 
 
-@pytest.mark.parametrize("rows", [1, 2, 10, 64, 65])
-def test_a_row_does_the_same_alone(rows):
+@pytest.mark.parametrize("num_envs", [1, 2, 10, 64, 65])
+def test_an_environment_does_the_same_alone(num_envs):
     policy = made(hidden=256)
-    observations = drawn(1)(rows, policy.size)
-    alone = np.concatenate([policy.actions(observations[row : row + 1]) for row in range(rows)])
+    observations = drawn(1)(num_envs, policy.size)
+    alone = np.concatenate([policy.actions(observations[index : index + 1]) for index in range(num_envs)])
     assert np.array_equal(policy.actions(observations), alone)
 
 
@@ -66,10 +66,10 @@ def test_comes_back_from_a_file_to_the_bit(saved):
 
 @pytest.mark.parametrize("name", ["", "policy.npz"])
 def test_is_a_policy_of_every_program(saved, name, monkeypatch):
-    """By the folder of a run, or the file; in rows and alone it does the same."""
+    """By the folder of a run, or the file; in a batch and alone it does the same."""
     policy = policies.policy(str(saved / name), "tick")
-    rows = VectorEnv("tick", "walk", 3, 1, "Disabled")
-    assert evaluation.episodes_in_batch(rows, policy, range(3)) == evaluation.episodes(
+    envs = VectorEnv("tick", "walk", 3, 1, "Disabled")
+    assert evaluation.episodes_in_batch(envs, policy, range(3)) == evaluation.episodes(
         arc_suite.load("tick", "walk"), policy, range(3)
     )
     monkeypatch.chdir(saved.parent)

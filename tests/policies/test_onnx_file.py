@@ -45,12 +45,12 @@ def test_equal_over_an_episode(robot, task, tmp_path):
     assert greatest < 1e-5
 
 
-def test_any_number_of_rows(tmp_path):
+def test_any_number_of_environments(tmp_path):
     policy = made()
     onnx_file.save(tmp_path / "policy.onnx", policy)
     run = session(tmp_path / "policy.onnx")
-    for rows in (1, 5, 64):
-        observations = np.random.default_rng(rows).normal(size=(rows, policy.size)).astype(np.float32)
+    for num_envs in (1, 5, 64):
+        observations = np.random.default_rng(num_envs).normal(size=(num_envs, policy.size)).astype(np.float32)
         (actions,) = run.run(None, {"observations": observations})
         np.testing.assert_allclose(actions, policy.actions(observations), atol=1e-5)
 

@@ -1,4 +1,4 @@
-"""The protocol of acting: every policy, in rows that begin at different times, acts as in the episode alone."""
+"""The protocol of acting: every policy, in environments that begin at different times, acts as in the episode alone."""
 
 import dm_env
 import numpy as np
@@ -11,9 +11,9 @@ from arc_suite import evaluation
 from arc_suite.policies import POLICIES, Individuals, Mixture, Script, Sum, alone, policy
 from arc_suite.robots import ROBOTS, generator
 
-# (row, control step at which it begins, seed) of episodes; a row's last step is that before the next begins.
+# (environment, control step at which it begins, seed) of episodes; its last step is that before the next begins.
 EPISODES = ((0, 0, 4), (1, 0, 5), (2, 0, 6), (1, 7, 7), (0, 20, 8), (2, 20, 4), (1, 31, 9), (1, 32, 0))
-ROWS, STEPS = 3, 300
+NUM_ENVS, STEPS = 3, 300
 
 OWN = """
 import numpy as np
@@ -48,9 +48,9 @@ def acted_alone(made, joints, seed, length):
     return np.array(actions)
 
 
-def acted_in_rows(made, joints):
+def acted_together(made, joints):
     """The actions of every episode, by its number."""
-    playing, actions = [None] * ROWS, [[] for _ in EPISODES]
+    playing, actions = [None] * NUM_ENVS, [[] for _ in EPISODES]
     for step in range(STEPS):
         beginning = [number for number, (_, first, _) in enumerate(EPISODES) if first == step]
         for number in beginning:
@@ -83,9 +83,9 @@ VARIANTS = [
     ids=["leaper", "made"],
 )
 @pytest.mark.parametrize(("name", "settings"), tiers(VARIANTS, lambda name, settings: "noise" in settings))
-def test_a_row_acts_as_its_episode_alone(name, settings, body):
+def test_an_environment_acts_as_its_episode_alone(name, settings, body):
     joints = len(body.joint_names)
-    together = acted_in_rows(policy(name, body, num_envs=ROWS, **settings), joints)
+    together = acted_together(policy(name, body, num_envs=NUM_ENVS, **settings), joints)
     for (_, _, seed), actions in zip(EPISODES, together, strict=True):
         made = policy(name, body, **settings)
         acted_alone(made, joints, seed + 1, 3)  # an episode before leaves nothing behind
@@ -95,7 +95,7 @@ def test_a_row_acts_as_its_episode_alone(name, settings, body):
     assert_array_equal(together[0], same[4][:20])
 
 
-def test_policies_of_one_row_play_episodes_and_act_on_time_steps():
+def test_policies_of_one_environment_play_episodes_and_act_on_time_steps():
     environment = arc_suite.load("tick", "walk", {"time_limit": 1.0})
     for name in POLICIES:
         steps = list(evaluation.rollout(environment, policy(name, "tick"), seed=3))

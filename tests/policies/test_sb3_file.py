@@ -52,10 +52,10 @@ def test_does_what_the_agent_does(name, saved):
 
 
 @needs_sb3
-def test_in_rows_it_does_the_same(saved):
+def test_in_a_batch_it_does_the_same(saved):
     policy, task = policies.policy(str(saved[0] / "SAC.zip"), "tick"), {"time_limit": 1.0}
-    rows = VectorEnv("tick", "walk", 3, 1, "Disabled", task_kwargs=task)
-    assert evaluation.episodes_in_batch(rows, policy, range(3)) == evaluation.episodes(
+    envs = VectorEnv("tick", "walk", 3, 1, "Disabled", task_kwargs=task)
+    assert evaluation.episodes_in_batch(envs, policy, range(3)) == evaluation.episodes(
         arc_suite.load("tick", "walk", task), policy, range(3)
     )
 
@@ -84,8 +84,8 @@ def normalised(tmp_path_factory):
     from arc_suite.envs import sb3
 
     folder = tmp_path_factory.mktemp("normalised")
-    rows = VectorEnv("tick", "walk", 4, 1, "SameStep", task_kwargs={"time_limit": 1.0})
-    environments = VecNormalize(sb3.VecEnv(rows))
+    envs = VectorEnv("tick", "walk", 4, 1, "SameStep", task_kwargs={"time_limit": 1.0})
+    environments = VecNormalize(sb3.VecEnv(envs))
     agent = PPO("MlpPolicy", environments, n_steps=16, batch_size=32, n_epochs=1, device="cpu", seed=0).learn(128)
     agent.save(folder / "ppo.zip")
     environments.save(folder / "stats.pkl")
@@ -153,8 +153,8 @@ def test_as_layers(name, tmp_path):
 
     from arc_suite.envs import sb3
 
-    rows = sb3.VecEnv(VectorEnv("leaper", "walk", 2, 1, "SameStep"))
-    getattr(stable_baselines3, name)("MlpPolicy", rows, device="cpu", seed=0).save(tmp_path / "agent.zip")
+    envs = sb3.VecEnv(VectorEnv("leaper", "walk", 2, 1, "SameStep"))
+    getattr(stable_baselines3, name)("MlpPolicy", envs, device="cpu", seed=0).save(tmp_path / "agent.zip")
     network, policy = (
         make(str(tmp_path / "agent.zip")) for make in (policies.trained, lambda p: policies.policy(p, "leaper"))
     )

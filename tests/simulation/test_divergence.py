@@ -18,9 +18,9 @@ ACCIDENTS = {
 every_accident = pytest.mark.parametrize("accident", ACCIDENTS)
 
 
-def spoil(data, accident, row=()):
+def spoil(data, accident, which=()):
     field, index, value, _ = ACCIDENTS[accident]
-    getattr(data, field)[(*row, index)] = value
+    getattr(data, field)[(*which, index)] = value
 
 
 def load(robot="queen", random=0, **task_kwargs):
@@ -91,17 +91,17 @@ def test_unknown_answer_to_divergence():
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @every_accident
-def test_one_row_of_64_diverges_and_the_others_notice_nothing(accident, mode):
+def test_one_environment_of_64_diverges_and_the_others_notice_nothing(accident, mode):
     batch, calm = (make(autoreset_mode=mode) for _ in range(2))
-    row, others = 17, np.arange(64) != 17
+    which, others = 17, np.arange(64) != 17
     first = batch.reset(seed=0)[0]
     assert_array_equal(calm.reset(seed=0)[0], first)
-    begun = load(random=row)
+    begun = load(random=which)
     begun.reset()
     restarted = begun.reset().observation["observations"].astype(np.float32)
     for count, actions in enumerate(random_actions(batch.action_space.shape, 6)):
         if count == 2:
-            spoil(batch.batch.data, accident, (row,))
+            spoil(batch.batch.data, accident, (which,))
         observation, reward, terminated, truncated, info = batch.step(actions)
         expected = calm.step(actions)
         for value, wanted in zip((observation, reward, terminated, truncated), expected, strict=False):
@@ -112,24 +112,24 @@ def test_one_row_of_64_diverges_and_the_others_notice_nothing(accident, mode):
             assert_array_equal(info[name][others], expected[4][name][others])
         assert np.isfinite(observation).all()
         assert not truncated.any()
-        assert_array_equal(np.flatnonzero(terminated), [row] if count == 2 else [])
+        assert_array_equal(np.flatnonzero(terminated), [which] if count == 2 else [])
         if count == 2:
-            assert reward[row] == 0.0
+            assert reward[which] == 0.0
             told = info["final_info"] if mode == "SameStep" else info
-            assert_array_equal(np.flatnonzero(told["diverged"]), [row])
-            assert_array_equal(np.flatnonzero(told["_diverged"]), [row])
-            assert all(told[name][row] == 0.0 and told[f"_{name}"][row] for name in terms)
+            assert_array_equal(np.flatnonzero(told["diverged"]), [which])
+            assert_array_equal(np.flatnonzero(told["_diverged"]), [which])
+            assert all(told[name][which] == 0.0 and told[f"_{name}"][which] for name in terms)
             if mode == "SameStep":
-                assert np.isfinite(info["final_obs"][row]).all()
+                assert np.isfinite(info["final_obs"][which]).all()
         else:
             assert "diverged" not in info and "final_info" not in info
         if count == (2 if mode == "SameStep" else 3):
-            assert_array_equal(observation[row], restarted)
-            assert ("_reward_forward" in info) and not info["_reward_forward"][row]
+            assert_array_equal(observation[which], restarted)
+            assert ("_reward_forward" in info) and not info["_reward_forward"][which]
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-def test_rows_diverge_as_single_environments_that_terminate_do(mode):
+def test_environments_diverge_as_single_environments_that_terminate_do(mode):
     batch = make("leaper", 3, autoreset_mode=mode)
     singles = gymnasium.make_vec(
         "arc_suite/leaper-walk-v0",
@@ -142,9 +142,9 @@ def test_rows_diverge_as_single_environments_that_terminate_do(mode):
     ends = 0
     for count, actions in enumerate(random_actions(batch.action_space.shape, 40)):
         if count % 3 == 0:
-            accident, row = list(ACCIDENTS)[count // 3 % 3], count // 3 % 2
-            spoil(batch.batch.data, accident, (row,))
-            spoil(singles.envs[row].unwrapped.physics.data.ptr, accident)
+            accident, which = list(ACCIDENTS)[count // 3 % 3], count // 3 % 2
+            spoil(batch.batch.data, accident, (which,))
+            spoil(singles.envs[which].unwrapped.physics.data.ptr, accident)
         result, expected = batch.step(actions), singles.step(actions)
         assert data_equivalence(result[:4], expected[:4], exact=True)
         ends += result[2].sum()

@@ -131,10 +131,10 @@ def test_async_vector_environments_work(method):
     observations, _ = envs.reset(seed=5)
     rewards = [envs.step(np.zeros((2, 18), np.float32))[1] for _ in range(3)]
     envs.close()
-    for row in range(2):
+    for index in range(2):
         env = gymnasium.make("arc_suite/tick-walk-v0")
-        np.testing.assert_array_equal(observations[row], env.reset(seed=5 + row)[0])
-        assert [float(reward[row]) for reward in rewards] == [env.step(np.zeros(18, np.float32))[1] for _ in range(3)]
+        np.testing.assert_array_equal(observations[index], env.reset(seed=5 + index)[0])
+        assert [float(reward[index]) for reward in rewards] == [env.step(np.zeros(18, np.float32))[1] for _ in range(3)]
 
 
 @pytest.mark.slow

@@ -106,7 +106,7 @@ def test_bodies_of_one_shape_walk_alike():
 @pytest.mark.long
 @pytest.mark.parametrize("scale", [0.05, 12.5, 50.0])  # 2 cm, 5 m and 20 m high
 def test_bodies_of_one_shape_start_and_walk_alike_with_the_noise_of_the_task(scale):
-    expected, found = (census_of(generator.scaled(BODY, factor)) for factor in (1.0, scale))
+    expected, found = (measures_of(generator.scaled(BODY, factor)) for factor in (1.0, scale))
     assert np.ptp(expected["tilts"]) > 1e-4
     np.testing.assert_allclose(found["tilts"], expected["tilts"], rtol=1e-6)
     np.testing.assert_allclose(found["clearances"], expected["clearances"], atol=1e-6)
@@ -114,7 +114,7 @@ def test_bodies_of_one_shape_start_and_walk_alike_with_the_noise_of_the_task(sca
     np.testing.assert_array_equal(found["falls"], expected["falls"])
 
 
-def census_of(body):
+def measures_of(body):
     """Episodes of 160 control steps of a body in the task as it is: starts and walks, in units without dimension."""
     found = {name: [] for name in ("tilts", "clearances", "shares", "falls")}
     environment, policy = arc_suite.load(body, "walk", {"random": 0}), Demonstrator(body)

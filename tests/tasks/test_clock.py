@@ -33,7 +33,7 @@ def test_edges_fall_where_summed_phases_put_them():
     assert (multiplied != task.clock.stance).any(axis=-1).sum() == 44
 
 
-def test_ticks_of_a_batch_are_those_of_its_rows():
+def test_ticks_of_a_batch_are_those_of_its_environments():
     clock = Clock.made(1.3, 0.6, np.array([0.0, 1.0, 2.0]), 0.05, 1000)
     ticks = np.array([[0, 7], [1000, 500]])
     for index in np.ndindex(2, 2):

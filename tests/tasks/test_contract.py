@@ -57,20 +57,20 @@ def frozen(memory):
 
 
 def started(task, seed=0):
-    """A simulation of one row at the start of an episode, its data, and the memory."""
+    """A simulation of one environment at the start of an episode, its data, and the memory."""
     batch = Batch(compiled(task.scene.body, task.scene.arena), 1, 1, task.reads)
     start = task.start(np.random.RandomState(seed), task.first())
-    row = np.ones(1, bool)
-    batch.reset(row, start.qpos[None], start.qvel[None])
+    mask = np.ones(1, bool)
+    batch.reset(mask, start.qpos[None], start.qvel[None])
     memory = frozen(start.memory)
     lifted = task.clear_spawn(memory, task.read(read_only(batch, task)))
     if lifted is not None:
-        batch.place(row, lifted[None])
+        batch.place(mask, lifted[None])
     return batch, frozen(task.begin(memory, task.read(read_only(batch, task))))
 
 
 def read_only(batch, task):
-    """The fields that a task declares, of the first row, which nobody can write."""
+    """The fields that a task declares, of the first environment, which nobody can write."""
     fields = {name: getattr(batch.data, name)[0].copy() for name in task.reads}
     for field in fields.values():
         field.flags.writeable = False
@@ -153,22 +153,22 @@ class Counting(np.random.RandomState):
         test=lambda *case: case[-1] == 3 and in_turn(*case[:-1]),
     ),
 )
-def test_a_row_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
-    """Over several episodes, among rows that fall or stand still at other times."""
+def test_an_environment_is_bit_equal_to_a_single_environment(task_name, body, settings, threads):
+    """Over several episodes, among environments that fall or stand still at other times."""
     settings = settings | {"time_limit": 14 * prepared(BODIES[body], "walk")[0].scene.control_timestep}
-    rows = VectorEnv(BODIES[body], task_name, 3, threads, task_kwargs=settings)
+    envs = VectorEnv(BODIES[body], task_name, 3, threads, task_kwargs=settings)
     single = gymnasium.make(SINGLE, domain_name=BODIES[body], task_name=task_name, task_kwargs=settings)
-    observations, observation = rows.reset(seed=40)[0], single.reset(seed=41)[0]
+    observations, observation = envs.reset(seed=40)[0], single.reset(seed=41)[0]
     assert_array_equal(observations[1], observation)
     random, ended, episodes = np.random.RandomState(0), False, 0
     for step in range(45):
-        action = random.uniform(-1.0, 1.0, rows.single_action_space.shape).astype(np.float32)
-        if step == 6:  # a row that starts in mid-episode of the others
-            rows.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
-        ended = twins.step(rows, single, action, ended)
+        action = random.uniform(-1.0, 1.0, envs.single_action_space.shape).astype(np.float32)
+        if step == 6:  # an environment that starts in mid-episode of the others
+            envs.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
+        ended = twins.step(envs, single, action, ended)
         episodes += ended
     assert episodes >= 3
-    rows.close()
+    envs.close()
 
 
 SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take the place of
@@ -257,22 +257,22 @@ class Kicked(Walk):
         return int(memory.tick)
 
 
-def test_kicks_and_carries_are_the_same_in_rows(monkeypatch):
+def test_kicks_and_carries_are_the_same_in_a_batch(monkeypatch):
     monkeypatch.setitem(TASKS, "kicked", Kicked)
     settings = {"time_limit": 0.5}
-    rows = VectorEnv("leaper", "kicked", 2, 1, task_kwargs=settings)
+    envs = VectorEnv("leaper", "kicked", 2, 1, task_kwargs=settings)
     plain, single = (arc_suite.load("leaper", name, {"random": 4, **settings}) for name in ("walk", "kicked"))
-    rows.reset(seed=3)
+    envs.reset(seed=3)
     plain.reset()
     assert single.reset() is not None and single.physics.position()[0] == 100.0
     for step in range(1, 12):
         plain.step(np.zeros(12))
         timestep = single.step(np.zeros(12))
-        observations, *_ = rows.step(np.zeros((2, 12)))
+        observations, *_ = envs.step(np.zeros((2, 12)))
         assert_array_equal(observations[1], np.concatenate(list(timestep.observation.values())).astype(np.float32))
         if step == 5:
             assert single.physics.position()[2] > plain.physics.position()[2] + 0.02
     assert timestep.first() and single.physics.position()[0] == 10.0, "the carry of ten steps"
     assert single.reset(seed=4) is not None and single.physics.position()[0] == 100.0, "a seed begins a new stream"
-    rows.reset(seed=3)
-    assert_array_equal(rows.batch.data.qpos[:, 0], 100.0)
+    envs.reset(seed=3)
+    assert_array_equal(envs.batch.data.qpos[:, 0], 100.0)

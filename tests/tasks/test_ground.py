@@ -171,16 +171,16 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
     level = terrain.made(ROBOTS[robot], {"rough": 3}, levels=(0.0,))
     returns = []
     for arena in (level, "flat"):
-        rows = VectorEnv(
+        envs = VectorEnv(
             ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0}
         )  # none is lifted
         policy = policies.policy("cpg", robot, "tuned", num_envs=6)
-        observations, rewards, total = rows.reset(seed=0)[0], np.zeros(6), 0.0
+        observations, rewards, total = envs.reset(seed=0)[0], np.zeros(6), 0.0
         policy.reset(range(6), range(6))
         for _ in range(300):
-            observations, rewards, *_ = rows.step(policy.act(rows.task.split(observations.astype(float)), rewards))
+            observations, rewards, *_ = envs.step(policy.act(envs.task.split(observations.astype(float)), rewards))
             total += rewards.mean()
-        rows.close()
+        envs.close()
         returns.append(total)
     # Bastion's speed sways more on a height field, which touches a foot in several points: 2.4 % once it walks.
     assert abs(returns[0] / returns[1] - 1.0) < (0.04 if robot == "bastion" else 0.01)
@@ -341,16 +341,16 @@ def test_levels_of_gaps_differ():
 @pytest.mark.slow
 @pytest.mark.parametrize("threads", [1, 3])
 @pytest.mark.parametrize("name", ["rough", "course"])
-def test_rows_of_a_curriculum_are_single_environments(name, threads):
+def test_environments_of_a_curriculum_are_single_environments(name, threads):
     """Over six episodes whose levels change."""
     settings = {"curriculum": True, "level": 4, "time_limit": 0.6}
-    rows = VectorEnv("leaper", name, 3, threads, task_kwargs=settings)
+    envs = VectorEnv("leaper", name, 3, threads, task_kwargs=settings)
     single = gymnasium.make(f"arc_suite/leaper-{name}-v0", task_kwargs=settings)
-    assert_array_equal(rows.reset(seed=10)[0][1], single.reset(seed=11)[0])
+    assert_array_equal(envs.reset(seed=10)[0][1], single.reset(seed=11)[0])
     random, levels, ended = np.random.RandomState(0), [], False
     for _ in range(80):
-        actions = random.uniform(-1.0, 1.0, rows.action_space.shape).astype(np.float32)
-        observations, rewards, _, truncated, infos = rows.step(actions)
+        actions = random.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
+        observations, rewards, _, truncated, infos = envs.step(actions)
         if ended:
             (observation, _), ended = single.reset(), False
         else:
@@ -360,7 +360,7 @@ def test_rows_of_a_curriculum_are_single_environments(name, threads):
             levels.append(info["progress_level"])
         assert_array_equal(observations[1], observation)
     assert levels[0] == 4.0 and len(set(levels)) >= 3
-    rows.close()
+    envs.close()
 
 
 @pytest.mark.long
@@ -385,15 +385,15 @@ def test_ground_has_no_scale():
     distances = []
     for scale in (0.075, 1.0, 10.0):
         body = generator.scaled(generator.generate(6, 3), scale)
-        rows = VectorEnv(body, "rough", 6, task_kwargs={"terrain_seed": 3})
+        envs = VectorEnv(body, "rough", 6, task_kwargs={"terrain_seed": 3})
         policy = policies.policy("cpg", body, "surefooted", num_envs=6)
-        observations, rewards = rows.reset(seed=0)[0], np.zeros(6)
+        observations, rewards = envs.reset(seed=0)[0], np.zeros(6)
         policy.reset(range(6), range(6))
         for _ in range(250):
-            actions = policy.act(rows.task.split(observations.astype(float)), rewards)
-            observations, rewards, *_, infos = rows.step(actions)
+            actions = policy.act(envs.task.split(observations.astype(float)), rewards)
+            observations, rewards, *_, infos = envs.step(actions)
         distances.append(infos["progress_distance"].mean())
-        rows.close()
+        envs.close()
     assert np.ptp(distances) < 0.02 and min(distances) > 0.8
 
 
@@ -415,7 +415,7 @@ def test_settings_that_do_not_fit_are_one_line(settings, message):
     assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
-def test_models_of_rows_and_of_one_environment_are_one():
+def test_models_of_environments_and_of_one_environment_are_one():
     body = ROBOTS["tick"]
     arena = prepared(body, "stairs")[0].scene.arena
     assert compiled(body, arena).ngeom == arc_suite.load(body, "stairs").physics.model.ngeom

@@ -17,7 +17,7 @@ GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "adding_a_task.md").read_t
 (OF_THE_GUIDE,) = re.findall(r"```python\n([^`]*?class LevelSteer.*?)```", GUIDE, re.DOTALL)
 
 BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": generator.random_body(3)}
-ROWS, STEPS = 3, 60
+NUM_ENVS, STEPS = 3, 60
 MODIFIERS = {
     "kicks": 1.0,
     "motor_strength": (0.5, 1.0),
@@ -36,16 +36,16 @@ def assert_close(ours, theirs):
 
 
 def recorded(body, task_name, settings):
-    """Yields memory, action and fields of the simulation, before and after steps of rows that walk about."""
-    rows = VectorEnv(body, task_name, ROWS, 1, task_kwargs=settings)
-    rows.reset(seed=0)
-    task, random = rows.task.definition, np.random.RandomState(0)
+    """Yields memory, action and fields of the simulation, before and after steps of environments that walk about."""
+    envs = VectorEnv(body, task_name, NUM_ENVS, 1, task_kwargs=settings)
+    envs.reset(seed=0)
+    task, random = envs.task.definition, np.random.RandomState(0)
     for _ in range(STEPS):
-        memory = rows._memory
-        action = random.uniform(-0.4, 0.4, rows.action_space.shape)
-        rows.step(action)
-        yield task, memory, action, {name: getattr(rows.batch.data, name).copy() for name in task.reads}
-    rows.close()
+        memory = envs._memory
+        action = random.uniform(-0.4, 0.4, envs.action_space.shape)
+        envs.step(action)
+        yield task, memory, action, {name: getattr(envs.batch.data, name).copy() for name in task.reads}
+    envs.close()
 
 
 PLACES = [
@@ -92,8 +92,8 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
     for task, memory, action, fields in recorded(BODIES[body], task_name, settings):
         if compiled is None:
             compiled = {
-                "rows at once": jax.jit(lambda *values, task=task: step(task, *values)),
-                "one row, mapped": jax.jit(jax.vmap(lambda *values, task=task: step(task, *values))),
+                "environments at once": jax.jit(lambda *values, task=task: step(task, *values)),
+                "one environment, mapped": jax.jit(jax.vmap(lambda *values, task=task: step(task, *values))),
             }
         expected = step(task, memory, action, fields)
         for function in compiled.values():

@@ -88,7 +88,7 @@ def test_the_gaits_of_the_robots_take_turns(task):
         assert (later.stance != clock.stance[:101, image.legs]).mean() < 0.1
 
 
-def test_twice_is_once_for_rows_of_any_precision():
+def test_twice_is_once_for_environments_of_any_precision():
     observation, action = arc_suite.symmetry("leaper", "steer")
     random = np.random.default_rng(0)
     for there, size in ((observation, 169), (action, 12)):

@@ -108,47 +108,47 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
         assert_array_equal(flat(once), flat(other))
 
 
-ROWS = [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", task, 3) for task in TASKS)]
+MODIFIED = [*((case, "steer", 2) for case in EACH), ("all", "walk", 1), *(("all", task, 3) for task in TASKS)]
 
 
 @pytest.mark.parametrize(
     ("case", "task_name", "threads", "body"),
     tiers(
-        [(*case, body) for case in ROWS for body in BODIES],
+        [(*case, body) for case in MODIFIED for body in BODIES],
         never,
         lambda case, task, threads, body: (
             (case, task) in [*itertools.product(["all"], ["walk", "stairs", "navigate"]), ("kicks", "steer")]
-            and turn(body, BODIES, ROWS.index((case, task, threads)))
+            and turn(body, BODIES, MODIFIED.index((case, task, threads)))
         ),
     ),
 )
-def test_a_row_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
-    """Over three episodes with kicks and limping, a snapshot and a pickle, among rows that start at other times."""
+def test_an_environment_is_bit_equal_to_a_single_environment(case, task_name, threads, body):
+    """Over three episodes with kicks and limping, a snapshot and a pickle, among others."""
     length = 50 * prepared(BODIES[body], "walk")[0].scene.control_timestep
     settings = CASES[case] | {"time_limit": length}
     names = {"domain_name": BODIES[body], "task_name": task_name, "task_kwargs": settings}
-    rows, single = (
+    envs, single = (
         VectorEnv(num_envs=3, num_threads=threads, **names),
         gymnasium.make("arc_suite/queen-walk-v0", **names),
     )
-    observations, observation = rows.reset(seed=40)[0], single.reset(seed=41)[0]
+    observations, observation = envs.reset(seed=40)[0], single.reset(seed=41)[0]
     assert_array_equal(observations[1], observation)
     random, ended, episodes, step = np.random.RandomState(0), False, 0, 0
     while episodes < 3:
         step += 1
-        action = random.uniform(-0.4, 0.4, rows.single_action_space.shape).astype(np.float32)
+        action = random.uniform(-0.4, 0.4, envs.single_action_space.shape).astype(np.float32)
         if step == 20:
-            rows.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
+            envs.reset(seed=9, options={"reset_mask": np.array([True, False, False])})
         if step == 30:
             again = VectorEnv(num_envs=3, num_threads=threads, **names)
-            again.restore(rows.snapshot())
-            rows.close()
-            rows = again
+            again.restore(envs.snapshot())
+            envs.close()
+            envs = again
         if step == 45:
-            rows, single = pickle.loads(pickle.dumps(rows)), copy.deepcopy(single)
-        ended = twins.step(rows, single, action, ended)
+            envs, single = pickle.loads(pickle.dumps(envs)), copy.deepcopy(single)
+        ended = twins.step(envs, single, action, ended)
         episodes += ended
-    rows.close()
+    envs.close()
 
 
 GOLDEN = [87, 108, 65, 107, 63, 0.9295281911731215, 0.26258377004339706, 0.7507627278607257, 0.25489406250513713]
@@ -402,17 +402,17 @@ def test_a_task_that_prescribes_no_gait_takes_modifiers():
     settings = ALL | {"exclude_blocks": "posture", "observation_noise": {"velocities": 1.0}, "time_limit": 2.0}
     with gaitless.registered():
         names = {"domain_name": "tick", "task_name": "stay", "task_kwargs": settings}
-        rows, single = VectorEnv(num_envs=2, **names), gymnasium.make("arc_suite/queen-walk-v0", **names)
-        rows.reset(seed=3), single.reset(seed=4)
+        envs, single = VectorEnv(num_envs=2, **names), gymnasium.make("arc_suite/queen-walk-v0", **names)
+        envs.reset(seed=3), single.reset(seed=4)
         for action in np.random.RandomState(0).uniform(-0.3, 0.3, (30, 18)):
-            observations, *_, infos = rows.step(np.stack([action, action]))
+            observations, *_, infos = envs.step(np.stack([action, action]))
             observation, *_, info = single.step(action)
             assert_array_equal(observations[1], observation)
             assert info["progress_fell"] == infos["progress_fell"][1] == 0.0
-        rows.close()
+        envs.close()
 
 
-def test_named_rows_are_steer_with_modifiers_that_callers_can_change():
+def test_named_environments_are_steer_with_modifiers_that_callers_can_change():
     for name, settings in (("shoved", {"kicks": 1.5}), ("limp", {"actuator_failure": True})):
         named, spelt = load("tick", name), load("tick", "steer", **settings)
         assert_array_equal(flat(named.reset()), flat(spelt.reset()))
@@ -523,12 +523,12 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
 
 
 def test_a_leg_whose_motors_have_failed_is_dark_in_all_pictures():
-    environment, rows = load("tick", "limp"), VectorEnv("tick", "limp", 2, render_mode="rgb_array", height=60, width=80)
-    environment.reset(seed=4), rows.reset(seed=3)
+    environment, envs = load("tick", "limp"), VectorEnv("tick", "limp", 2, render_mode="rgb_array", height=60, width=80)
+    environment.reset(seed=4), envs.reset(seed=3)
     before = environment.physics.render(60, 80, "profile")
     assert environment.task.failed_legs() == ()
     for _ in range(modified.FAILS_FROM + 1):
-        environment.step(np.zeros(18)), rows.step(np.zeros((2, 18)))
+        environment.step(np.zeros(18)), envs.step(np.zeros((2, 18)))
     (leg,) = environment.task.failed_legs()
     failing = environment.task.memory.changes.failing
     names = [name for name, fails in zip(environment.task.body.joint_names, failing, strict=True) if fails]
@@ -536,8 +536,8 @@ def test_a_leg_whose_motors_have_failed_is_dark_in_all_pictures():
     assert not np.array_equal(environment.physics.render(60, 80, "profile"), before)
     environment.physics.failed_legs, lit = None, environment.physics.render(60, 80)
     assert not np.array_equal(environment.physics.render(60, 80), lit)
-    assert_array_equal(rows.render([1])[0], lit)
-    rows.close()
+    assert_array_equal(envs.render([1])[0], lit)
+    envs.close()
 
 
 def test_pictures_of_walk_have_no_markers_and_no_dark_leg():

@@ -189,37 +189,37 @@ def test_a_pillar_in_the_way_is_touched_and_stops_a_body():
     assert (progress["goals"], progress["collisions"]) == (0.0, 1.0)
 
 
-def test_rows_are_single_environments_and_carry_on_after_a_copy():
-    rows, single = VectorEnv("tick", "navigate", 3, 2), arc_suite.load("tick", "navigate")
+def test_environments_are_single_environments_and_carry_on_after_a_copy():
+    envs, single = VectorEnv("tick", "navigate", 3, 2), arc_suite.load("tick", "navigate")
     demonstrator = Demonstrator("tick", "steered")
-    observations, timestep = rows.reset(seed=4)[0], single.reset(seed=5)
+    observations, timestep = envs.reset(seed=4)[0], single.reset(seed=5)
     for step in range(60):
         if step == 30:
-            rows = copy.deepcopy(rows)
-        actions = demonstrator.act(rows.task.split(observations))
-        observations, rewards, *_ = rows.step(actions)
+            envs = copy.deepcopy(envs)
+        actions = demonstrator.act(envs.task.split(observations))
+        observations, rewards, *_ = envs.step(actions)
         timestep = single.step(actions[1])
         assert_array_equal(observations[1], single.task.definition.vector(timestep.observation, np.float32))
         assert rewards[1] == timestep.reward
-    rows.close()
+    envs.close()
 
 
 @pytest.mark.slow
 def test_pictures_show_the_goal_and_pillars():
-    rows = VectorEnv("tick", "navigate", 2, 1, render_mode="rgb_array", height=60, width=80)
+    envs = VectorEnv("tick", "navigate", 2, 1, render_mode="rgb_array", height=60, width=80)
     single = arc_suite.load("tick", "navigate")
-    rows.reset(seed=4), single.reset(seed=5)
+    envs.reset(seed=4), single.reset(seed=5)
     for _ in range(3):
-        rows.step(np.zeros(rows.action_space.shape)), single.step(np.zeros(18))
+        envs.step(np.zeros(envs.action_space.shape)), single.step(np.zeros(18))
     shown = single.physics.render(60, 80)
-    assert_array_equal(rows.render()[1], shown)
+    assert_array_equal(envs.render()[1], shown)
     task, memory = single.task.definition, single.task.memory
     disc = task.markers(memory, task.read(single.physics.data.ptr))[-1]
     assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.context.reach)
     assert_array_equal(disc.start[:2], memory.command.goals[0])
     single.physics.data.mocap_pos[:, :2] += 100.0
     assert not np.array_equal(single.physics.render(60, 80), shown)
-    rows.close()
+    envs.close()
 
 
 @pytest.mark.long

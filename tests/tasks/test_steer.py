@@ -195,7 +195,7 @@ def test_a_live_command_takes_the_place_of_the_schedule_until_the_next_episode()
     assert np.isnan(environment.task.memory.command.live).all()
 
 
-def test_live_commands_of_rows_are_those_of_single_environments():
+def test_live_commands_of_environments_are_those_of_single_environments():
     envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
     env = gymnasium.make("arc_suite/tick-steer-v0")
     envs.reset(seed=5), env.reset(seed=6)
@@ -213,7 +213,7 @@ def test_live_commands_of_rows_are_those_of_single_environments():
     envs.close()
 
 
-def test_live_commands_of_rows_add_up_between_two_steps():
+def test_live_commands_of_environments_add_up_between_two_steps():
     envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
     envs.reset(seed=5)
     for value, mask in ((0.25, [True, True, False]), (0.5, [False, True, True])):
@@ -237,30 +237,30 @@ def test_live_commands_of_rows_add_up_between_two_steps():
 def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, message):
     single = arc_suite.load("tick", task)
     single.reset()
-    rows = gymnasium.make_vec(f"arc_suite/tick-{task}-v0", num_envs=2)
-    rows.reset(seed=0)
-    for environment in (single, rows):
+    envs = gymnasium.make_vec(f"arc_suite/tick-{task}-v0", num_envs=2)
+    envs.reset(seed=0)
+    for environment in (single, envs):
         with pytest.raises(ValueError) as error:
             environment.command(name, value)
         assert str(error.value) == message
-    rows.close()
+    envs.close()
 
 
 @pytest.mark.long
 def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
     earned = {}
     for preset in ("steered", "tuned", None):
-        rows = VectorEnv("tick", "steer", 6)
+        envs = VectorEnv("tick", "steer", 6)
         policy = Demonstrator("tick", preset) if preset else None
-        observations, _ = rows.reset(seed=0)
+        observations, _ = envs.reset(seed=0)
         total = 0.0
         for _ in range(300):
-            blocks = rows.task.split(observations)
-            actions = policy.act(blocks) if policy else np.zeros(rows.action_space.shape)
-            observations, rewards, *_ = rows.step(actions)
+            blocks = envs.task.split(observations)
+            actions = policy.act(blocks) if policy else np.zeros(envs.action_space.shape)
+            observations, rewards, *_ = envs.step(actions)
             total += rewards.sum()
         earned[preset] = total
-        rows.close()
+        envs.close()
     assert earned[None] < 0.55 * earned["steered"]
     assert earned["tuned"] < 0.45 * earned["steered"]
 
@@ -366,10 +366,10 @@ def test_pictures_show_the_command_as_arrows():
     assert [mark.shape for mark in task.markers(environment.task.memory, readings)] == ["cylinder"]
     stopped = environment.physics.render(60, 80)
     assert not np.array_equal(shown, stopped)
-    rows = VectorEnv("queen", "steer", 2, render_mode="rgb_array", height=60, width=80)
+    envs = VectorEnv("queen", "steer", 2, render_mode="rgb_array", height=60, width=80)
     single = arc_suite.load("queen", "steer")
-    rows.reset(seed=3), single.reset(seed=4)
+    envs.reset(seed=3), single.reset(seed=4)
     for _ in range(3):
-        rows.step(np.zeros(rows.action_space.shape)), single.step(np.zeros(18))
-    assert_array_equal(rows.render([1])[0], single.physics.render(60, 80))
-    rows.close()
+        envs.step(np.zeros(envs.action_space.shape)), single.step(np.zeros(18))
+    assert_array_equal(envs.render([1])[0], single.physics.render(60, 80))
+    envs.close()

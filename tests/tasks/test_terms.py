@@ -109,7 +109,7 @@ def test_healthy_term_is_zero_after_a_fall():
     assert timestep.discount == 0.0
 
 
-def test_costs_of_a_batch_are_the_costs_of_its_rows():
+def test_costs_of_a_batch_are_the_costs_of_its_environments():
     rng = np.random.default_rng(0)
     default = rng.uniform(-0.5, 0.5, 12)
     shapes = Readings((17,), (3,), (4,), (12,), (18,), (126,), (3,), (4,))

@@ -51,7 +51,7 @@ def test_small_run_prints_tables_and_writes_results_plot_and_document(small_run)
         "vector env, 1 environment",
         "vector env, 4 environments",
         *report.TARGETS,
-        "memory of a row, kB",
+        "memory of an environment, kB",
         "4 links a leg",
     ):
         assert any(line.startswith(f"| {start}") for line in lines), start

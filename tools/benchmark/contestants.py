@@ -52,7 +52,7 @@ class Contestant(NamedTuple):
 
 
 def singles(robot: str, ordinary_id: str) -> Iterator[Contestant]:
-    """Plain MuJoCo and the environments of one row."""
+    """Plain MuJoCo and the environments that run alone."""
     lean, silent = compiled(ROBOTS[robot]), compiled(ROBOTS[robot])
     silent.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_SENSOR
     full = mujoco.MjModel.from_xml_string(ordinary.full_model(robot).to_xml_string())
@@ -75,7 +75,7 @@ def ordinary_vectors(ordinary_id: str, workers: Sequence[int]) -> Iterator[Conte
 
 
 def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator[Contestant]:
-    """The vector environment: every number of rows on most threads, and the middle one on every number of threads."""
+    """The vector environment: every size on most threads, and the middle one on every number of threads."""
     most = max(threads)
     sizes = [(number, most) for number in rows] + [(reference(rows), few) for few in threads if few != most]
     for number, few in sizes:
@@ -86,7 +86,7 @@ def vectors(robot: str, rows: Sequence[int], threads: Sequence[int]) -> Iterator
 
 
 def reference(rows: Sequence[int]) -> int:
-    """The number of rows at which threads are compared: 64 where it is among them."""
+    """The number of environments at which threads are compared: 64 where it is among them."""
     return 64 if 64 in rows else max(rows)
 
 

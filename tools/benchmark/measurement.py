@@ -19,7 +19,7 @@ from benchmark import contestants, growth, ordinary
 from benchmark.contestants import Contestant
 
 WARM_UP = 20  # control steps, in which a robot begins to walk
-ROW_STEPS = 1500  # rows x control steps of a block beyond which blocks get shorter
+ENV_STEPS = 1500  # environments x control steps of a block beyond which blocks get shorter
 
 
 def machine() -> dict:
@@ -50,11 +50,11 @@ def measure(
         threads: of the vector environment.
         workers: processes of Gymnasium's own.
         rounds: how often each contestant has its turn.
-        steps: control steps of a turn, fewer where there are many rows, but not less than a third.
+        steps: control steps of a turn, fewer where there are many environments, but not less than a third.
         progress: wraps an iterable, such as `tqdm`.
 
     Returns:
-        JSON-able: "machine", "robots" and "growth"; times in us per control step of one row, one
+        JSON-able: "machine", "robots" and "growth"; times in us per control step of one environment, one
         for each round.
     """
     results = {"machine": machine(), "robots": {}, "growth": []}
@@ -103,7 +103,7 @@ class _Field:
         order = range(len(self._contestants))
         for index in order if len(self._times[0]) % 2 == 0 else reversed(order):
             rows = self._contestants[index].num_envs
-            few = max(1, steps // 3, min(steps, ROW_STEPS // rows))
+            few = max(1, steps // 3, min(steps, ENV_STEPS // rows))
             self._times[index].append(1e6 * self._run(index, few) / (few * rows))
 
     def results(self) -> list[dict]:
@@ -149,7 +149,7 @@ def _size(robot: str, rows: int, threads: int) -> dict:
     return {
         "num_envs": rows,
         "build_seconds": built,
-        "kilobytes_per_row": memory / rows / 1e3,
+        "kilobytes_per_environment": memory / rows / 1e3,
         "masked_reset_microseconds": 1e6 * float(np.median(resets)),
     }
 

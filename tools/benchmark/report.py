@@ -17,7 +17,7 @@ TARGETS = {
     "dm_env / lean-model limit without sensors": None,
     "vector env / best AsyncVectorEnv": 2.70,
     "vector env / threads x lean-model limit": 0.95,
-    "vector env, most rows / reference rows": 0.95,
+    "vector env, most environments / reference": 0.95,
 }
 # A robot that is not here has a colour of matplotlib's.
 _COLORS = {"queen": "#b8860b", "bastion": "#2a7f8e", "tick": "#7a5195", "leaper": "#c8443c"}
@@ -25,16 +25,16 @@ _MARKED = re.compile(r"(<!-- benchmark -->\n).*?(<!-- end of benchmark -->)", re
 
 
 def tables(results: dict) -> str:
-    """All tables in Markdown: speeds, ratios, and what many rows cost."""
+    """All tables in Markdown: speeds, ratios, and what many environments cost."""
     robots = list(results["robots"])
     parts = [
         _about(results["machine"]),
-        "### Speed\n\nus per control step of one row: median (spread of the middle half).",
+        "### Speed\n\nus per control step of one environment: median (spread of the middle half).",
     ]
     parts.append(_table(["", *robots], _speed_rows(results)))
     parts.append("### Ratios\n\nof steps per second: median over the rounds.")
     parts.append(_table(["", "at least", *robots], _ratio_rows(results)))
-    parts.append("### Many rows")
+    parts.append("### Many environments")
     parts.append(_table(["", *robots], _size_rows(results)))
     parts.append("### Legs and links\n\nus per control step, 25 times `mj_step` of a standing body: median.")
     parts.append(_growth_table(results["growth"]))
@@ -56,7 +56,7 @@ def ratios(contestants: list[dict]) -> dict[str, float]:
         "dm_env / lean-model limit without sensors": (single[names.SILENT], single[names.DM_ENV]),
         "vector env / best AsyncVectorEnv": (best_async, middle),
         "vector env / threads x lean-model limit": (single[names.LEAN] / most, middle),
-        "vector env, most rows / reference rows": (middle, largest),
+        "vector env, most environments / reference": (middle, largest),
     }
     return {name: float(np.median(slow / fast)) for name, (slow, fast) in pairs.items()}
 
@@ -81,7 +81,7 @@ def into_document(path: pathlib.Path, text: str) -> None:
 
 
 def plot(results: dict, path: pathlib.Path) -> None:
-    """Draws steps per second of single environments, over rows and over threads, and the cost of legs and links."""
+    """Draws steps per second of single environments, over sizes and over threads, and the cost of legs and links."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -138,7 +138,7 @@ def _size_rows(results: dict) -> Iterator[list[str]]:
     sizes = [robot["size"] for robot in results["robots"].values()]
     rows = sizes[0]["num_envs"]
     yield [f"building {rows} environments, s", *(f"{size['build_seconds']:.2f}" for size in sizes)]
-    yield ["memory of a row, kB", *(f"{size['kilobytes_per_row']:.0f}" for size in sizes)]
+    yield ["memory of an environment, kB", *(f"{size['kilobytes_per_environment']:.0f}" for size in sizes)]
     yield [
         f"restarting one of {rows} environments, us",
         *(f"{size['masked_reset_microseconds']:.0f}" for size in sizes),
@@ -195,7 +195,7 @@ def _plot_rows(panel, results: dict) -> None:
         panel.axhline(best, color=color, linestyle=":", linewidth=1)
     panel.set_xscale("log", base=2)
     panel.set_xticks([rows for rows, _ in points], [str(rows) for rows, _ in points])
-    panel.set_title("Vector env over rows\n(dotted: best AsyncVectorEnv of ordinary ones)")
+    panel.set_title("Vector env over environments\n(dotted: best AsyncVectorEnv of ordinary ones)")
     panel.set_xlabel("environments")
     panel.set_ylabel("control steps / s")
 

@@ -58,8 +58,8 @@ def test_checkpoints_take_turns(run):
     observation = {name: np.full((3, size), 0.3) for name, size in sizes.items()}
     both.reset(range(3), [4, 2, 0])
     actions = both.act(observation, np.zeros(3))
-    for row, turn in enumerate((1, 2, 0)):
-        np.testing.assert_array_equal(actions[row], alone[turn].act(observation, np.zeros(3))[row])
+    for which, turn in enumerate((1, 2, 0)):
+        np.testing.assert_array_equal(actions[which], alone[turn].act(observation, np.zeros(3))[which])
 
 
 @pytest.mark.slow

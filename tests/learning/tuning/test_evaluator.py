@@ -17,7 +17,7 @@ def test_evaluator_plays_the_episodes_of_ordinary_environments():
     presets = [PRESETS["leaper"][name] for name in ("slow", "fast")]
     score = Evaluator(Setup.of("leaper"), presets=2, episodes=2, steps=30)(presets, range(5, 7))
     environment = gymnasium.make("arc_suite/leaper-walk-v0")
-    for row, preset in enumerate(presets):
+    for index, preset in enumerate(presets):
         for episode in range(2):
             policy = Demonstrator("leaper", preset)
             observation, _ = environment.reset(seed=5 + episode)
@@ -29,9 +29,9 @@ def test_evaluator_plays_the_episodes_of_ordinary_environments():
                 smoothness += info["reward_smoothness"]
                 mujoco.mju_rotVecQuat(axis, (0.0, 0.0, 1.0), observation[1:5].astype(float))
                 tilt += axis[0] ** 2 + axis[1] ** 2
-            assert_allclose(score.rewards[row, episode], total / 30, rtol=1e-12)
-            assert_allclose(score.style["smoothness"][row, episode], smoothness / 30, rtol=1e-12)
-            assert_allclose(score.style["tilt"][row, episode], tilt / 30, rtol=1e-4)
+            assert_allclose(score.rewards[index, episode], total / 30, rtol=1e-12)
+            assert_allclose(score.style["smoothness"][index, episode], smoothness / 30, rtol=1e-12)
+            assert_allclose(score.style["tilt"][index, episode], tilt / 30, rtol=1e-4)
     assert not score.falls.any()
 
 
