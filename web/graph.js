@@ -1,7 +1,9 @@
-// Trained policies: graphs of ONNX operators on float32 numbers for one environment; see arc_suite.policies.graphs.
+// Trained policies: nodes on float32 numbers of one environment, a leading axis of 1; see arc_suite.policies.graph.
+
+const EPSILON = 1e-5; // of a layer norm
 
 const count = (shape) => shape.reduce((product, length) => product * length, 1);
-const tensor = (shape, values) => ({ shape, data: Float32Array.from(values) });
+const array = (shape, values) => ({ shape, data: Float32Array.from(values) });
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 // Steps along each axis of an array; 0 along axes of length 1, which are repeated.
@@ -11,10 +13,13 @@ function strides(shape) {
 
 // Computes number by number, with axes repeated as NumPy does.
 function elementwise(compute) {
-  return (inputs) => {
+  return (...inputs) => {
     const rank = Math.max(...inputs.map(({ shape }) => shape.length));
     const shapes = inputs.map(({ shape }) => [...Array(rank - shape.length).fill(1), ...shape]);
-    const shape = Array.from({ length: rank }, (_, axis) => Math.max(...shapes.map((each) => each[axis])));
+    const shape = Array.from({ length: rank }, (_, axis) => {
+      const lengths = shapes.map((each) => each[axis]);
+      return lengths.find((length) => length !== 1) ?? 1;
+    });
     const steps = shapes.map(strides);
     const data = Float32Array.from({ length: count(shape) }, (_, index) => {
       const places = inputs.map(() => 0);
@@ -29,20 +34,12 @@ function elementwise(compute) {
   };
 }
 
-// Reduces the second axis, which stays with the length 1.
-function reduction(compute) {
-  return ([{ shape: [, length, ...rest], data }]) => {
-    const width = count(rest);
-    const column = (start) => Array.from({ length }, (_, row) => data[row * width + start]);
-    return tensor([1, 1, ...rest], Array.from({ length: width }, (_, start) => compute(column(start))));
-  };
-}
-
 const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+const add = elementwise((a, b) => a + b);
 
-// Products of the rows of an array with a matrix.
-function matMul([{ shape, data }, { shape: [inner, outer], data: weight }]) {
-  const rows = data.length / inner, found = new Float32Array(rows * outer);
+// Products of rows with a matrix.
+function product({ shape: [rows], data }, { shape: [inner, outer], data: weight }) {
+  const found = new Float32Array(rows * outer);
   for (let row = 0; row < rows; row += 1) {
     for (let o = 0; o < outer; o += 1) {
       let sum = 0;
@@ -50,72 +47,92 @@ function matMul([{ shape, data }, { shape: [inner, outer], data: weight }]) {
       found[row * outer + o] = sum;
     }
   }
-  return { shape: [...shape.slice(0, -1), outer], data: found };
+  return { shape: [rows, outer], data: found };
 }
 
-const add = elementwise((a, b) => a + b);
-
-function layerNormalization([{ shape, data }, scale, offset], { epsilon }) {
-  const middle = mean(data), centred = data.map((value) => value - middle);
-  const deviation = Math.sqrt(mean(centred.map((value) => value * value)) + epsilon);
-  return { shape, data: centred.map((value, i) => (value / deviation) * scale.data[i] + offset.data[i]) };
+function layerNorm({ shape, data }, scale, offset) {
+  const width = shape.at(-1), found = new Float32Array(data.length);
+  for (let start = 0; start < data.length; start += width) {
+    const row = data.subarray(start, start + width), middle = mean(row), centred = row.map((value) => value - middle);
+    const deviation = Math.sqrt(mean(centred.map((value) => value * value)) + EPSILON);
+    found.set(centred.map((value, i) => (value / deviation) * scale.data[i] + offset.data[i]), start);
+  }
+  return { shape, data: found };
 }
 
-// Arrays of the same rows, one after the other along the last axis.
-function concat(inputs) {
-  const widths = inputs.map(({ shape }) => shape.at(-1)), leading = inputs[0].shape.slice(0, -1);
-  const rows = Array.from({ length: count(leading) }, (_, row) =>
-    inputs.flatMap(({ data }, input) => [...data.subarray(row * widths[input], (row + 1) * widths[input])]),
-  );
-  return tensor([...leading, widths.reduce((sum, width) => sum + width, 0)], rows.flat());
+// The rows where a mask is not 0.
+function pick({ shape, data }, mask) {
+  const width = shape.at(-1), kept = data.filter((_, index) => mask.data[Math.floor(index / width)] > 0);
+  return { shape: [kept.length / width, width], data: kept };
+}
+
+// Rows where a mask is not 0, and 0 elsewhere.
+function place({ shape: [, width], data }, mask) {
+  const found = new Float32Array(mask.data.length * width);
+  let row = 0;
+  mask.data.forEach((there, index) => {
+    if (there > 0) found.set(data.subarray(row * width, (row += 1) * width), index * width);
+  });
+  return { shape: [...mask.shape, width], data: found };
+}
+
+// Sums over the axis after that of environments.
+function sum({ shape: [, length, ...rest], data }) {
+  const found = new Float32Array(count(rest));
+  for (let i = 0; i < length; i += 1) found.forEach((_, at) => (found[at] += data[i * found.length + at]));
+  return { shape: [1, ...rest], data: found };
+}
+
+function concat(...inputs) {
+  const values = inputs.flatMap(({ data }) => Array.from(data));
+  return array([1, values.length], values);
 }
 
 const OPERATORS = {
-  Abs: elementwise(Math.abs),
   Add: add,
-  Cast: ([x]) => x, // truth values are 0 and 1 already
   Clip: elementwise(clamp),
   Concat: concat,
   Div: elementwise((a, b) => a / b),
   Elu: elementwise((value) => (value > 0 ? value : Math.expm1(value))),
-  Gather: ([{ data }, indices]) => tensor([1, indices.data.length], Array.from(indices.data, (index) => data[index])),
-  Gemm: ([x, weight, bias]) => add([matMul([x, weight]), bias]),
+  Equal: elementwise((a, b) => a === b),
   Greater: elementwise((a, b) => a > b),
   GreaterOrEqual: elementwise((a, b) => a >= b),
-  LayerNormalization: layerNormalization,
-  MatMul: matMul,
+  LayerNorm: layerNorm,
+  Linear: (x, weight, bias) => add(product(x, weight), bias),
   Max: elementwise(Math.max),
   Mul: elementwise((a, b) => a * b),
-  Not: elementwise((value) => !value),
-  Or: elementwise((a, b) => a || b),
-  ReduceMax: reduction((values) => Math.max(...values)),
-  ReduceMean: reduction(mean),
+  Neg: elementwise((value) => -value),
+  Pick: pick,
+  Place: place,
+  Product: product,
   Relu: elementwise((value) => Math.max(value, 0)),
-  Reshape: ([{ data }, shape]) => ({ shape: [1, ...shape.data.slice(1)], data }),
   Sqrt: elementwise(Math.sqrt),
   Sub: elementwise((a, b) => a - b),
+  Sum: sum,
+  Take: ({ data }, { shape, data: places }) => array([1, ...shape], Array.from(places, (at) => data[at])),
   Tanh: elementwise(Math.tanh),
 };
 
 const bytes = (base64) => Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer;
-const CONSTANTS = { float: (text) => new Float32Array(bytes(text)), integer: (text) => new Int32Array(bytes(text)) };
+const TYPES = { float32: Float32Array, int32: Int32Array };
 
 export class Graph {
-  constructor({ blocks, nodes, constants }) {
+  constructor({ blocks, nodes, arrays }) {
     this.blocks = blocks;
     this.nodes = nodes;
-    this.constants = Object.fromEntries(
-      Object.entries(constants).map(([name, { kind, shape, data }]) => [name, { shape, data: CONSTANTS[kind](data) }]),
+    this.arrays = Object.fromEntries(
+      Object.entries(arrays).map(([name, { type, shape, data }]) => [name, { shape, data: new TYPES[type](bytes(data)) }]),
     );
   }
 
   // Returns actions of the motors for blocks of an observation.
   act(observation) {
-    const inputs = this.blocks.flatMap((name) => Array.from(observation[name]));
-    const found = { ...this.constants, observations: tensor([1, inputs.length], inputs) };
-    for (const { operator, inputs: names, result, attributes } of this.nodes) {
-      found[result] = OPERATORS[operator](names.map((name) => found[name]), attributes);
+    const known = { ...this.arrays, observations: concat(...this.blocks.map((name) => ({ data: observation[name] }))) };
+    const results = [];
+    for (const [operator, ...inputs] of this.nodes) {
+      const given = inputs.map((input) => (typeof input === "number" ? results[input] : known[input]));
+      results.push(OPERATORS[operator](...given));
     }
-    return Array.from(found.actions.data, (action) => clamp(action, -1, 1));
+    return Array.from(results.at(-1).data, (action) => clamp(action, -1, 1));
   }
 }

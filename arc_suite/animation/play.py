@@ -2,7 +2,7 @@
 
 A page is one HTML file with nothing to fetch. `make web` builds its scripts, with three.js and MuJoCo's own
 WebAssembly; the law `steered` is a port to JavaScript of what Python computes, with its constants, and trained
-policies are the graphs of their ONNX files.
+policies are graphs, which the page runs as they are.
 """
 
 import base64
@@ -22,7 +22,7 @@ from arc_suite.cpg.steering import Steered
 from arc_suite.envs.setup import Setup
 from arc_suite.models.outline import outline
 from arc_suite.models.sizing import SUBSTEPS
-from arc_suite.policies import graphs, universal, zips
+from arc_suite.policies import universal, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.universal import Universal
 from arc_suite.robots.spec import Body
@@ -143,22 +143,19 @@ def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
     if zips.parts(name):
         made = policies.trained(name)
     if isinstance(made, Universal):  # acts in the task that it was trained in
-        task = Setup.of(body, made.network.setup.task).definition
-        made, blocks = Universal(made.network, task), task.sizes
-    elif isinstance(made, Network):
-        blocks, task = made.blocks, made.setup.definition
-    else:
+        made = universal.fitted(made.network, Setup.of(body, made.network.setup.task))
+    if not isinstance(made, Network):
         raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
+    blocks, task = made.blocks, made.setup.definition
     if unknown := [block for block in blocks if block not in _BLOCKS]:
         raise ValueError(f"policy {name}: observes {unknown[0]}, and a page has {', '.join(_BLOCKS)} alone")
     if task.actions != "torque":
         raise ValueError(f"policy {name}: its actions are a {task.actions} a joint, and a page takes torques")
-    graph = graphs.of(made)
-    nodes = [node._asdict() for node in graph.nodes]
-    constants = {constant: _constant(array) for constant, array in graph.constants.items()}
-    return task, {"kind": "graph", "constants": {"blocks": list(blocks), "nodes": nodes, "constants": constants}}
+    nodes = [[node.operator, *node.inputs] for node in made.graph.nodes]
+    arrays = {array: _array(values) for array, values in made.graph.arrays.items()}
+    return task, {"kind": "graph", "constants": {"blocks": list(blocks), "nodes": nodes, "arrays": arrays}}
 
 
-def _constant(array: np.ndarray) -> dict[str, Any]:
-    kind, number = ("integer", "<i4") if array.dtype.kind == "i" else ("float", "<f4")
-    return {"kind": kind, "shape": array.shape, "data": base64.b64encode(array.astype(number).tobytes()).decode()}
+def _array(values: np.ndarray) -> dict[str, Any]:
+    data = base64.b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode()
+    return {"type": values.dtype.name, "shape": values.shape, "data": data}

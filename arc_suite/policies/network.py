@@ -1,130 +1,44 @@
-"""Policies that are networks: layers of numbers, evaluated by NumPy, however they were trained.
+"""Policies that are graphs, and the setups that they were trained in, as files.
 
-A policy file is an archive of arrays with one JSON text:
+A policy file is an archive of the graph's arrays with one JSON text:
 
     robot, task, task_kwargs    the setup that the policy was trained in
     blocks                      size of every block of the observation, in the order of the input
-    layers                      kind of every layer, by whose index its arrays are named
+    nodes                       [operator, input, ...] for each node of the graph; see `graph`
 
 It holds no pickle and no code, so reading a file of others runs nothing.
 """
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import archives, checks, files, registry
 from arc_suite.envs.setup import Setup
-from arc_suite.tasks import tokens
+from arc_suite.policies.graph import Graph, Node, checked
 
 PACKAGED = Path(__file__).with_name("packaged")  # policy files that come with the package
 
 EXTENSION = ".npz"
 FILE = f"policy{EXTENSION}"  # in the folder of a run
 
-EPSILON = 1e-5  # of a layer norm, as in PyTorch
-
 _MAX_BYTES = 1 << 28  # of a file, unpacked
-
-
-class Layer(NamedTuple):
-    """A layer of a network.
-
-    Attributes:
-        kind: a name of `KINDS`.
-        arrays: what it computes with, float32.
-    """
-
-    kind: str
-    arrays: tuple[np.ndarray, ...] = ()
-
-
-def _linear(x, weight, bias):
-    # Not a product of matrices: BLAS rounds by the number of environments and threads.
-    return np.einsum("ri,io->ro", x, weight) + bias
-
-
-def _layer_norm(x, scale, offset):
-    x = x - x.mean(axis=-1, keepdims=True)
-    return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(EPSILON)) * scale + offset
-
-
-def _legs(x, first, first_bias, second, second_bias, own, mean, bias, last, last_bias):
-    """The network of `agents.architectures.PerLeg`, computed for the legs that there are."""
-    inputs, mask = tokens.leg_inputs(x)
-    there = mask.any(axis=-1)
-    found = _elu(_linear(_elu(_linear(inputs[there], first, first_bias)), second, second_bias))
-    features = np.zeros((*there.shape, found.shape[-1]), np.float32)
-    features[there] = found
-    context = _linear(features.sum(axis=1) / there.sum(axis=1, dtype=np.float32)[:, None], mean, bias)
-    hidden = np.einsum("ri,io->ro", found, own) + context[np.nonzero(there)[0]]
-    outputs = np.zeros(mask.shape, np.float32)
-    outputs[there] = _linear(_elu(hidden), last, last_bias)
-    return (outputs * mask).reshape(len(x), -1)
-
-
-def _elu(x):
-    return np.where(x > 0.0, x, np.expm1(np.minimum(x, np.float32(0.0))))
-
-
-class Kind(NamedTuple):
-    """What a layer computes.
-
-    Attributes:
-        function: of inputs (num_envs, i) float32 and of arrays; returns outputs (num_envs, o) or (num_envs, i).
-        shapes: of the arrays, a letter for each axis.
-        sizes: of axes that are given, by letter.
-        outputs: number of outputs, where no letter says it.
-    """
-
-    function: Callable
-    shapes: tuple[str, ...] = ()
-    sizes: Mapping[str, int] = {}
-    outputs: int | None = None
-
-
-# Arrays are weight and bias; scale and offset; mean, factor and limit of inputs, which become (x - mean) * factor
-# within +-limit.
-KINDS = {
-    "linear": Kind(_linear, ("io", "o")),
-    "layer_norm": Kind(_layer_norm, ("i", "i")),
-    "normalise": Kind(lambda x, mean, factor, limit: ((x - mean) * factor).clip(-limit, limit), ("i", "i", "")),
-    "relu": Kind(lambda x: np.maximum(x, np.float32(0.0))),
-    "elu": Kind(_elu),
-    "tanh": Kind(np.tanh),
-    "clip": Kind(lambda x: x.clip(np.float32(-1.0), np.float32(1.0))),
-    # Of legs: weights and biases of two layers for the features of a leg; of the layer that takes features of the
-    # leg, and those of the mean of all; of the last.
-    "legs": Kind(
-        _legs,
-        ("tf", "f", "fg", "g", "gh", "gh", "h", "hj", "j"),
-        {"i": sum(tokens.FLAT.values()), "t": tokens.LEG_INPUTS, "j": tokens.JOINTS},
-        tokens.LEGS * tokens.JOINTS,
-    ),
-}
-
-
-def forward(layers: Sequence[Layer], x: np.ndarray) -> np.ndarray:
-    """Return the outputs of layers for inputs (num_envs, n), float32; each is bit-exact as if computed alone."""
-    for layer in layers:
-        x = KINDS[layer.kind].function(x, *layer.arrays)
-    return x
 
 
 class Network(NamedTuple):
     """A deterministic policy, and the setup it was trained in.
 
     Attributes:
-        layers: from the flat observation (num_envs, size) to actions (num_envs, joints).
+        graph: from the flat observation (num_envs, size) to actions (num_envs, joints).
         setup: body, or bodies, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
     """
 
-    layers: tuple[Layer, ...]
+    graph: Graph
     setup: Setup
     blocks: Mapping[str, int]
 
@@ -140,7 +54,7 @@ class Network(NamedTuple):
 
     def actions(self, observations: np.ndarray) -> np.ndarray:
         """Return actions (num_envs, joints) float32 for flat observations (num_envs, size)."""
-        return forward(self.layers, observations.astype(np.float32, copy=False))
+        return self.graph(observations.astype(np.float32, copy=False))
 
     # The protocol of acting.
 
@@ -171,15 +85,10 @@ def save(path: str | os.PathLike, network: Network) -> None:
     Raises:
         OSError: it cannot be written.
     """
-    kinds = [layer.kind for layer in network.layers]
-    known = network.setup.to_dict() | {"blocks": dict(network.blocks), "layers": kinds}
-    arrays: dict[str, Any] = {
-        f"{index}.{place}": array
-        for index, layer in enumerate(network.layers)
-        for place, array in enumerate(layer.arrays)
-    }
+    nodes = [[node.operator, *node.inputs] for node in network.graph.nodes]
+    known = network.setup.to_dict() | {"blocks": dict(network.blocks), "nodes": nodes}
     with files.writing(path) as temporary:
-        np.savez(temporary, policy=np.array(json.dumps(known)), **arrays)
+        np.savez(temporary, policy=np.array(json.dumps(known)), **network.graph.arrays)  # type: ignore[arg-type]
 
 
 def load(path: str | os.PathLike) -> Network:
@@ -198,11 +107,13 @@ def load(path: str | os.PathLike) -> Network:
             name: checks.integer(f"block {name}", size, 0)
             for name, size in checks.mapping("blocks", known["blocks"]).items()
         }
-        layers, width = [], sum(blocks.values())
-        for index, kind in enumerate(known["layers"]):
-            layer, width = _layer(kind, index, arrays, width)
-            layers.append(layer)
-        return Network(tuple(layers), Setup.from_dict(known), blocks)
+        if "layers" in known:
+            raise ValueError("holds layers, as policies did before they were graphs: train it again")
+        nodes = tuple(Node(operator, tuple(inputs)) for operator, *inputs in known["nodes"])
+        # Packaged policies are stored as float16.
+        found = {name: array.astype(np.float32) if array.dtype == np.float16 else array for name, array in arrays.items()}
+        graph = checked(Graph(nodes, found), sum(blocks.values()))
+        return Network(graph, Setup.from_dict(known), blocks)
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except registry.NotImported as error:
@@ -215,22 +126,3 @@ def checkpoint_files(folder: Path) -> list[Path]:
     """Return the policy files of a folder of checkpoints, `FOLDER/<step>/policy.npz`, by their steps."""
     found = [path for path in folder.glob(f"*/{FILE}") if path.parent.name.isdecimal()]
     return sorted(found, key=lambda path: int(path.parent.name))
-
-
-def _layer(kind: str, index: int, arrays: Mapping[str, np.ndarray], width: int) -> tuple[Layer, int]:
-    """Return a layer that takes inputs of a width, and the width of its outputs."""
-    made, found = KINDS[checks.name(kind, KINDS, "layer")], []
-    sizes = {"i": width} | dict(made.sizes)
-    if sizes["i"] != width:
-        raise ValueError(f"layer {index}, {kind}: expected {sizes['i']} inputs, got {width}")
-    for place, letters in enumerate(made.shapes):
-        array = arrays[f"{index}.{place}"]
-        array = array.astype(np.float32) if array.dtype == np.float16 else array  # as packaged ones are stored
-        sizes = dict(zip(letters, array.shape, strict=False)) | sizes  # the first array tells an axis' size
-        if array.dtype != np.float32 or array.shape != tuple(map(sizes.get, letters)):
-            given = f"{array.dtype} {array.shape}"
-            raise ValueError(f"layer {index}, {kind}: array {place} does not fit {width} inputs, got {given}")
-        if not np.isfinite(array).all():
-            raise ValueError(f"layer {index}, {kind}: array {place} is not finite")
-        found.append(array)
-    return Layer(kind, tuple(found)), made.outputs or sizes.get("o", width)

@@ -1,4 +1,4 @@
-"""Policies as ONNX, which game engines and onnxruntime run: all layers of a network, its normaliser among them.
+"""Policies as ONNX, which game engines and onnxruntime run: the whole graph, its normalization among it.
 
 The input `observations` is (num_envs, size) float32, flat: the task's blocks one after the other. The output
 `actions` is (num_envs, joints) in [-1, 1]. The metadata hold what else a game needs, JSON by name; see `metadata`.
@@ -6,15 +6,16 @@ The input `observations` is (num_envs, size) float32, flat: the task's blocks on
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator
+
+import numpy as np
 
 from arc_suite import files, versions
 from arc_suite.envs.setup import Setup
-from arc_suite.policies import graphs
-from arc_suite.policies.graphs import INPUT, OUTPUT, Graph
+from arc_suite.policies.graph import EPSILON, INPUT, Graph
 from arc_suite.policies.network import Network
-from arc_suite.policies.universal import Universal
 
+OUTPUT = "actions"
 OPSET = 17  # the first with LayerNormalization
 IR_VERSION = 8  # of the same time, so that older runtimes read it
 
@@ -34,11 +35,8 @@ def metadata(network: Network) -> dict:
         ValueError: a policy of many bodies.
     """
     if network.setup.several:
-        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; save_universal takes others")
-    return _metadata(network.setup, network.blocks)
-
-
-def _metadata(setup: Setup, blocks: Mapping[str, int]) -> dict:
+        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.fitted")
+    setup, blocks = network.setup, network.blocks
     task, model = setup.prepared()
     step = task.scene.control_timestep
     known = setup.to_dict() | {
@@ -65,32 +63,18 @@ def save(path: str | os.PathLike, network: Network) -> None:
         OSError: the file cannot be written.
     """
     known = metadata(network)
-    _write(path, graphs.of(network), network.size, network.joints, known)
-
-
-def save_universal(path: str | os.PathLike, network: Network, setup: Setup) -> None:
-    """Write a policy of many bodies as ONNX for one body in a task, atomically.
-
-    Raises:
-        ValueError: the package onnx is not installed, or a body or task that does not fit.
-        OSError: the file cannot be written.
-    """
-    policy = Universal(network, setup.definition)
-    _write(path, graphs.of(policy), policy.task.size, len(policy.reach), _metadata(setup, policy.task.sizes))
-
-
-def _write(path: str | os.PathLike, graph: Graph, size: int, joints: int, known: Mapping) -> None:
     try:
         import onnx
         from onnx import TensorProto, helper, numpy_helper
     except ImportError as error:
         raise versions.MissingExtra("ONNX needs the package onnx", "onnx", error) from None
+    nodes, arrays = _standard(network.graph)
     made = helper.make_graph(
-        [helper.make_node(node.operator, node.inputs, [node.result], **node.attributes) for node in graph.nodes],
+        [helper.make_node(operator, names, [result], **attributes) for operator, names, result, attributes in nodes],
         "policy",
-        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["num_envs", size])],
-        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["num_envs", joints])],
-        [numpy_helper.from_array(array, name) for name, array in graph.constants.items()],
+        [helper.make_tensor_value_info(INPUT, TensorProto.FLOAT, ["num_envs", network.size])],
+        [helper.make_tensor_value_info(OUTPUT, TensorProto.FLOAT, ["num_envs", network.joints])],
+        [numpy_helper.from_array(array, name) for name, array in arrays.items()],
     )
     model = helper.make_model(made, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "arc_suite"
@@ -99,3 +83,57 @@ def _write(path: str | os.PathLike, graph: Graph, size: int, joints: int, known:
     onnx.checker.check_model(model)
     with files.writing(path) as temporary:
         temporary.write_bytes(model.SerializeToString())
+
+
+# Arrays that nodes of ONNX take where ours have none.
+_ARRAYS = {name: np.array(values, np.int64) for name, values in {"flat": (0, -1), "one": (1,), "two": (2,)}.items()}
+
+# The nodes of ONNX that each of ours is: operator, inputs, attributes. An input is one of ours by its number, an array
+# by its name, or the result before, BEFORE. Operators that are missing are the same.
+BEFORE = -1
+_TRUTH = ("Cast", (BEFORE,), {"to": 1})
+_STANDARD: dict[str, tuple] = {
+    "Equal": (("Equal", (0, 1), {}), _TRUTH),
+    "Greater": (("Greater", (0, 1), {}), _TRUTH),
+    "GreaterOrEqual": (("GreaterOrEqual", (0, 1), {}), _TRUTH),
+    "LayerNorm": (("LayerNormalization", (0, 1, 2), {"axis": -1, "epsilon": EPSILON}),),
+    "Linear": (("MatMul", (0, 1), {}), ("Add", (BEFORE, 2), {})),
+    # Every row is computed, and those that are not there become 0.
+    "Pick": (("Identity", (0,), {}),),
+    "Place": (("Unsqueeze", (1, "two"), {}), ("Mul", (0, BEFORE), {})),
+    "Product": (("MatMul", (0, 1), {}),),
+    "Sum": (("ReduceSum", (0, "one"), {"keepdims": 0}),),
+    "Take": (("Reshape", (0, "flat"), {}), ("Gather", (BEFORE, 1), {"axis": 1})),
+}
+
+
+def _standard(graph: Graph) -> tuple[list[tuple], dict[str, np.ndarray]]:
+    """Return nodes (operator, inputs, result, attributes) of ONNX, and their arrays by name."""
+    arrays = _ARRAYS | {f"array_{name}": array for name, array in graph.arrays.items()}
+    nodes: list[tuple] = [("Shape", [INPUT], "num_envs", {"end": 1}), ("Concat", ["num_envs", "one"], "rows", {"axis": 0})]
+    known = {INPUT: INPUT} | {name: f"array_{name}" for name in graph.arrays}
+    for index, node in enumerate(graph.nodes):
+        known[index] = OUTPUT if index == len(graph.nodes) - 1 else f"node_{index}"
+        inputs = [known[name] for name in node.inputs]
+        if node.operator == "Concat":
+            nodes += _joined(inputs, known[index])
+        else:
+            steps = _STANDARD.get(node.operator, ((node.operator, range(len(inputs)), {}),))
+            nodes += _steps(steps, inputs, known[index])
+    return nodes, arrays
+
+
+def _steps(steps: tuple, inputs: list[str], result: str) -> Iterator[tuple]:
+    results = [f"{result}_{place}" for place in range(len(steps) - 1)] + [result]
+    for place, (operator, own, attributes) in enumerate(steps):
+        given = [each if isinstance(each, str) else [*inputs, results[place - 1]][each] for each in own]
+        yield operator, given, results[place], attributes
+
+
+def _joined(inputs: list[str], result: str) -> Iterator[tuple]:
+    """All numbers of inputs, one after the other; arrays are the same in every environment."""
+    flat = [f"{result}_{place}" for place in range(len(inputs))]
+    for name, part in zip(inputs, flat, strict=True):
+        yield "Reshape", [name, "flat"], f"{part}_flat", {}
+        yield "Expand", [f"{part}_flat", "rows"], part, {}
+    yield "Concat", flat, result, {"axis": 1}

@@ -14,14 +14,16 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from arc_suite import checks
 from arc_suite.envs.setup import Setup
-from arc_suite.policies.network import Layer, Network
+from arc_suite.policies.network import Network
+from arc_suite.policies.tracing import Traced, traced
 
-_LAYERS = {
-    torch.nn.Linear: lambda module: Layer("linear", (_array(module.weight.T), _array(module.bias))),
-    torch.nn.ReLU: lambda module: Layer("relu"),
-    torch.nn.Tanh: lambda module: Layer("tanh"),
+# The node of a module, for its inputs.
+_NODES = {
+    torch.nn.Linear: lambda x, module: x.node("Linear", _array(module.weight.T), _array(module.bias)),
+    torch.nn.ReLU: lambda x, module: x.node("Relu"),
+    torch.nn.Tanh: lambda x, module: x.node("Tanh"),
 }
-_TOLERANCE = 1e-4  # of an action, between a network of layers and torch's
+_TOLERANCE = 1e-4  # of an action, between the graph and torch
 
 
 class Saved:
@@ -69,7 +71,7 @@ class Saved:
         return self._actions(flat).astype(float)
 
     def network(self, setup: Setup) -> Network:
-        """Return the policy as layers, with the statistics as the first.
+        """Return the policy as a graph, which normalizes observations with the statistics.
 
         Args:
             setup: that it was trained in.
@@ -81,19 +83,21 @@ class Saved:
         if self._size != (task.size,):
             raise ValueError(f"policy {self._path}: expected observations ({task.size},), got {self._size}")
         try:
-            layers = tuple(_LAYERS[type(module)](module) for module in _modules(self._policy))
+            made = Network(traced(self._traced, task.size), setup, task.sizes)
         except (KeyError, AttributeError, TypeError) as error:
             raise ValueError(f"policy {self._path}: expected a perceptron, got {checks.quoted(error)}") from None
-        layers = (*layers, Layer("tanh" if self._policy.squash_output else "clip"))
-        if (known := self._statistics) is not None and known.norm_obs:
-            factor = 1.0 / np.sqrt(known.obs_rms.var + known.epsilon)
-            arrays = known.obs_rms.mean, factor, known.clip_obs
-            layers = (Layer("normalise", tuple(np.asarray(array, np.float32) for array in arrays)), *layers)
-        made = Network(layers, setup, task.sizes)
         samples = np.random.default_rng(0).standard_normal((8, *self._size), np.float32)
         if np.abs(made.actions(samples) - self._actions(samples)).max() > _TOLERANCE:
             raise ValueError(f"policy {self._path}: expected a perceptron, got another network")
         return made
+
+    def _traced(self, x: Traced) -> Traced:
+        if (known := self._statistics) is not None and known.norm_obs:
+            limit = np.float32(known.clip_obs)
+            x = ((x - known.obs_rms.mean) * (1.0 / np.sqrt(known.obs_rms.var + known.epsilon))).clip(-limit, limit)
+        for module in _modules(self._policy):
+            x = _NODES[type(module)](x, module)
+        return x.node("Tanh") if self._policy.squash_output else x.clip(-1.0, 1.0)
 
     def _actions(self, observations: np.ndarray) -> np.ndarray:
         if self._statistics is not None:

@@ -6,10 +6,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from arc_suite.cpg.law import Clocked, checked, proprioception, torques
+from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.policies import network
+from arc_suite.policies.graph import Graph
 from arc_suite.policies.network import PACKAGED, Network
+from arc_suite.policies.tracing import Traced, repeated, traced
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import Tokens
 
@@ -62,6 +65,12 @@ class Universal:
         self.reach = described.reach[described.mask]
         self.tokens = Tokens.of([task])
         self.gains = position_gains(sized(body), standing(body).inertias)
+        self._positions = traced(self._traced, task.size)
+
+    @property
+    def graph(self) -> Graph:
+        """What gives the actions (num_envs, joints) for observations (num_envs, size) of the task."""
+        return self._positions if self.task.actions == "position" else traced(self._traced_torques, self.task.size)
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int]) -> None:
         """Start episodes: nothing to do, as the policy remembers nothing."""
@@ -74,11 +83,29 @@ class Universal:
         """
         blocks = checked(observation, self.task.sizes, len(self.reach), len(self.task.scene.body.part_names))
         vectors = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
-        own = self.tokens.part(np.zeros(len(vectors), int))
-        seen = own.observed(own.gathered(vectors))
-        descriptions = (np.repeat(part, len(vectors), axis=0) for part in self.descriptions)
-        positions = own.actions(self.network.actions(tokens.flat(seen, *descriptions))).astype(float)
+        positions = self._positions(vectors).astype(float)
         if self.task.actions == "position":
             return positions
         _, angles, speeds = proprioception(checked(observation, Clocked.reads, len(self.reach)))
         return torques(self.reach * positions, angles, speeds, *self.gains)
+
+    def _traced(self, vectors: Traced) -> Traced:
+        """Write the nodes of positions (1, joints) for an observation (1, size)."""
+        seen = self.tokens.observed(self.tokens.gathered(vectors))
+        return self.tokens.actions(repeated(self.network.graph, tokens.flat(seen, *self.descriptions)))
+
+    def _traced_torques(self, vectors: Traced) -> Traced:
+        """Write the nodes of torques (1, joints) for an observation (1, size)."""
+        _, _, *proprioceived, _, _, _ = self.tokens.parts(self.tokens.gathered(vectors))
+        angles, speeds = map(self.tokens.actions, proprioceived)
+        return torques(self.reach * self._traced(vectors), angles, speeds, *self.gains)
+
+
+def fitted(trained: Network, setup: Setup) -> Network:
+    """Return a policy of many bodies as a policy of one body in a task.
+
+    Raises:
+        ValueError: as `Universal`.
+    """
+    made = Universal(trained, setup.definition)
+    return Network(made.graph, setup, dict(made.task.sizes))

@@ -273,8 +273,9 @@ class Tokens(NamedTuple):
         angles, speeds = (array.reshape(self.mask.shape) * self.mask for array in (angles, speeds))
         sine = clock[:, :1] * self.offset[..., 1] + clock[:, 1:] * self.offset[..., 0]
         cosine = clock[:, 1:] * self.offset[..., 1] - clock[:, :1] * self.offset[..., 0]
-        going = clock.any(axis=-1)[:, None]
-        stands = (sine * self.middle[:, :1] + cosine * self.middle[:, 1:] >= self.middle[:, 1:]) | ~going
+        still = clock == 0.0
+        stands = sine * self.middle[:, :1] + cosine * self.middle[:, 1:] >= self.middle[:, 1:]
+        stands = stands | (still[:, :1] & still[:, 1:])
         phase = np.stack([sine, cosine, stands, forces >= self.loaded[:, None]], axis=-1) * self.legs[..., None]
         legs = np.concatenate([angles, speeds / self.rate[:, None, None], phase], axis=-1)
 

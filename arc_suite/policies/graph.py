@@ -1,0 +1,203 @@
+"""Graphs: what a trained policy computes, as nodes and arrays, and the interpreter that runs them.
+
+A node applies an operator of a small table to arrays, to observations and to results of nodes before it. All numbers
+are float32; a truth value is 1 or 0. Results have a leading axis for environments.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from arc_suite import checks
+
+INPUT = "observations"
+EPSILON = 1e-5  # of a layer norm, as in PyTorch
+
+_MOST_NODES = 1 << 10
+_MOST_NUMBERS = 1 << 22  # of all results, for one environment
+
+Shape = tuple[int, ...]
+
+
+class Node(NamedTuple):
+    """An operator and its inputs.
+
+    Attributes:
+        operator: a name of `OPERATORS`.
+        inputs: `INPUT`, names of arrays, and indices of earlier nodes.
+    """
+
+    operator: str
+    inputs: tuple[str | int, ...]
+
+
+class Graph(NamedTuple):
+    """What maps observations (num_envs, size) to actions (num_envs, joints).
+
+    Attributes:
+        nodes: in order; the last one gives the actions.
+        arrays: float32, or int32 for indices.
+    """
+
+    nodes: tuple[Node, ...]
+    arrays: Mapping[str, np.ndarray]
+
+    def __call__(self, observations: np.ndarray) -> np.ndarray:
+        """Return actions (num_envs, joints) for observations (num_envs, size), float32.
+
+        Actions of each environment are bit-exact as if computed alone.
+        """
+        known: dict[str | int, np.ndarray] = {**self.arrays, INPUT: observations}
+        for index, (operator, inputs) in enumerate(self.nodes):
+            known[index] = OPERATORS[operator].function(*(known[name] for name in inputs))
+        return known[len(self.nodes) - 1]
+
+
+class Operator(NamedTuple):
+    """An operator.
+
+    Attributes:
+        function: of arrays.
+        inputs: their number; 0 for any.
+        shape: of the result, from the shapes of the inputs; axes of environments have length 1.
+    """
+
+    function: Callable[..., np.ndarray]
+    inputs: int
+    shape: Callable[..., Shape] = np.broadcast_shapes
+
+
+def _product(x, weight):
+    # Not a product of matrices: BLAS rounds by the number of environments and threads.
+    return np.einsum("ri,io->ro", x, weight)
+
+
+def _product_shape(x: Shape, weight: Shape, bias: Shape | None = None) -> Shape:
+    if len(weight) != 2 or x[-1:] != weight[:1] or bias not in (None, weight[1:]):
+        raise ValueError(f"weight {weight}{'' if bias is None else f' and bias {bias}'} do not fit {x}")
+    return (*x[:-1], weight[1])
+
+
+def _layer_norm(x, scale, offset):
+    x = x - x.mean(axis=-1, keepdims=True)
+    return x / np.sqrt((x * x).mean(axis=-1, keepdims=True) + np.float32(EPSILON)) * scale + offset
+
+
+def _elu(x):
+    return np.where(x > 0.0, x, np.expm1(np.minimum(x, np.float32(0.0))))
+
+
+def _place(rows, mask):
+    placed = np.zeros((*mask.shape, rows.shape[-1]), np.float32)
+    placed[mask > 0.0] = rows
+    return placed
+
+
+def _clip_shape(x: Shape, low: Shape, high: Shape) -> Shape:
+    if low or high:
+        raise ValueError(f"expected a number for each limit, got {low} and {high}")
+    return x
+
+
+def _masked_shape(x: Shape, mask: Shape) -> Shape:
+    if mask != x[:-1]:
+        raise ValueError(f"mask {mask} does not fit {x}")
+    return x
+
+
+def _truth(compare: np.ufunc) -> Operator:
+    return Operator(lambda a, b: compare(a, b).astype(np.float32), 2)
+
+
+# Take gives numbers of an environment by their indices, in the shape of the indices; Concat all numbers of its inputs;
+# Sum sums over the first axis after that of environments. Pick gives the rows (n, size) of an array (num_envs, count,
+# size) where a mask (num_envs, count) is not 0, so that nodes after it compute these alone, and Place puts rows back,
+# with 0 elsewhere. As all operators between them compute row by row, whoever computes every row gets the same.
+OPERATORS = {
+    "Add": Operator(np.add, 2),
+    "Clip": Operator(lambda x, low, high: x.clip(low, high), 3, _clip_shape),
+    "Concat": Operator(
+        lambda *parts: _concatenated([part.reshape(len(part), -1) for part in parts]),
+        0,
+        lambda *shapes: (1, sum(map(math.prod, shapes))),
+    ),
+    "Div": Operator(np.divide, 2),
+    "Elu": Operator(_elu, 1),
+    "Equal": _truth(np.equal),
+    "Greater": _truth(np.greater),
+    "GreaterOrEqual": _truth(np.greater_equal),
+    "LayerNorm": Operator(_layer_norm, 3),
+    "Linear": Operator(lambda x, weight, bias: _product(x, weight) + bias, 3, _product_shape),
+    "Max": Operator(np.maximum, 2),
+    "Mul": Operator(np.multiply, 2),
+    "Neg": Operator(np.negative, 1),
+    "Pick": Operator(lambda x, mask: x[mask > 0.0], 2, _masked_shape),
+    "Place": Operator(_place, 2, _masked_shape),
+    "Product": Operator(_product, 2, _product_shape),
+    "Relu": Operator(lambda x: np.maximum(x, np.float32(0.0)), 1),
+    "Sqrt": Operator(np.sqrt, 1),
+    "Sub": Operator(np.subtract, 2),
+    "Sum": Operator(lambda x: x.sum(axis=1), 1, lambda x: (x[0], *x[2:])),
+    "Take": Operator(lambda x, places: x.reshape(len(x), -1).take(places, axis=1), 2, lambda x, places: (1, *places)),
+    "Tanh": Operator(np.tanh, 1),
+}
+
+
+def _concatenated(parts: list[np.ndarray]) -> np.ndarray:
+    count = max(map(len, parts))  # arrays are the same in every environment
+    return np.concatenate([np.broadcast_to(part, (count, part.shape[1])) for part in parts], axis=1)
+
+
+def checked(graph: Graph, size: int) -> Graph:
+    """Return a graph that others may have written, once it is known to fit observations of a size.
+
+    Raises:
+        ValueError: too many nodes or numbers, an unknown operator, inputs that do not fit, or no actions at the end.
+    """
+    if not 0 < len(graph.nodes) <= _MOST_NODES:
+        raise ValueError(f"expected 1 to {_MOST_NODES} nodes, got {len(graph.nodes)}")
+    for name, array in graph.arrays.items():
+        if array.dtype not in (np.float32, np.int32) or not array.size:
+            raise ValueError(f"array {name}: expected float32 or int32, got {array.dtype} {array.shape}")
+        if array.dtype == np.int32 and array.min() < 0:
+            raise ValueError(f"array {name}: expected indices, got {array.min()}")
+        if not np.isfinite(array).all():
+            raise ValueError(f"array {name} is not finite")
+    # Environments that observe nothing and anything: what shapes do not show, these do.
+    sample = np.zeros((3, size), np.float32)
+    sample[1:] = np.random.default_rng(0).standard_normal((2, size))
+    shapes: dict[str | int, Shape] = {name: array.shape for name, array in graph.arrays.items()} | {INPUT: (1, size)}
+    known: dict[str | int, np.ndarray] = {**graph.arrays, INPUT: sample}
+    for index, node in enumerate(graph.nodes):
+        try:
+            shapes[index] = shape_of(node, shapes)
+            if (numbers := sum(math.prod(shapes[result]) for result in range(index + 1))) > _MOST_NUMBERS:
+                raise ValueError(f"expected at most {_MOST_NUMBERS} numbers of an environment, got {numbers}")
+            with np.errstate(all="ignore"):
+                known[index] = OPERATORS[node.operator].function(*(known[name] for name in node.inputs))
+            if known[index].dtype != np.float32:
+                raise ValueError(f"expected float32, got {known[index].dtype}")
+        except (ValueError, IndexError, TypeError) as error:
+            raise ValueError(f"node {index}, {node.operator}: {checks.quoted(error)}") from None
+    if len(shapes[index]) != 2 or known[index].shape != (len(sample), shapes[index][1]):
+        raise ValueError(f"node {index}, {node.operator}: expected actions of every environment, got {shapes[index]}")
+    return graph
+
+
+def shape_of(node: Node, shapes: Mapping[str | int, Shape]) -> Shape:
+    """Return the shape of a node's result, from the shapes of all before it; axes of environments have length 1.
+
+    Raises:
+        ValueError: an unknown operator, or inputs that do not fit.
+    """
+    operator = OPERATORS[checks.name(node.operator, OPERATORS, "operator")]
+    if len(node.inputs) != operator.inputs and (operator.inputs or not node.inputs):
+        raise ValueError(f"expected {operator.inputs or 'one or more'} inputs, got {len(node.inputs)}")
+    if unknown := [name for name in node.inputs if isinstance(name, bool) or name not in shapes]:
+        raise ValueError(f"unknown input {unknown[0]!r}")
+    shape = operator.shape(*(shapes[name] for name in node.inputs))
+    if shape[:1] != (1,):
+        raise ValueError(f"expected a leading axis for environments, got {shape}")
+    return shape
