@@ -42,11 +42,11 @@ def main(run: str | None = None) -> None:
     found, known = network.load(Path(run)), configuration.read(Path(run) / "config.json")
     several = known.setup.several
     kind = np.float32 if several else np.float16  # inputs of many bodies differ too much in size for 16 bits
-    layers = [layer._replace(arrays=tuple(a.astype(kind) for a in layer.arrays)) for layer in found.layers]
+    arrays = {name: a.astype(kind) if a.dtype == np.float32 else a for name, a in found.graph.arrays.items()}
     name = f"{universal.NAME if several else known.setup.body.name}-{known.setup.task}"
     PACKAGED.mkdir(exist_ok=True)
     path = PACKAGED / f"{name}{network.EXTENSION}"
-    network.save(path, found._replace(layers=tuple(layers)))
+    network.save(path, found._replace(graph=found.graph._replace(arrays=arrays)))
     entry = {
         "command": command(known),
         "return": round(float(np.mean(returns(path))), 1),

@@ -193,7 +193,7 @@ def shape_of(node: Node, shapes: Mapping[str | int, Shape]) -> Shape:
         ValueError: an unknown operator, or inputs that do not fit.
     """
     operator = OPERATORS[checks.name(node.operator, OPERATORS, "operator")]
-    if len(node.inputs) != operator.inputs and (operator.inputs or not node.inputs):
+    if not node.inputs or operator.inputs not in (0, len(node.inputs)):
         raise ValueError(f"expected {operator.inputs or 'one or more'} inputs, got {len(node.inputs)}")
     if unknown := [name for name in node.inputs if isinstance(name, bool) or name not in shapes]:
         raise ValueError(f"unknown input {unknown[0]!r}")

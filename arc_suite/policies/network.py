@@ -111,8 +111,8 @@ def load(path: str | os.PathLike) -> Network:
             raise ValueError("holds layers, as policies did before they were graphs: train it again")
         nodes = tuple(Node(operator, tuple(inputs)) for operator, *inputs in known["nodes"])
         # Packaged policies are stored as float16.
-        found = {name: array.astype(np.float32) if array.dtype == np.float16 else array for name, array in arrays.items()}
-        graph = checked(Graph(nodes, found), sum(blocks.values()))
+        arrays = {name: a.astype(np.float32) if a.dtype == np.float16 else a for name, a in arrays.items()}
+        graph = checked(Graph(nodes, arrays), sum(blocks.values()))
         return Network(graph, Setup.from_dict(known), blocks)
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None

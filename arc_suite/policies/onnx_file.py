@@ -11,7 +11,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from arc_suite import files, versions
-from arc_suite.envs.setup import Setup
 from arc_suite.policies.graph import EPSILON, INPUT, Graph
 from arc_suite.policies.network import Network
 
@@ -110,7 +109,8 @@ _STANDARD: dict[str, tuple] = {
 def _standard(graph: Graph) -> tuple[list[tuple], dict[str, np.ndarray]]:
     """Return nodes (operator, inputs, result, attributes) of ONNX, and their arrays by name."""
     arrays = _ARRAYS | {f"array_{name}": array for name, array in graph.arrays.items()}
-    nodes: list[tuple] = [("Shape", [INPUT], "num_envs", {"end": 1}), ("Concat", ["num_envs", "one"], "rows", {"axis": 0})]
+    nodes: list[tuple] = [("Shape", [INPUT], "num_envs", {"end": 1})]
+    nodes.append(("Concat", ["num_envs", "one"], "rows", {"axis": 0}))
     known = {INPUT: INPUT} | {name: f"array_{name}" for name in graph.arrays}
     for index, node in enumerate(graph.nodes):
         known[index] = OUTPUT if index == len(graph.nodes) - 1 else f"node_{index}"

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -153,3 +153,19 @@ def repeated(graph: Graph, inputs: Traced) -> Traced:
     for index, (operator, names) in enumerate(graph.nodes):
         known[index] = inputs._node(operator, *(known[name] for name in names))
     return known[len(graph.nodes) - 1]
+
+
+def perceptron(x: Traced, layers: Sequence[Mapping], activation: str = "relu") -> Traced:
+    """Write the nodes of a multilayer perceptron, its last layer linear.
+
+    Args:
+        x: (1, inputs)
+        layers: mappings to `weight`, `bias`, and `scale` and `offset` where a layer norm follows.
+        activation: of hidden layers, relu, elu or tanh.
+    """
+    for index, each in enumerate(layers):
+        x = x.node("Linear", each["weight"], each["bias"])
+        if index < len(layers) - 1:
+            x = x.node("LayerNorm", each["scale"], each["offset"]) if "scale" in each else x
+            x = x.node(activation.capitalize())
+    return x

@@ -34,7 +34,7 @@ def test_a_rollout_of_jax_gives_the_update_of_numpy():
     environments = collecting.Environments(hp, context)
     task, architecture = environments.task, environments.architecture
     state = ppo.begin(hp, architecture, np.random.default_rng(0))
-    normalise = Moments.none(task.size).after(environments.observation).layer()
+    normalise = Moments.none(task.size).after(environments.observation).normalizer()
     rollout = environments.roll_out(state.policy, normalise, 0.3, 0, 0)
     orders = np.random.default_rng(0).permutation(32)[None, :8]
     found = []
@@ -56,7 +56,7 @@ def test_a_new_command_cuts_the_returns(monkeypatch):
     hp, context = run.hyperparameters, RunContext(run.setup, 0, 100, 100, pathlib.Path())
     collector = worlds.Worlds(hp, context)
     state = ppo.begin(hp, collector.architecture, np.random.default_rng(0))
-    normalise = Moments.none(collector.task.size).layer()
+    normalise = Moments.none(collector.task.size).normalizer()
     rollout = jax.tree.map(np.asarray, collector.roll_out(state.policy, normalise, 0.01, 0, 0))
     here, there = (
         collector.task.split(rollout[name])["command"][..., :3] for name in ("observations", "next_observations")

@@ -13,7 +13,8 @@ from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import network
-from arc_suite.policies.network import Layer
+from arc_suite.policies.graph import OPERATORS
+from arc_suite.policies.tracing import traced
 from arc_suite.robots import generator
 
 
@@ -23,28 +24,63 @@ def saved(tmp_path):
     return tmp_path
 
 
-def test_what_layers_compute():
+def test_what_operators_compute():
+    """Every operator, against the same in float64; truth values are 1 and 0."""
     numbers = drawn(1)
-    x = numbers(7, 5)
-    weight, bias, scale, offset = numbers(5, 4), numbers(4), numbers(4), numbers(4)
-    mean, factor, limit = numbers(5), numbers(5), np.float32(0.7)
-    x64 = x.astype(float)
-    linear = x64 @ weight + bias
-    centred = linear - linear.mean(axis=1, keepdims=True)
-    normal = centred / np.sqrt(linear.var(axis=1, keepdims=True) + 1e-5) * scale + offset
-    cases = [
-        ([Layer("linear", (weight, bias))], linear),
-        ([Layer("linear", (weight, bias)), Layer("layer_norm", (scale, offset))], normal),
-        ([Layer("normalise", (mean, factor, limit))], ((x64 - mean) * factor).clip(-limit, limit)),
-        ([Layer("relu")], np.where(x > 0.0, x64, 0.0)),
-        ([Layer("elu")], np.where(x > 0.0, x64, np.exp(x64) - 1.0)),
-        ([Layer("tanh")], np.tanh(x64)),
-        ([Layer("clip")], x64.clip(-1.0, 1.0)),
-    ]
-    for layers, expected in cases:
-        found = network.forward(layers, x)
-        assert found.dtype == np.float32
-        np.testing.assert_allclose(found, expected, atol=2e-6)
+    x, other, weight, bias, scale, offset = (
+        numbers(7, 5),
+        numbers(1, 5),
+        numbers(5, 4),
+        numbers(4),
+        numbers(5),
+        numbers(5),
+    )
+    mask = (numbers(7, 5) > 0.0).astype(np.float32)
+    rows, x64 = numbers(7, 5, 3), x.astype(float)
+    centred = x64 - x64.mean(axis=1, keepdims=True)
+    expected = {
+        "Add": ((x, other), x64 + other),
+        "Clip": ((x, np.float32(-0.5), np.float32(0.7)), x64.clip(-0.5, 0.7)),
+        "Concat": ((x, rows, other), np.hstack([x64, rows.reshape(7, -1), np.repeat(other, 7, axis=0)])),
+        "Div": ((x, other), x64 / other),
+        "Elu": ((x,), np.where(x > 0.0, x64, np.exp(x64) - 1.0)),
+        "Equal": ((mask, np.float32(1.0)), mask == 1.0),
+        "Greater": ((x, other), x > other),
+        "GreaterOrEqual": ((x, x), x >= x),
+        "LayerNorm": ((x, scale, offset), centred / np.sqrt(x64.var(axis=1, keepdims=True) + 1e-5) * scale + offset),
+        "Linear": ((x, weight, bias), x64 @ weight + bias),
+        "Max": ((x, other), np.maximum(x64, other)),
+        "Mul": ((x, other), x64 * other),
+        "Neg": ((x,), -x64),
+        "Pick": ((rows, mask), rows[mask > 0.0]),
+        "Place": ((rows[mask > 0.0], mask), rows * mask[..., None]),
+        "Product": ((x, weight), x64 @ weight),
+        "Relu": ((x,), np.where(x > 0.0, x64, 0.0)),
+        "Sqrt": ((abs(x),), np.sqrt(abs(x64))),
+        "Sub": ((x, other), x64 - other),
+        "Sum": ((rows,), rows.sum(axis=1, dtype=float)),
+        "Take": ((rows, np.array([[0, 14], [3, 3]], np.int32)), rows.reshape(7, -1)[:, [[0, 14], [3, 3]]]),
+        "Tanh": ((x,), np.tanh(x64)),
+    }
+    assert list(expected) == list(OPERATORS)
+    for name, (inputs, result) in expected.items():
+        found = OPERATORS[name].function(*inputs)
+        assert found.dtype == np.float32, name
+        np.testing.assert_allclose(found, result, atol=2e-6, rtol=1e-5, err_msg=name)
+
+
+def test_a_traced_function_computes_the_same_to_the_bit():
+    def function(x):
+        first, second = np.split(x.reshape(len(x), 3, 2), [1], axis=1)
+        joined = np.stack([first[:, 0], -second[:, 1].clip(-0.5, 0.5)], axis=1)
+        where = (joined >= 0.25) | ((joined == 0.0) & (joined > -1.0))
+        spread = np.broadcast_to(joined.sum(axis=1)[:, None], joined.shape)
+        return (np.maximum(np.sqrt(spread * spread), 2.0 * joined - 1.0) / 3.0 + where).reshape(len(x), -1)
+
+    x = drawn(0)(5, 6)
+    graph = traced(function, 6)
+    np.testing.assert_array_equal(graph(x[:1]), function(x[:1]))
+    np.testing.assert_array_equal(graph(x), np.concatenate([function(x[i : i + 1]) for i in range(5)]))
 
 
 @pytest.mark.parametrize("num_envs", [1, 2, 10, 64, 65])
@@ -58,9 +94,9 @@ def test_an_environment_does_the_same_alone(num_envs):
 def test_comes_back_from_a_file_to_the_bit(saved):
     policy, again = made(), network.load(saved / "policy.npz")
     assert again[1:] == policy[1:]
-    for one, other in zip(policy.layers, again.layers, strict=True):
-        assert one.kind == other.kind
-        assert [np.asarray(array).tobytes() for array in one.arrays] == [array.tobytes() for array in other.arrays]
+    assert again.graph.nodes == policy.graph.nodes and again.graph.arrays.keys() == policy.graph.arrays.keys()
+    for name, array in policy.graph.arrays.items():
+        assert again.graph.arrays[name].tobytes() == array.tobytes()
     assert again.joints == 18 and again.size == 199
 
 
@@ -92,7 +128,7 @@ def test_blocks_that_its_task_excluded_are_left_out(saved):
     whole = policies.policy(str(saved), "tick")
     rest = {name: size for name, size in whole.blocks.items() if name != "contact_forces"}
     blind = whole._replace(
-        layers=(Layer("linear", (np.eye(sum(rest.values()), 18, dtype=np.float32), np.zeros(18, np.float32))),),
+        graph=traced(lambda x: x.node("Product", np.eye(sum(rest.values()), 18)), sum(rest.values())),
         setup=Setup.of("tick", "walk", {"exclude_blocks": ["contact_forces"]}),
         blocks=rest,
     )
@@ -125,10 +161,26 @@ def test_damaged_files(saved, kept):
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"layers": ["normalise", "sigmoid"]}, "unknown layer 'sigmoid'"),
-        ({"layers": ["relu"]}, r"policy\.npz: moves 199 joints, and tick has 18$"),
-        ({"layers": [*["relu"] * 9, "linear"]}, "a damaged one: '9.0'"),
-        ({"blocks": {"posture": 3}}, r"layer 0, normalise: array 0 does not fit 3 inputs, got float32 \(199,\)"),
+        ({"nodes": [["Sigmoid", "observations"]]}, "node 0, Sigmoid: unknown operator 'Sigmoid'"),
+        ({"nodes": [["Relu", "observations"]]}, r"policy\.npz: moves 199 joints, and tick has 18$"),
+        ({"nodes": [["Relu", "observations"], ["Relu", 1]]}, "node 1, Relu: unknown input 1$"),
+        ({"nodes": [["Relu", "observations"], ["Relu", False]]}, "node 1, Relu: unknown input False$"),
+        ({"nodes": [["Relu", "nowhere"]]}, "node 0, Relu: unknown input 'nowhere'$"),
+        ({"nodes": [["Relu", ["observations"]]]}, "a damaged one: node 0, Relu: "),
+        ({"nodes": [["Add", "observations"]]}, "node 0, Add: expected 2 inputs, got 1$"),
+        ({"nodes": [["Concat"]]}, "node 0, Concat: expected one or more inputs, got 0$"),
+        ({"nodes": [["Concat", *["observations"] * 30_000]]}, "node 0, Concat: expected at most 4194304 numbers"),
+        ({"nodes": [["Neg", "0"]]}, r"node 0, Neg: expected a leading axis for environments, got \(199,\)$"),
+        ({"nodes": [["Clip", "observations", "0", "0"]]}, "node 0, Clip: expected a number for each limit"),
+        ({"nodes": []}, "expected 1 to 1024 nodes, got 0$"),
+        ({"nodes": [["Relu", "observations"]] * 1025}, "expected 1 to 1024 nodes, got 1025$"),
+        ({"nodes": 3}, "a damaged one: "),
+        ({"nodes": [3]}, "a damaged one: "),
+        (
+            {"layers": ["relu"]},
+            r"policy\.npz: .* holds layers, as policies did before they were graphs: train it again$",
+        ),
+        ({"blocks": {"posture": 3}}, "a damaged one: node 0, Sub: "),
         ({"blocks": 3}, "blocks: expected a mapping"),
         ({"robot": None}, "expected robot to be a str"),
         (
@@ -150,12 +202,13 @@ def test_files_made_in_bad_faith(saved, change, line):
 @pytest.mark.parametrize(
     ("name", "change", "line"),
     [
-        ("1.0", lambda array: array * np.nan, "layer 1, linear: array 0 is not finite"),
-        ("1.1", lambda array: array[:1], r"layer 1, linear: array 1 does not fit 199 inputs, got float32 \(1,\)"),
-        ("1.1", lambda array: array[:, None], "layer 1, linear: array 1 does not fit"),
-        ("1.0", lambda array: array[:, 0], "layer 1, linear: array 0 does not fit"),
-        ("2.0", lambda array: array.astype(float), "layer 2, layer_norm: array 0 does not fit"),
-        ("0.2", lambda array: array[None], "layer 0, normalise: array 2 does not fit"),
+        ("4", lambda array: array * np.nan, "array 4 is not finite"),
+        ("5", lambda array: array[:1], r"node 3, Linear: weight \(199, 32\) and bias \(1,\) do not fit \(1, 199\)"),
+        ("5", lambda array: array[:, None], "node 3, Linear: weight"),
+        ("4", lambda array: array[:, 0], "node 3, Linear: weight"),
+        ("6", lambda array: array.astype(float), "array 6: expected float32 or int32, got float64"),
+        ("3", lambda array: array[None], "node 2, Clip: expected a number for each limit"),
+        ("6", lambda array: array[:0], r"array 6: expected float32 or int32, got float32 \(0,\)"),
         ("policy", lambda array: np.array("[" * 100_000), "maximum recursion depth"),
     ],
 )
@@ -186,7 +239,7 @@ def test_archives_made_in_bad_faith(saved):
 
 
 def test_a_pickle_is_refused(saved):
-    np.savez(saved / "policy.npz", policy=np.array({"layers": []}, object))
+    np.savez(saved / "policy.npz", policy=np.array({"nodes": []}, object))
     with pytest.raises(ValueError, match="Object arrays cannot be loaded"):
         policies.policy(str(saved), "tick")
 

@@ -11,11 +11,10 @@ import arc_suite
 from arc_suite import policies
 from arc_suite.envs.setup import Setup
 from arc_suite.models.sizing import SUBSTEPS
-from arc_suite.policies import alone, onnx_file
-from arc_suite.policies.network import Layer
+from arc_suite.policies import alone, onnx_file, universal
+from arc_suite.policies.graph import INPUT
 from arc_suite.policies.universal import Universal
 from arc_suite.robots import generator
-from arc_suite.tasks import tokens
 
 pytest.importorskip("onnx", reason="of the extra onnx: make check-agents")
 runtime = pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
@@ -88,14 +87,10 @@ def test_metadata_tell_what_a_game_needs(tmp_path):
     ],
 )
 def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
-    """With a normaliser, in an episode that the policy itself plays."""
+    """In an episode that the policy itself plays."""
     setup = Setup.of(body, task, settings | {"time_limit": 1.0})
-    random = np.random.default_rng(0)
-    mean, factor = 0.1 * random.standard_normal(tokens.LEG_INPUTS), random.uniform(0.5, 2.0, tokens.LEG_INPUTS)
-    of_legs = tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), np.array(5.0, np.float32)
     network = legs.network()
-    network = network._replace(layers=(Layer("normalise", of_legs), *network.layers))
-    onnx_file.save_universal(tmp_path / "policy.onnx", network, setup)
+    onnx_file.save(tmp_path / "policy.onnx", universal.fitted(network, setup))
     run, environment, greatest = session(tmp_path / "policy.onnx"), setup.load(), 0.0
     policy = Universal(network, environment.task.definition)
     timestep = environment.reset(0)
@@ -103,7 +98,7 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
         blocks = {name: block[None] for name, block in timestep.observation.items()}
         vector = np.concatenate(list(blocks.values()), axis=-1, dtype=np.float32)
         expected = policy.act(blocks)
-        (actions,) = run.run(None, {onnx_file.INPUT: vector})
+        (actions,) = run.run(None, {INPUT: vector})
         greatest = max(greatest, abs(actions - expected).max())
         timestep = environment.step(expected[0])
     assert greatest < 1e-4
@@ -112,6 +107,6 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
 
 
 def test_a_policy_of_many_bodies_needs_one_of_them(tmp_path):
-    with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; save_universal takes others$"):
+    with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; see universal.fitted$"):
         onnx_file.save(tmp_path / "policy.onnx", legs.network())
     assert not list(tmp_path.iterdir())

@@ -9,6 +9,7 @@ from arc_suite import evaluation, policies
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import network, universal
+from arc_suite.policies.tracing import traced
 from arc_suite.policies.universal import Universal
 from arc_suite.robots import ROBOTS, generator
 
@@ -66,25 +67,44 @@ def test_any_program_takes_it(trained, body):
 def test_a_file_of_it_is_read_as_it_was_written(trained):
     read, made = network.load(trained), drawn()
     assert read.setup == made.setup and read.setup.robot == "random:0-1" and read.blocks == made.blocks
-    assert [layer.kind for layer in read.layers] == ["legs", "clip"]
-    for one, other in zip(read.layers[0].arrays, made.layers[0].arrays, strict=True):
-        assert_array_equal(one, other)
+    assert read.graph.nodes == made.graph.nodes and read.graph.arrays.keys() == made.graph.arrays.keys()
+    for name, array in read.graph.arrays.items():
+        assert_array_equal(array, made.graph.arrays[name])
 
 
 def test_a_damaged_file_is_one_line(tmp_path):
-    layer, clip = drawn().layers
-    path = tmp_path / "policy.npz"
-    for arrays, message in (
-        ((layer.arrays[0][:-1], *layer.arrays[1:]), "layer 0, legs: array 0 does not fit 664 inputs"),
-        ((*layer.arrays[:4], layer.arrays[4][:-1], *layer.arrays[5:]), "layer 0, legs: array 4 does not fit"),
-        ((*layer.arrays[:-1], layer.arrays[-1][:-1]), "layer 0, legs: array 8 does not fit"),
+    made, path = drawn(), tmp_path / "policy.npz"
+    graph, at = made.graph, {node.operator: index for index, node in enumerate(made.graph.nodes)}
+    for operator, place, change, message in (
+        ("Linear", 1, lambda array: array[:-1], r"node \d+, Linear: weight .* do not fit"),
+        ("Product", 1, lambda array: array[:-1], r"node \d+, Product: weight .* do not fit"),
+        ("Take", 1, lambda array: array + 664 * 12, r"node \d+, Take: index \d+ is out of bounds"),
+        ("Take", 1, lambda array: array - 664 * 12, r"array \d+: expected indices, got -\d+"),
     ):
-        network.save(path, drawn()._replace(layers=(layer._replace(arrays=arrays), clip)))
+        name = graph.nodes[at[operator]].inputs[place]
+        changed = graph._replace(arrays={**graph.arrays, name: change(graph.arrays[name])})
+        network.save(path, made._replace(graph=changed))
         with pytest.raises(ValueError, match=f"no policy, or a damaged one: {message}"):
             network.load(path)
-    network.save(path, drawn()._replace(blocks={"legs": 663}))
-    with pytest.raises(ValueError, match="layer 0, legs: expected 664 inputs, got 663"):
+    masked = graph._replace(nodes=tuple(node for node in graph.nodes if node.operator != "Pick"))
+    network.save(path, made._replace(graph=masked))
+    with pytest.raises(ValueError, match=r"no policy, or a damaged one: node \d+, "):
         network.load(path)
+    network.save(path, made._replace(blocks={"legs": 663}))
+    with pytest.raises(ValueError, match=r"no policy, or a damaged one: node \d+, "):
+        network.load(path)
+
+
+@pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
+@pytest.mark.parametrize("settings", [{}, {"actions": "position"}])
+def test_fitted_to_a_body_it_does_the_same(body, settings):
+    """To the bit where actions are positions; torques are float64 in `act` and float32 in a graph."""
+    setup = Setup.of(body, "steer", settings)
+    environment = setup.make_vec(3, seed=0)
+    policy, fitted = Universal(drawn(), setup.definition), universal.fitted(drawn(), setup)
+    observations, _ = environment.reset()
+    expected = policy.act(environment.task.split(observations))
+    assert_allclose(fitted.actions(observations), expected, atol=0.0 if settings else 1e-5)
 
 
 def test_what_does_not_fit_is_one_line(trained, tmp_path):
@@ -100,7 +120,7 @@ def test_what_does_not_fit_is_one_line(trained, tmp_path):
     with pytest.raises(ValueError, match=r"expected one of one body, or --robot; got one of random:0-1$"):
         policies.trained(trained)
     single = Setup.of("leaper").definition
-    layers = (network.Layer("linear", (np.zeros((single.size, 12), np.float32), np.zeros(12, np.float32))),)
-    network.save(tmp_path / "one.npz", network.Network(layers, Setup.of("leaper"), dict(single.sizes)))
+    graph = traced(lambda x: x.node("Product", np.zeros((single.size, 12))), single.size)
+    network.save(tmp_path / "one.npz", network.Network(graph, Setup.of("leaper"), dict(single.sizes)))
     with pytest.raises(ValueError, match=r"one\.npz: expected one of many bodies, got one of leaper$"):
         universal.load(tmp_path / "one.npz")

@@ -3,6 +3,7 @@
 An architecture is a frozen value. Learners draw its parameters, normalise its observations and apply it.
 """
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Self
 
 import jax.numpy as jnp
@@ -11,8 +12,9 @@ import numpy as np
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
-from arc_suite.learning.agents.normaliser import Moments
-from arc_suite.policies.network import Layer
+from arc_suite.learning.agents.normaliser import Moments, Normalizer
+from arc_suite.policies.graph import Graph
+from arc_suite.policies.tracing import Traced, perceptron, traced
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import JOINTS, LEGS
 
@@ -47,17 +49,17 @@ class Architecture(Protocol):
     def seen(self, observations):
         """Return the vectors (n, inputs) whose moments normalise observations (..., size)."""
 
-    def normalise(self, moments: Moments) -> Layer:
-        """Return the layer that normalises observations, from the moments of what was seen."""
+    def normalise(self, moments: Moments) -> Normalizer:
+        """Return what normalizes observations, from the moments of what was seen."""
 
-    def exported(self, parameters) -> tuple[Layer, ...]:
-        """Return a network of actions as layers of a policy file."""
+    def exported(self, parameters, x: Traced) -> Traced:
+        """Write the nodes of the actions (1, joints) for a normalized observation (1, size)."""
 
-    def imported(self, layers: tuple[Layer, ...]) -> Any:
-        """Return the parameters of layers that `exported` gave.
+    def imported(self, weights: Sequence[np.ndarray]) -> Any:
+        """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order.
 
         Raises:
-            ValueError: other layers.
+            ValueError: others.
         """
 
 
@@ -110,20 +112,18 @@ class Perceptron(NamedTuple):
         """Return the observations."""
         return observations
 
-    def normalise(self, moments: Moments) -> Layer:
-        """Return the layer of the moments."""
-        return moments.layer()
+    def normalise(self, moments: Moments) -> Normalizer:
+        """Return what normalizes observations by the moments."""
+        return moments.normalizer()
 
-    def exported(self, parameters):
-        """Return the layers of a network of actions, its first weights scaled."""
+    def exported(self, parameters, x):
+        """Write the nodes of a network of actions, its first weights scaled."""
         first, *others = parameters
-        return networks.exported(({**first, "weight": first["weight"] * self.scale[:, None]}, *others), ACTIVATION)
+        return perceptron(x, ({**first, "weight": first["weight"] * self.scale[:, None]}, *others), ACTIVATION)
 
-    def imported(self, layers):
-        """Return the parameters of layers."""
-        if [layer.kind for layer in layers] != ["linear", "elu", "linear", "elu", "linear"]:
-            raise ValueError("a policy of dagger, bc or ppo, with two hidden layers")
-        first, *others = (dict(zip(("weight", "bias"), layer.arrays, strict=True)) for layer in layers[::2])
+    def imported(self, weights):
+        """Return the parameters."""
+        first, *others = map(_layer, weights[::2], weights[1::2])
         return {**first, "weight": first["weight"] / self.scale[:, None]}, *others
 
 
@@ -163,27 +163,30 @@ class PerLeg(NamedTuple):
         legs, mask = tokens.leg_inputs(observations)
         return legs[mask.any(axis=-1)]
 
-    def normalise(self, moments: Moments) -> Layer:
-        """Return a layer of 664 numbers, the same for every leg; it leaves the number of joints as it is."""
-        mean, factor, limit = moments.layer().arrays
-        return Layer("normalise", (tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), limit))
+    def normalise(self, moments: Moments) -> Normalizer:
+        """Return what normalizes 664 numbers, the same for every leg; it leaves the number of joints as it is."""
+        mean, factor, limit = moments.normalizer()
+        return Normalizer(tokens.of_all_legs(mean, 0.0), tokens.of_all_legs(factor, 1.0), limit)
 
-    def exported(self, parameters):
-        """Return the layer of a network of actions."""
-        *features, head, last = (
-            (np.asarray(each["weight"]), np.asarray(each["bias"])) for part in parameters for each in part
-        )
-        own, mean = np.split(head[0], 2)
-        return (Layer("legs", (*(array for each in features for array in each), own, mean, head[1], *last)),)
+    def exported(self, parameters, x):
+        """Write the nodes of a network of actions, which compute the legs that there are."""
+        (first, second), (head, last) = parameters
+        own, mean = np.split(np.asarray(head["weight"]), 2)
+        inputs, mask = tokens.leg_inputs(x)
+        there = mask.sum(axis=-1) > 0.0
+        features = perceptron(inputs.node("Pick", there), (first, second), ACTIVATION).node("Elu")
+        context = features.node("Place", there).sum(axis=1) / there.sum(axis=1)[:, None]
+        context = context.node("Linear", mean, head["bias"])[:, None]
+        context = np.broadcast_to(context, (1, LEGS, context.shape[-1])).node("Pick", there)
+        hidden = features.node("Product", own) + context
+        found = hidden.node("Elu").node("Linear", last["weight"], last["bias"])
+        return (found.node("Place", there) * mask).reshape(1, -1)
 
-    def imported(self, layers):
-        """Return the parameters of layers."""
-        if [layer.kind for layer in layers] != ["legs"]:
-            raise ValueError("a policy of different bodies")
-        *features, own, mean, bias, last, last_bias = layers[0].arrays
-        head = {"weight": np.concatenate([own, mean]), "bias": bias}, {"weight": last, "bias": last_bias}
-        names = ("weight", "bias")
-        return tuple(dict(zip(names, pair, strict=True)) for pair in (features[:2], features[2:])), head
+    def imported(self, weights):
+        """Return the parameters."""
+        first, first_bias, second, second_bias, mean, bias, own, last, last_bias = weights
+        head = _layer(np.concatenate([own, mean]), bias), _layer(last, last_bias)
+        return (_layer(first, first_bias), _layer(second, second_bias)), head
 
     def _drawn(self, random, hidden, outputs, last_gain=1.0):
         gain = 2**0.5
@@ -197,6 +200,33 @@ def of(environment: VectorEnv | BodiesEnv) -> Architecture:
     if isinstance(environment, BodiesEnv):
         return PerLeg()
     return Perceptron.of(environment.task.definition)
+
+
+def policy(architecture: Architecture, normalise: Normalizer, parameters) -> Graph:
+    """Return the graph of a policy: a normalizer and a network of actions."""
+    return traced(lambda x: architecture.exported(parameters, normalise(x)).clip(-1.0, 1.0), architecture.size)
+
+
+def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
+    """Return the normalizer and the parameters of a graph that `policy` gave.
+
+    Raises:
+        ValueError: another graph.
+    """
+    try:
+        normalise = Normalizer(*(graph.arrays[str(node.inputs[-1])] for node in graph.nodes[:3]))
+        names = [node.inputs[1:] for node in graph.nodes if node.operator in ("Linear", "Product")]
+        parameters = architecture.imported([graph.arrays[str(name)] for own in names for name in own])
+        same = policy(architecture, normalise, parameters).nodes == graph.nodes
+    except (KeyError, TypeError, ValueError):
+        same = False
+    if not same:
+        raise ValueError("a policy of dagger, bc or ppo, with two hidden layers")
+    return normalise, parameters
+
+
+def _layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:
+    return {"weight": weight, "bias": bias}
 
 
 def _of_legs(parameters, observations):

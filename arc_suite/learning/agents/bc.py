@@ -9,12 +9,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from arc_suite.learning.agents import dagger, networks, priors
+from arc_suite.learning.agents import architectures, dagger, networks, priors
 from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.hyperparameters import BehaviourCloning
 from arc_suite.learning.agents.learner import RunContext, Slice, generator, restoring
 from arc_suite.learning.agents.normaliser import Moments
-from arc_suite.policies.network import forward
 
 SLICE = 500  # updates
 
@@ -35,7 +34,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
     moments = Moments.none(task.size)
     for first in range(0, len(data), _CHUNK):
         moments = moments.after(data.at(np.arange(first, min(first + _CHUNK, len(data)))).observations)
-    normalise = moments.layer()
+    normalise = moments.normalizer()
     architecture = Perceptron.of(task)
     state = dagger.begin(architecture.drawn(generator(context.seed, "networks", 0), hp.hidden))
     step = 0
@@ -54,7 +53,7 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
             state, error = dagger.fit(
                 architecture,
                 state,
-                forward([normalise], batch.observations),
+                normalise(batch.observations),
                 batch.actions,
                 np.arange(updates * hp.batch).reshape(updates, hp.batch),
                 rates.astype(np.float32),
@@ -62,4 +61,5 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
             errors.append(float(error))
             step += updates
         checkpoint = {**networks.named("state", state), "step": np.array(step)}
-        yield Slice(step, {"error": float(np.mean(errors))}, dagger.policy(architecture, normalise, state), checkpoint)
+        graph = architectures.policy(architecture, normalise, state.layers)
+        yield Slice(step, {"error": float(np.mean(errors))}, graph, checkpoint)

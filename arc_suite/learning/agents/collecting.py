@@ -11,8 +11,7 @@ from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import Diverged, RunContext, generator
-from arc_suite.policies import network
-from arc_suite.policies.network import Layer
+from arc_suite.learning.agents.normaliser import Normalizer
 from arc_suite.tasks import Task
 
 # Names of the arrays of a rollout.
@@ -30,12 +29,12 @@ class Collector(Protocol):
     task: Task
     architecture: Architecture
 
-    def roll_out(self, policy, normalise: Layer, std: float, iteration: int, step: int) -> dict[str, Any]:
+    def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, Any]:
         """Act in all environments for a horizon.
 
         Args:
             policy: network of normalised observations to mean actions.
-            normalise: layer that normalises observations.
+            normalise: what normalizes observations.
             std: standard deviation of actions.
             iteration: number of the horizon, from which the noise follows.
             step: environment steps before it.
@@ -72,12 +71,12 @@ class Environments:
         steps = ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
 
-    def roll_out(self, policy, normalise: Layer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
+    def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
         """Act in all environments for a horizon."""
         random = generator(self._seed, "noise", iteration)
         rollout = {name: [] for name in TRANSITIONS}
         for _ in range(self._hp.horizon):
-            normalised = network.forward([normalise], self.observation)
+            normalised = normalise(self.observation)
             mean = np.asarray(ppo.mean_action(self.architecture, policy, normalised))
             if not np.isfinite(mean).all():
                 raise Diverged("an action is not finite", step)

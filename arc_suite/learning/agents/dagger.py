@@ -19,8 +19,7 @@ from arc_suite.learning.agents import architectures, learner, networks
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import DAgger
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
-from arc_suite.learning.agents.normaliser import Moments
-from arc_suite.policies.network import Layer, forward
+from arc_suite.learning.agents.normaliser import Moments, Normalizer
 from arc_suite.policies.teachers import Teacher
 
 CHUNK = 20  # updates of one call
@@ -69,7 +68,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             step = min(done * hp.num_envs, context.steps)
             for name, array in dataset.items():
                 array[:done] = saved[name]
-            normalise = networks.restored_layer("normaliser", normalise, saved)
+            normalise = Normalizer(*map(np.asarray, networks.restored("normaliser", tuple(normalise), saved)))
             observation = learner.restore_environment(environment, saved)
             teacher.restore(saved)
 
@@ -80,7 +79,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             teacher.reset(np.flatnonzero(age == 0))
             label = teacher.act(environment.task.split(observation), np.zeros(hp.num_envs)).clip(-1.0, 1.0)
             action, own = label.copy(), slice(hp.num_envs // 2, None)
-            action[own] = _act(architecture, state.layers, forward([normalise], observation[own]))
+            action[own] = _act(architecture, state.layers, normalise(observation[own]))
             action += hp.noise * random.standard_normal(action.shape)
             for array, value in zip(dataset.values(), (observation, label, age), strict=True):
                 array[done] = value
@@ -105,7 +104,7 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             inputs, outputs = (
                 np.zeros((length * hp.num_envs, array.shape[-1]), np.float32) for array in (observations, labels)
             )  # of one shape in every round, so compiled once
-            inputs[: len(labels)], outputs[: len(labels)] = forward([normalise], observations), labels
+            inputs[: len(labels)], outputs[: len(labels)] = normalise(observations), labels
             inputs, outputs = jnp.asarray(inputs), jnp.asarray(outputs)
             for first in range(0, len(rates), CHUNK):
                 part = rates[first : first + CHUNK].astype(np.float32)
@@ -117,21 +116,16 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
             **networks.named("state", state),
             **{name: array[:done] for name, array in dataset.items()},
             "age": age,
-            **networks.named("normaliser", normalise.arrays),
+            **networks.named("normaliser", tuple(normalise)),
             **learner.environment_arrays(environment),
             **teacher.snapshot(),
         }
-        yield Slice(step, metrics, policy(architecture, normalise, state), checkpoint)
+        yield Slice(step, metrics, architectures.policy(architecture, normalise, state.layers), checkpoint)
 
 
 def begin(layers) -> DaggerState:
     """Return the state before the first update of a network."""
     return jax.tree.map(jnp.asarray, DaggerState(layers, optax.scale_by_adam().init(layers)))
-
-
-def policy(architecture: Architecture, normalise: Layer, state: DaggerState) -> tuple[Layer, ...]:
-    """Return the layers of a policy file."""
-    return normalise, *architecture.exported(state.layers), Layer("clip")
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=1)

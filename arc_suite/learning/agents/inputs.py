@@ -1,14 +1,14 @@
 """Inputs of networks: numbers of the observation without some blocks, normalised; and mirrored transitions."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.learning.agents.normaliser import Moments
+from arc_suite.learning.agents.normaliser import Moments, Normalizer
 from arc_suite.learning.agents.replay import Transitions
-from arc_suite.policies import network
-from arc_suite.policies.network import Layer
+from arc_suite.policies.graph import Graph
+from arc_suite.policies.tracing import perceptron, traced
 from arc_suite.tasks import Task
 from arc_suite.tasks.mirrors import Mirror, Symmetry
 
@@ -59,7 +59,7 @@ class Inputs(NamedTuple):
     def __call__(self, observations: np.ndarray) -> np.ndarray:
         """Return the inputs (..., inputs) for observations (..., size)."""
         found = observations[..., self.columns]
-        return found if self.moments is None else network.forward([self.moments.layer()], found)
+        return found if self.moments is None else self.moments.normalizer()(found)
 
     def after(self, observations: np.ndarray) -> Self:
         """Return the inputs with more observations (..., size), and their mirror images, in the moments."""
@@ -84,19 +84,22 @@ class Inputs(NamedTuple):
             observations=self(observations), actions=actions, next_observations=self(next_observations)
         )
 
-    def exported(self, layers: Sequence[Layer]) -> tuple[Layer, ...]:
-        """Return the layers of a policy that takes whole observations, from those of one that takes inputs."""
+    def exported(self, layers: Sequence[Mapping]) -> Graph:
+        """Return the policy of whole observations, from the layers of an actor that takes inputs."""
         first, *others = layers
-        weight, bias = first.arrays
-        layers = Layer("linear", (self._whole(weight), bias)), *others
-        if self.moments is None:
-            return layers
-        mean, factor, limit = self.moments.layer().arrays
-        return Layer("normalise", (self._whole(mean), self._whole(factor), limit)), *layers
+        layers = {**first, "weight": self._whole(first["weight"])}, *others
+
+        def normalize(x):
+            if self.moments is None:
+                return x
+            mean, factor, limit = self.moments.normalizer()
+            return Normalizer(self._whole(mean), self._whole(factor), limit)(x)
+
+        return traced(lambda x: perceptron(normalize(x), layers).node("Tanh"), self.size)
 
     def _whole(self, array: np.ndarray) -> np.ndarray:
         """Return an array (inputs, ...) as one (size, ...), 0 for numbers that networks do not see."""
-        whole = np.zeros((self.size, *array.shape[1:]), array.dtype)
+        whole = np.zeros((self.size, *array.shape[1:]), np.float32)
         whole[self.columns] = array
         return whole
 

@@ -2,7 +2,7 @@
 
 import contextlib
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.policies import teachers
-from arc_suite.policies.network import Layer
+from arc_suite.policies.graph import Graph
 
 _SEEDS = 100_000  # of the environments of a run; those below are left for evaluation
 MOST_SEEDS = 40_000
@@ -81,13 +81,13 @@ class Slice(NamedTuple):
     Attributes:
         step: environment steps so far.
         metrics: by name, always the same names: a line of training.csv; None for no line.
-        policy: layers of the deterministic policy, from the flat observation to actions in [-1, 1].
+        policy: graph of the deterministic policy, from the flat observation to actions in [-1, 1].
         checkpoint: everything that learning resumes from, arrays by name.
     """
 
     step: int
     metrics: Mapping[str, float] | None
-    policy: Sequence[Layer]
+    policy: Graph
     checkpoint: dict[str, np.ndarray]
 
 

@@ -11,8 +11,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from arc_suite.policies.network import Layer
-
 EPSILON = 1e-5  # of a layer norm
 
 ACTIVATIONS = {"relu": jax.nn.relu, "elu": jax.nn.elu}
@@ -106,19 +104,6 @@ def forward(layers: Sequence[Mapping], x, activation: str = "relu"):
     return linear(layers[-1], hidden(layers[:-1], x, activation))
 
 
-def exported(layers: Sequence[Mapping], activation: str = "relu") -> tuple[Layer, ...]:
-    """Return a multilayer perceptron as layers of a policy file, its last layer linear."""
-    result = []
-    for each in layers:
-        numbers = {name: np.asarray(array, np.float32) for name, array in each.items()}
-        result.append(Layer("linear", (numbers["weight"], numbers["bias"])))
-        if each is not layers[-1]:
-            if "scale" in numbers:
-                result.append(Layer("layer_norm", (numbers["scale"], numbers["offset"])))
-            result.append(Layer(activation))
-    return tuple(result)
-
-
 def named(prefix: str, tree) -> dict[str, np.ndarray]:
     """Return the arrays of a pytree by name, prefix/path/to/array: part of a checkpoint."""
     leaves, _ = jax.tree_util.tree_flatten_with_path(tree)
@@ -139,11 +124,6 @@ def restored(prefix: str, template, arrays: Mapping[str, np.ndarray]):
             raise ValueError(f"{prefix}{_text(path)}: expected {like.dtype} {like.shape}")
         values.append(jnp.asarray(value))
     return jax.tree_util.tree_unflatten(structure, values)
-
-
-def restored_layer(prefix: str, layer: Layer, arrays: Mapping[str, np.ndarray]) -> Layer:
-    """Return a layer of a policy like the given one with the arrays that `named` gave for `layer.arrays`."""
-    return layer._replace(arrays=tuple(map(np.asarray, restored(prefix, layer.arrays, arrays))))
 
 
 def _text(path) -> str:

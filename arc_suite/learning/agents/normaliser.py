@@ -1,13 +1,29 @@
 """Running mean and variance of observations, for normalised inputs of networks."""
 
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.policies.network import Layer
-
 LIMIT = 5.0  # of a normalised number
 _LEAST = 1e-3  # lower bound of the standard deviation, for near-constant inputs
+
+
+class Normalizer(NamedTuple):
+    """What normalizes vectors of NumPy, of JAX or of a traced graph: (x - mean) * factor, within +-limit.
+
+    Attributes:
+        mean: (size,)
+        factor: (size,)
+        limit: ()
+    """
+
+    mean: Any
+    factor: Any
+    limit: Any
+
+    def __call__(self, vectors):
+        """Return vectors (..., size) normalized."""
+        return ((vectors - self.mean) * self.factor).clip(-self.limit, self.limit)
 
 
 class Moments(NamedTuple):
@@ -41,8 +57,8 @@ class Moments(NamedTuple):
             self.squares + squares + apart**2 * (self.count * len(vectors) / count),
         )
 
-    def layer(self) -> Layer:
-        """Return the layer that normalises observations."""
+    def normalizer(self) -> Normalizer:
+        """Return what normalizes observations, float32."""
         deviation = np.sqrt(self.squares / max(self.count, 1.0))
         factor = 1.0 / np.maximum(deviation, _LEAST) if self.count else np.ones_like(deviation)
-        return Layer("normalise", tuple(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))
+        return Normalizer(*(each.astype(np.float32) for each in (self.mean, factor, np.array(LIMIT))))

@@ -178,7 +178,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
             **networks.named("moments", inputs.moments),
             **learner.environment_arrays(environment),
         }
-        yield Slice(before if phase else steps, metrics, inputs.exported(sac.exported(state)), checkpoint)
+        yield Slice(before if phase else steps, metrics, inputs.exported(sac.actor(state)), checkpoint)
 
 
 act = jax.jit(lambda policy, observation, noise: sac.sample(*sac.distribution(policy, observation), noise)[0])

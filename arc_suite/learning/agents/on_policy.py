@@ -15,15 +15,15 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite import policies
-from arc_suite.learning.agents import collecting, inputs, learner, networks
+from arc_suite.learning.agents import architectures, collecting, inputs, learner, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.collecting import Collector
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
-from arc_suite.learning.agents.normaliser import Moments
-from arc_suite.policies import network, universal
-from arc_suite.policies.network import Layer
+from arc_suite.learning.agents.normaliser import Moments, Normalizer
+from arc_suite.policies import universal
+from arc_suite.policies.network import Network
 
 
 def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
@@ -51,7 +51,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         with learner.restoring():
             state = networks.restored("state", state, saved)
             moments = Moments(*(saved[f"moments/{name}"] for name in Moments._fields))
-            normalise = networks.restored_layer("normaliser", normalise, saved)
+            normalise = Normalizer(*map(np.asarray, networks.restored("normaliser", tuple(normalise), saved)))
             iterations = int(saved["iterations"])
             collector.restore(saved)
 
@@ -91,15 +91,15 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
             "policy_rate": float(state.rate),
             "value_loss": float(value_loss),
         }
-        layers = normalise, *architecture.exported(state.policy), Layer("clip")
+        graph = architectures.policy(architecture, normalise, state.policy)
         checkpoint = {
             **networks.named("state", state),
             **networks.named("moments", moments),
-            **networks.named("normaliser", normalise.arrays),
+            **networks.named("normaliser", tuple(normalise)),
             "iterations": np.array(iterations),
             **collector.arrays(),
         }
-        yield Slice(iterations * hp.num_envs * hp.horizon, metrics, layers, checkpoint)
+        yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
 
 
 def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
@@ -115,14 +115,14 @@ def batch_of(
     architecture: Architecture,
     rollout: Mapping[str, Any],
     values,
-    normalise: Layer,
+    normalise: Normalizer,
     symmetry,
 ) -> ppo.Horizon:
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
     size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
-    observations = network.forward([normalise], rollout["observations"])
+    observations = normalise(rollout["observations"])
     here = numpy.asarray(ppo.value(architecture, values, observations))
-    after = network.forward([normalise], rollout["next_observations"])
+    after = normalise(rollout["next_observations"])
     there = numpy.asarray(ppo.value(architecture, values, after))
     rewards = (1.0 - hp.discount) * rollout["rewards"]
     advantages = ppo.advantages(hp, rewards, here, there, rollout["terminated"], rollout["ended"])
@@ -132,7 +132,7 @@ def batch_of(
     actions, means = (rollout[name].reshape(len(returns), -1) for name in ("actions", "means"))
     if symmetry is not None:
         mirror, mirror_action = symmetry
-        mirrored = network.forward([normalise], mirror(rollout["observations"]).reshape(-1, size))
+        mirrored = normalise(mirror(rollout["observations"]).reshape(-1, size))
         observations = numpy.concatenate([observations, mirrored])
         # The mirrored action is as probable as the action was. Under the policy's own mean for the mirrored
         # observation, where the policy is not symmetric, its probability would be almost 0 and its gradient huge.
@@ -142,11 +142,10 @@ def batch_of(
     return ppo.Horizon(*(jnp.asarray(array, jnp.float32) for array in arrays))
 
 
-def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Layer, tuple]:
+def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Normalizer, tuple]:
     """The normaliser and the network of the policy that learning starts from."""
     found = _start(hp, context, task)
-    first, *layers, last = getattr(found, "layers", ()) or (Layer("none"), Layer("none"))
-    if (first.kind, last.kind) != ("normalise", "clip"):
+    if not isinstance(found, Network):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
     for name in {**found.blocks, **task.sizes}:
         there, here = (blocks.get(name, 0) for blocks in (found.blocks, task.sizes))
@@ -154,13 +153,13 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
             other = f"a policy of {found.setup.kind.name} for other observations than those of {task.name}"
             raise ValueError(f"{hp.start}: {other}: {name} has {there} numbers, and not {here}")
     try:
-        policy = architecture.imported(tuple(layers))
+        normalise, policy = architectures.read(architecture, found.graph)
     except ValueError as error:
         raise ValueError(f"{hp.start}: expected {error}") from None
     shapes = [leaf.shape for leaf in jax.tree.leaves(policy)]
     if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
-    return first, policy
+    return normalise, policy
 
 
 def _start(hp: ProximalPolicy, context: RunContext, task):

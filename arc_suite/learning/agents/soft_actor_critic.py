@@ -20,7 +20,6 @@ import optax
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.replay import Transitions
-from arc_suite.policies.network import Layer
 
 CRITICS = 2
 HIDDEN_LAYERS = 2
@@ -202,9 +201,9 @@ def held_out_loss(hp: SoftActorCritic, state: SacState, observations, noise, kep
     return policy_loss(hp, state.policy, state, observations, noise, kept)[0]
 
 
-def exported(state: SacState) -> tuple[Layer, ...]:
-    """Return the deterministic policy, the tanh of the mean, as layers of a policy file."""
-    return *networks.exported((*state.policy["trunk"], state.policy["mean"])), Layer("tanh")
+def actor(state: SacState) -> tuple[Mapping, ...]:
+    """Return the layers of the deterministic policy, whose tanh is the action."""
+    return *state.policy["trunk"], state.policy["mean"]
 
 
 def _stepped(hp: SoftActorCritic, name: str, parameters, gradient, moments):

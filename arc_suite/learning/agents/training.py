@@ -133,7 +133,7 @@ def _write_times(run_files: RunFolder, state: dict[str, Any], latest: tuple, ste
 
 def _evaluate(configuration: Configuration, environment: VectorEnv, run_files: RunFolder, found: Slice) -> float:
     """Evaluate a policy by the protocol, write it and its returns into the folder, and return their mean."""
-    policy = Network(tuple(found.policy), configuration.setup, dict(environment.task.sizes))
+    policy = Network(found.policy, configuration.setup, dict(environment.task.sizes))
     network.save(run_files.path / network.FILE, policy)
     kept = files.folder(run_files.path / checkpoints.FOLDER / str(found.step))
     network.save(kept / network.FILE, policy)

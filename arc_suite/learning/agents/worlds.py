@@ -14,8 +14,7 @@ from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.collecting import TRANSITIONS, ages
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
-from arc_suite.policies import network
-from arc_suite.policies.network import Layer
+from arc_suite.learning.agents.normaliser import Normalizer
 
 _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}
 
@@ -38,23 +37,23 @@ class Worlds:
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
         self._act = jax.jit(self._acted)
 
-    def roll_out(self, policy, normalise: Layer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
+    def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
         """Act in all worlds for a horizon."""
         keys = jax.random.split(jax.random.fold_in(self._key, iteration), self._hp.horizon)
         carry = self._state, self._steps
-        (self._state, self._steps), rollout = self._act(carry, policy, normalise.arrays, np.float32(std), keys)
+        (self._state, self._steps), rollout = self._act(carry, policy, normalise, np.float32(std), keys)
         if not jnp.isfinite(rollout["means"]).all():
             raise Diverged("an action is not finite", step)
         return rollout
 
     def _acted(self, carry, policy, normalise, std, keys):
-        return jax.lax.scan(functools.partial(self._step, policy, Layer("normalise", normalise), std), carry, keys)
+        return jax.lax.scan(functools.partial(self._step, policy, normalise, std), carry, keys)
 
-    def _step(self, policy, normalise: Layer, std, carry, key):
+    def _step(self, policy, normalise: Normalizer, std, carry, key):
         """Step all worlds; return what the next step goes on from, and the transitions."""
         state, steps = carry
         noise, restart = jax.random.split(key)
-        mean = ppo.mean_action(self.architecture, policy, network.forward([normalise], state.obs))
+        mean = ppo.mean_action(self.architecture, policy, normalise(state.obs))
         action = mean + std * jax.random.normal(noise, mean.shape)
         after = jax.vmap(self.env.step)(state, action)
         steps = steps + 1

@@ -46,13 +46,10 @@ def main(run: str | None = None) -> None:
     checks.extension(output, [".onnx"])
     if _ROBOT.present or made_body() is not None:
         setup = only_setup(_ROBOT)
-        task = setup.definition
-        onnx_file.save_universal(output, universal.load(name, task), setup)
-        size, joints = task.size, len(setup.body.joint_names)
+        policy = universal.fitted(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
     else:
         policy = policies.trained(name)
-        onnx_file.save(output, policy)
-        size, joints = policy.size, policy.joints
-    print(f"wrote {output}: {size} observations, {joints} actions, {output.stat().st_size} bytes")
+    onnx_file.save(output, policy)
+    print(f"wrote {output}: {policy.size} observations, {policy.joints} actions, {output.stat().st_size} bytes")

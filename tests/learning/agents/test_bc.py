@@ -9,7 +9,6 @@ from conftest import SHORT, learning
 
 from arc_suite import data
 from arc_suite.envs.setup import Setup
-from arc_suite.policies.network import forward
 
 
 @pytest.fixture
@@ -31,11 +30,11 @@ def test_it_learns_the_actions_of_its_dataset(begun, prior):
     episodes = list(data.open(prior))
     observations = np.concatenate([episode.observations[:-1] for episode in episodes])
     actions = np.concatenate([episode.actions for episode in episodes])
-    learned = forward(agent.latest.policy, observations)
+    learned = agent.latest.policy(observations)
     # Most of it; the demonstrator starts by a clock that the network does not see.
     assert ((learned - actions) ** 2).mean() < 0.3 * actions.var()
     # The normaliser has the moments of the whole dataset.
-    mean, factor, _ = agent.latest.policy[0].arrays
+    mean, factor = (agent.latest.policy.arrays[name] for name in ("0", "1"))
     np.testing.assert_allclose(mean, observations.mean(axis=0), atol=1e-5)
     moving = observations.std(axis=0) > 1e-3
     np.testing.assert_allclose(1.0 / factor[moving], observations.std(axis=0)[moving], rtol=1e-3)

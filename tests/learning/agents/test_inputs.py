@@ -7,8 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.inputs import Inputs
 from arc_suite.learning.agents.replay import Transitions
-from arc_suite.policies import network
-from arc_suite.policies.network import Layer
 from arc_suite.robots import generator
 
 TASK = Setup.of("tick").definition
@@ -69,7 +67,7 @@ def test_a_body_without_symmetry_has_no_mirrored_transitions():
 def test_exported_layers_take_whole_observations(normalize):
     inputs = Inputs.of(TASK, CONTACTS, normalize, mirror=False).after(3.0 + 2.0 * drawn(50))
     weight = drawn(len(inputs.columns), 4)
-    layers = Layer("linear", (weight, np.ones(4, np.float32))), Layer("tanh")
+    layers = ({"weight": weight, "bias": np.ones(4, np.float32)},)
     observations = 3.0 + 2.0 * drawn(60)[50:]
-    expected = network.forward(layers, inputs(observations))
-    assert_allclose(network.forward(inputs.exported(layers), observations), expected, atol=1e-5)
+    expected = np.tanh(inputs(observations) @ weight + 1.0)
+    assert_allclose(inputs.exported(layers)(observations), expected, atol=1e-5)

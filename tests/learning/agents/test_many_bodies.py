@@ -7,15 +7,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 pytest.importorskip("jax", reason="of the extra agents: make check-agents")
 
-import jax
 
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
+from arc_suite.learning.agents import architectures
 from arc_suite.learning.agents.architectures import PerLeg
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.normaliser import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network, policy
+from arc_suite.policies.tracing import traced
 from arc_suite.tasks import tokens
 
 SETUP = Setup.of("random:0-1", "steer", {"time_limit": 0.5})
@@ -32,16 +33,18 @@ def vectors():
 def test_a_network_of_legs_in_files_computes_what_learning_does(vectors):
     architecture = PerLeg()
     parameters = architecture.drawn(np.random.default_rng(0), 16)
-    layer = architecture.normalise(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
-    normalised = network.forward([layer], vectors)
+    normalise = architecture.normalise(Moments.none(architecture.inputs).after(architecture.seen(vectors)))
+    normalised = normalise(vectors)
     expected = np.asarray(architecture.actions(parameters, normalised))
-    layers = architecture.exported(parameters)
-    assert_allclose(network.forward(layers, normalised), expected, atol=1e-5)
-    again = architecture.imported(layers)
+    graph = architectures.policy(architecture, normalise, parameters)
+    assert_allclose(graph(vectors), expected.clip(-1.0, 1.0), atol=1e-5)
+    normalizer, again = architectures.read(architecture, graph)
+    for array, same in zip(normalizer, normalise, strict=True):
+        assert_array_equal(array, same)
     assert_array_equal(np.asarray(architecture.actions(again, normalised)), expected)
     assert not expected[~SETUP.make_vec(2).description.mask.reshape(2, -1)].any()
-    with pytest.raises(ValueError, match="^a policy of different bodies$"):
-        architecture.imported((network.Layer("clip"),))
+    with pytest.raises(ValueError, match="^a policy of dagger, bc or ppo"):
+        architectures.read(architecture, traced(lambda x: x.clip(-1.0, 1.0), architecture.size))
 
 
 def test_the_order_of_legs_does_not_matter(vectors):
@@ -67,8 +70,8 @@ def test_the_order_of_legs_does_not_matter(vectors):
 def test_normalised_observations_keep_the_number_of_joints(vectors):
     architecture = PerLeg()
     seen = architecture.seen(vectors)
-    layer = architecture.normalise(Moments.none(architecture.inputs).after(seen))
-    inputs, mask = tokens.leg_inputs(network.forward([layer], vectors))
+    normalise = architecture.normalise(Moments.none(architecture.inputs).after(seen))
+    inputs, mask = tokens.leg_inputs(normalise(vectors))
     assert_array_equal(mask, tokens.leg_inputs(vectors)[1])
     there = inputs[mask.any(axis=-1)]
     scaled = np.delete(there, np.arange(20, 24), axis=-1)
@@ -95,7 +98,7 @@ def test_it_resumes_bit_exactly(algorithm, tmp_path):
     for other in (first, second):
         for name, array in whole.until(96).checkpoint.items():
             assert_array_equal(other.until(96).checkpoint[name], array, err_msg=name)
-    finite = jax.tree.map(np.isfinite, whole.latest.policy[1].arrays)
+    finite = map(np.isfinite, whole.latest.policy.arrays.values())
     assert all(each.all() for each in finite)
 
 

@@ -4,7 +4,6 @@ import numpy as np
 from numpy.testing import assert_allclose
 
 from arc_suite.learning.agents.normaliser import LIMIT, Moments
-from arc_suite.policies.network import forward
 
 
 def test_moments_of_parts_are_those_of_the_whole():
@@ -17,17 +16,17 @@ def test_moments_of_parts_are_those_of_the_whole():
     assert_allclose(moments.squares / 60, whole.var(axis=0, dtype=float), rtol=1e-9, atol=1e-12)
 
 
-def test_the_layer_normalises_within_bounds_and_leaves_alone_what_never_moves():
+def test_it_normalizes_within_bounds_and_leaves_alone_what_never_moves():
     random = np.random.default_rng(0)
     vectors = (random.normal(size=(5000, 3)) * (2.0, 1e-2, 0.0) + (5.0, -1.0, 7.0)).astype(np.float32)
-    layer = Moments.none(3).after(vectors).layer()
-    seen = forward([layer], vectors)
+    normalize = Moments.none(3).after(vectors).normalizer()
+    seen = normalize(vectors)
     assert_allclose(seen[:, :2].std(axis=0), 1.0, atol=1e-2)
     assert_allclose(seen.mean(axis=0), 0.0, atol=1e-3)
     assert (seen[:, 2] == 0.0).all()
-    assert_allclose(forward([layer], np.float32([[1e3, -1e3, 7.0]])), [[LIMIT, -LIMIT, 0.0]], atol=1e-3)
+    assert_allclose(normalize(np.float32([[1e3, -1e3, 7.0]])), [[LIMIT, -LIMIT, 0.0]], atol=1e-3)
 
 
 def test_before_the_first_vector_nothing_is_changed_within_bounds():
     vectors = np.float32([[0.5, -4.0, 2.0]])
-    assert_allclose(forward([Moments.none(3).layer()], vectors), vectors)
+    assert_allclose(Moments.none(3).normalizer()(vectors), vectors)

@@ -14,11 +14,12 @@ import jax
 
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.learning.agents import on_policy, run_folder
+from arc_suite.learning.agents import architectures, on_policy, run_folder
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Perceptron
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
+from arc_suite.learning.agents.normaliser import Moments
 from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
 from arc_suite.robots import generator
@@ -172,10 +173,11 @@ def test_a_network_is_exported_and_imported_as_it_acts():
     random = np.random.default_rng(0)
     parameters = architecture.drawn(random, 16)
     x = random.normal(size=(5, 158)).astype(np.float32)
-    layers = architecture.exported(parameters)
-    acted = network.forward(layers, x)
-    assert_allclose(acted, ppo.mean_action(architecture, parameters, x), atol=1e-5)
-    assert_allclose(ppo.mean_action(architecture, architecture.imported(layers), x), acted, atol=1e-5)
+    graph = architectures.policy(architecture, Moments.none(158).normalizer(), parameters)
+    acted = graph(x)
+    assert_allclose(acted, ppo.mean_action(architecture, parameters, x).clip(-1.0, 1.0), atol=1e-5)
+    normalize, again = architectures.read(architecture, graph)
+    assert_allclose(ppo.mean_action(architecture, again, normalize(x)).clip(-1.0, 1.0), acted, atol=1e-5)
 
 
 def test_every_transition_has_a_mirrored_one(begun):
@@ -190,7 +192,7 @@ def test_every_transition_has_a_mirrored_one(begun):
         both = np.asarray(getattr(given, name))
         assert_array_equal(agent.symmetry.action(both[:32]), both[32:])
     mirrored = agent.symmetry.observation(rollout["observations"].reshape(32, -1))
-    assert_array_equal(network.forward([agent.normalise], mirrored), given.observations[32:])
+    assert_array_equal(agent.normalise(mirrored), given.observations[32:])
     # The normaliser has seen as much of the left as of the right.
     assert_allclose(agent.symmetry.observation(agent.moments.mean), agent.moments.mean, atol=1e-9)
 
@@ -223,9 +225,7 @@ def test_time_limits_fall_on_different_steps_and_bootstrap(begun):
     split = agent.collector.environment.task.split
     assert_allclose(split(rollout["observations"][2, 3])["gait_clock"], (0.0, 1.0))
     assert split(last)["gait_clock"][0] > 0.1
-    value = np.asarray(
-        ppo.value(agent.collector.architecture, agent.state.values, network.forward([agent.normalise], last[None]))
-    )[0]
+    value = np.asarray(ppo.value(agent.collector.architecture, agent.state.values, agent.normalise(last[None])))[0]
     expected = (1.0 - agent.hp.discount) * rollout["rewards"][1, 3] + agent.hp.discount * value
     assert np.asarray(given.returns)[:32].reshape(8, 4)[1, 3] == pytest.approx(expected, rel=1e-5)
 
@@ -234,8 +234,8 @@ def test_schedules(begun):
     """The standard deviation falls, and the normaliser stays from a part of the run on."""
     agent = begun(changes={"normalize_until": 0.5})
     assert agent.advance().metrics["std"] == SMALL.initial_std
-    before = agent.until(192).policy[0].arrays[0]
-    assert_array_equal(agent.until(320).policy[0].arrays[0], before)
+    before = agent.until(192).policy.arrays["0"]  # the mean
+    assert_array_equal(agent.until(320).policy.arrays["0"], before)
     ratio = SMALL.final_std / SMALL.initial_std
     assert agent.latest.metrics["std"] == pytest.approx(SMALL.initial_std * ratio**0.9)
 
@@ -246,12 +246,16 @@ def test_it_starts_from_a_policy_with_a_warm_up_of_the_values(begun, imitated):
     values = None
     for _ in range(2):  # the warm-up
         latest = agent.advance()
-        assert_array_equal(network.forward(latest.policy, observations), start.actions(observations))
+        assert_array_equal(latest.policy(observations), start.actions(observations))
         assert values is None or (weights(agent.state.values) != values).mean() > 0.3  # some inputs never move
         values = weights(agent.state.values)
     latest = agent.advance()
-    assert not np.array_equal(latest.policy[1].arrays[0], start.layers[1].arrays[0])
-    assert_array_equal(latest.policy[0].arrays[0], start.layers[0].arrays[0])
+    (weight, *_), (mean, *_) = (
+        [name for name in node.inputs if name in start.graph.arrays]
+        for node in (start.graph.nodes[3], start.graph.nodes[0])
+    )
+    assert not np.array_equal(latest.policy.arrays[weight], start.graph.arrays[weight])
+    assert_array_equal(latest.policy.arrays[mean], start.graph.arrays[mean])
 
 
 def test_a_run_resumes_without_the_policy_that_it_started_from(tmp_path, imitated):

@@ -10,7 +10,6 @@ from conftest import small
 
 from arc_suite.learning.agents import algorithms, off_policy
 from arc_suite.learning.agents import soft_actor_critic as sac
-from arc_suite.policies import network
 
 NAME = "sac_parallel"
 
@@ -83,7 +82,7 @@ def test_its_policy_takes_whole_observations(learner):
     found = agent.until(50)
     observations = agent.buffer.at(np.arange(50)).observations
     mean, _ = sac.distribution(agent.state.policy, agent.inputs(observations))
-    assert_allclose(network.forward(found.policy, observations), np.tanh(mean), atol=1e-5)
+    assert_allclose(found.policy(observations), np.tanh(mean), atol=1e-5)
 
 
 @pytest.mark.parametrize("changes", [{}, {"n_step": 1}, {"symmetry_augmentation": False}])
