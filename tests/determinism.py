@@ -79,13 +79,13 @@ def main() -> None:
     parser.add_argument("threads", type=int, nargs="*", default=[1, 2, 8])
     parser.add_argument("--steps", type=int, default=500)
     given = parser.parse_args()
-    print(f"{'robot':<10}{'task':<10}{'way':<16}{'observations':<18}rewards")
+    print(f"{'robot':<10}{'task':<10}{'way':<18}{'observations':<18}rewards")
     for robot, task in arc_suite.ALL_TASKS:
         ways = {"single": single(robot, task, given.steps)}
         ways |= {f"batch, threads={count}": batched(robot, task, count, given.steps) for count in given.threads}
         for way, episode in ways.items():
             found = digests(episode)
-            print(f"{robot:<10}{task:<10}{way:<16}{found.observations:<18}{found.rewards}", flush=True)
+            print(f"{robot:<10}{task:<10}{way:<18}{found.observations:<18}{found.rewards}", flush=True)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ ENVIRON = os.environ | {"PYTHONPATH": str(FOLDER.parent)}
 
 
 @pytest.mark.release
-def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_an_environment():
+def test_the_same_bits_in_every_process_on_any_number_of_threads_and_in_a_batch():
     found = {}
     for threads in (["1", "8"], ["2"]):
         command = [sys.executable, FOLDER / "determinism.py", *threads, f"--steps={STEPS}"]
