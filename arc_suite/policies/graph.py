@@ -6,7 +6,7 @@ are float32; a truth value is 1 or 0. Results have a leading axis for environmen
 
 import math
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,7 +49,7 @@ class Graph(NamedTuple):
 
         Actions of each environment are bit-exact as if computed alone.
         """
-        known: dict[str | int, np.ndarray] = {**self.arrays, INPUT: observations}
+        known: dict[Any, np.ndarray] = {**self.arrays, INPUT: observations}
         for index, (operator, inputs) in enumerate(self.nodes):
             known[index] = OPERATORS[operator].function(*(known[name] for name in inputs))
         return known[len(self.nodes) - 1]
@@ -168,8 +168,8 @@ def checked(graph: Graph, size: int) -> Graph:
     # Environments that observe nothing and anything: what shapes do not show, these do.
     sample = np.zeros((3, size), np.float32)
     sample[1:] = np.random.default_rng(0).standard_normal((2, size))
-    shapes: dict[str | int, Shape] = {name: array.shape for name, array in graph.arrays.items()} | {INPUT: (1, size)}
-    known: dict[str | int, np.ndarray] = {**graph.arrays, INPUT: sample}
+    shapes: dict[Any, Shape] = {name: array.shape for name, array in graph.arrays.items()} | {INPUT: (1, size)}
+    known: dict[Any, np.ndarray] = {**graph.arrays, INPUT: sample}
     for index, node in enumerate(graph.nodes):
         try:
             shapes[index] = shape_of(node, shapes)

@@ -7,6 +7,7 @@ The input `observations` is (num_envs, size) float32, flat: the task's blocks on
 import json
 import os
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -111,7 +112,7 @@ def _standard(graph: Graph) -> tuple[list[tuple], dict[str, np.ndarray]]:
     arrays = _ARRAYS | {f"array_{name}": array for name, array in graph.arrays.items()}
     nodes: list[tuple] = [("Shape", [INPUT], "num_envs", {"end": 1})]
     nodes.append(("Concat", ["num_envs", "one"], "rows", {"axis": 0}))
-    known = {INPUT: INPUT} | {name: f"array_{name}" for name in graph.arrays}
+    known: dict[Any, str] = {INPUT: INPUT} | {name: f"array_{name}" for name in graph.arrays}
     for index, node in enumerate(graph.nodes):
         known[index] = OUTPUT if index == len(graph.nodes) - 1 else f"node_{index}"
         inputs = [known[name] for name in node.inputs]

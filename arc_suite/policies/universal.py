@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from arc_suite.models.standing import standing
 from arc_suite.policies import network
 from arc_suite.policies.graph import Graph
 from arc_suite.policies.network import PACKAGED, Network
-from arc_suite.policies.tracing import Traced, repeated, traced
+from arc_suite.policies.tracing import repeated, traced
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import Tokens
 
@@ -89,13 +90,14 @@ class Universal:
         _, angles, speeds = proprioception(checked(observation, Clocked.reads, len(self.reach)))
         return torques(self.reach * positions, angles, speeds, *self.gains)
 
-    def _traced(self, vectors: Traced) -> Traced:
-        """Write the nodes of positions (1, joints) for an observation (1, size)."""
+    def _traced(self, vectors: Any) -> Any:
+        """Write the nodes of positions (1, joints) for a traced observation (1, size)."""
         seen = self.tokens.observed(self.tokens.gathered(vectors))
-        return self.tokens.actions(repeated(self.network.graph, tokens.flat(seen, *self.descriptions)))
+        flat: Any = tokens.flat(seen, *self.descriptions)
+        return self.tokens.actions(repeated(self.network.graph, flat))  # type: ignore[arg-type]
 
-    def _traced_torques(self, vectors: Traced) -> Traced:
-        """Write the nodes of torques (1, joints) for an observation (1, size)."""
+    def _traced_torques(self, vectors: Any) -> Any:
+        """Write the nodes of torques (1, joints) for a traced observation (1, size)."""
         _, _, *proprioceived, _, _, _ = self.tokens.parts(self.tokens.gathered(vectors))
         angles, speeds = map(self.tokens.actions, proprioceived)
         return torques(self.reach * self._traced(vectors), angles, speeds, *self.gains)
