@@ -16,7 +16,7 @@ import numpy as np
 from tqdm import tqdm
 
 from arc_suite.animation.clips import planting
-from arc_suite.animation.clips.catalogue import CLIPS, DEFAULT, Walk
+from arc_suite.animation.clips.catalogue import CLIPS, DEFAULT, WalkLoop
 from arc_suite.animation.clips.drafts import drafts, passage
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.cpg.kinematics import Legs
@@ -62,7 +62,7 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
     """Return numbers of the default clips of a body by name, and the reasons of those that are left out."""
     recorder, left_out = Kept(Setup.of(body, "steer"), "cpg", None), {}
     made = drafts(recorder, DEFAULT, iter, left_out)
-    loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], Walk)]
+    loops = [draft for name, draft in made.items() if isinstance(CLIPS[name], WalkLoop)]
     found = {"clips": len(DEFAULT) - len(left_out), "cycles": max((draft.cycles for draft in loops), default=np.nan)}
     found["seam"] = np.degrees(max((draft.motion.seam for draft in loops), default=np.nan))
     if "walk" in made:
