@@ -23,7 +23,7 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
         terms, reward = terms.reward(task.terms(memory, readings), task.settings.weights, task.cost_limit)
         blocks = task.observe(memory, readings)
         terminated, truncated = task.ended(memory, readings)
-    carry = task.stream_state(memory)
+    stream = task.stream_state(memory)
 """
 
 import collections
@@ -277,7 +277,7 @@ class Task(Observed):
         return None
 
     def first(self) -> Any:
-        """Return the carry with which a new stream of episodes begins."""
+        """Return the stream state with which a new stream of episodes begins."""
         return None
 
     @abstractmethod
@@ -285,11 +285,11 @@ class Task(Observed):
         """Draw how an episode starts, and everything else that is random in it.
 
         The number of draws is fixed and does not depend on what is drawn, so that an episode is a
-        function of its seed, the carry and its actions.
+        function of its seed, the stream state and its actions.
 
         Args:
             random: what to draw from.
-            carry: of the episode before, or `first()`.
+            stream: state of the stream after the episode before, or `first()`.
         """
 
     def read(self, data) -> Readings:
