@@ -143,7 +143,7 @@ def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
     if zips.parts(name):
         made = policies.trained(name)
     if isinstance(made, Universal):  # acts in the task that it was trained in
-        made = universal.fitted(made.network, Setup.of(body, made.network.setup.task))
+        made = universal.for_body(made.network, Setup.of(body, made.network.setup.task))
     if not isinstance(made, Network):
         raise ValueError(f"policy {name}: a page runs cpg, ppo, universal, or one trained network")
     blocks, task = made.blocks, made.setup.definition

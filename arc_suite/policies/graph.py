@@ -111,10 +111,11 @@ def _truth(compare: np.ufunc) -> Operator:
     return Operator(lambda a, b: compare(a, b).astype(np.float32), 2)
 
 
-# Take gives numbers of an environment by their indices, in the shape of the indices; Concat all numbers of its inputs;
-# Sum sums over the first axis after that of environments. Pick gives the rows (n, size) of an array (num_envs, count,
-# size) where a mask (num_envs, count) is not 0, so that nodes after it compute these alone, and Place puts rows back,
-# with 0 elsewhere. As all operators between them compute row by row, whoever computes every row gets the same.
+# Take gives numbers of an environment by their indices, in the shape of the indices. Concat gives all numbers of its
+# inputs. Sum sums over the axis after that of environments.
+# Pick gives the rows (n, size) of an array (num_envs, count, size) where a mask (num_envs, count) is not 0: nodes after
+# it compute these rows alone. Place puts rows back, with 0 elsewhere. Operators between them compute each row for
+# itself, so an export that computes all rows gets the same.
 OPERATORS = {
     "Add": Operator(np.add, 2),
     "Clip": Operator(lambda x, low, high: x.clip(low, high), 3, _clip_shape),

@@ -35,7 +35,7 @@ def metadata(network: Network) -> dict:
         ValueError: a policy of many bodies.
     """
     if network.setup.several:
-        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.fitted")
+        raise ValueError(f"policy of {network.setup.robot}: expected one of one body; see universal.for_body")
     setup, blocks = network.setup, network.blocks
     task, model = setup.prepared()
     step = task.scene.control_timestep

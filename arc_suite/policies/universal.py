@@ -103,7 +103,7 @@ class Universal:
         return torques(self.reach * self._traced(vectors), angles, speeds, *self.gains)
 
 
-def fitted(trained: Network, setup: Setup) -> Network:
+def for_body(trained: Network, setup: Setup) -> Network:
     """Return a policy of many bodies as a policy of one body in a task.
 
     Raises:

@@ -90,7 +90,7 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
     """In an episode that the policy itself plays."""
     setup = Setup.of(body, task, settings | {"time_limit": 1.0})
     network = legs.network()
-    onnx_file.save(tmp_path / "policy.onnx", universal.fitted(network, setup))
+    onnx_file.save(tmp_path / "policy.onnx", universal.for_body(network, setup))
     run, environment, greatest = session(tmp_path / "policy.onnx"), setup.load(), 0.0
     policy = Universal(network, environment.task.definition)
     timestep = environment.reset(0)
@@ -107,6 +107,6 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
 
 
 def test_a_policy_of_many_bodies_needs_one_of_them(tmp_path):
-    with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; see universal.fitted$"):
+    with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; see universal.for_body$"):
         onnx_file.save(tmp_path / "policy.onnx", legs.network())
     assert not list(tmp_path.iterdir())

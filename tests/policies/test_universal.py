@@ -101,7 +101,7 @@ def test_fitted_to_a_body_it_does_the_same(body, settings):
     """To the bit where actions are positions; torques are float64 in `act` and float32 in a graph."""
     setup = Setup.of(body, "steer", settings)
     environment = setup.make_vec(3, seed=0)
-    policy, fitted = Universal(drawn(), setup.definition), universal.fitted(drawn(), setup)
+    policy, fitted = Universal(drawn(), setup.definition), universal.for_body(drawn(), setup)
     observations, _ = environment.reset()
     expected = policy.act(environment.task.split(observations))
     assert_allclose(fitted.actions(observations), expected, atol=0.0 if settings else 1e-5)

@@ -46,7 +46,7 @@ def main(run: str | None = None) -> None:
     checks.extension(output, [".onnx"])
     if _ROBOT.present or made_body() is not None:
         setup = only_setup(_ROBOT)
-        policy = universal.fitted(universal.load(name, setup.definition), setup)
+        policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
     else:
