@@ -11,9 +11,9 @@ from arc_suite.policies import network
 
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory):
-    """The file of a policy of many bodies that learned nothing."""
+    """The file of a policy of many bodies that stands."""
     path = tmp_path_factory.mktemp("policy") / "policy.npz"
-    network.save(path, drawn())
+    network.save(path, drawn(scale=0.0))
     return path
 
 
