@@ -69,7 +69,7 @@ class Material(NamedTuple):
 
 def parts(body: Body) -> tuple[list[Part], dict[str, Material]]:
     """Return the parts of a body in the order of its `part_names`, and the materials of what they show by name."""
-    model = mujoco.MjModel.from_xml_string(models.assemble(body, decorated=True).to_xml_string())
+    model = models.parsed(body, decorated=True).compile()
     ids = [model.body(name).id for name in body.part_names]
     found = [_part(model, index, ids) for index in ids]
     names = sorted({shape.material for part in found for shape in part.shapes})

@@ -53,9 +53,7 @@ def ground(environment, low: np.ndarray, high: np.ndarray) -> dict[str, Any]:
         high: the opposite corner.
     """
     arena = environment.task.definition.scene.arena
-    model = mujoco.MjModel.from_xml_string(
-        models.assemble(environment.task.body, arena, decorated=True).to_xml_string()
-    )
+    model = models.parsed(environment.task.body, arena, decorated=True).compile()
     data = mujoco.MjData(model)
     data.mocap_pos[:] = environment.physics.data.mocap_pos
     mujoco.mj_kinematics(model, data)

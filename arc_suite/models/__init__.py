@@ -1,5 +1,5 @@
 """From a spec to MJCF: builder, standing pose, sizing, visuals."""
 
-from arc_suite.models.assembly import assemble
+from arc_suite.models.assembly import assemble, parsed
 
-__all__ = ["assemble"]
+__all__ = ["assemble", "parsed"]

@@ -1,5 +1,7 @@
 """Whole models: a body in its arena, as PyMJCF, with or without visuals."""
 
+import mujoco
+import numpy as np
 from dm_control import mjcf
 
 from arc_suite.arenas import FLAT, Arena
@@ -24,3 +26,20 @@ def assemble(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mjcf.R
     if decorated:
         visuals.decorate(root, body)
     return root
+
+
+def parsed(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.MjSpec:
+    """Assemble a body in an arena as `assemble` does, and return MuJoCo's own spec of the model.
+
+    Heights of the ground go in as numbers. MuJoCo's parser reports "unknown error" of a long list
+    when the heap cannot grow in place, although the memory is there.
+    """
+    root = assemble(body, arena, decorated)
+    fields = root.find_all("hfield")
+    heights = [np.reshape(field.elevation, (field.nrow, field.ncol)) for field in fields]
+    for field in fields:
+        del field.elevation
+    spec = mujoco.MjSpec.from_string(root.to_xml_string())
+    for field, values in zip(spec.hfields, heights, strict=True):
+        field.userdata = values[::-1].ravel()  # MJCF lists rows from the far side in y
+    return spec

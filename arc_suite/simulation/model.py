@@ -37,10 +37,7 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
-    if arena == FLAT:
-        spec = direct.on_flat_ground(sized(body))
-    else:
-        spec = mujoco.MjSpec.from_string(models.assemble(body, arena).to_xml_string())
+    spec = direct.on_flat_ground(sized(body)) if arena == FLAT else models.parsed(body, arena)
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()

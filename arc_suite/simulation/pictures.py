@@ -7,6 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 from dm_control import mujoco as dm_mujoco
+from dm_control.mujoco import wrapper
 
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
@@ -56,7 +57,7 @@ class Decorated(dm_mujoco.Physics):
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT, quality: Quality = QUALITIES["fast"]) -> "Decorated":
         """Compile the decorated body in an arena, for pictures of a quality."""
-        decorated = cls.from_xml_string(models.assemble(body, arena, decorated=True).to_xml_string())
+        decorated = cls.from_model(wrapper.MjModel(models.parsed(body, arena, decorated=True).compile()))
         decorated.model.vis.quality.shadowsize = quality.shadows
         decorated.model.vis.map.shadowclip = quality.clip
         decorated._legs = _legs(body, decorated.model.ptr)
