@@ -1,4 +1,4 @@
-// What a task reads from the simulation and remembers, as arc_suite.tasks.commanded and walk define it; no reward.
+// What a task reads from the simulation and remembers, as arc_suite.tasks.command_task and walk define it; no reward.
 
 const TURN = 2 * Math.PI;
 

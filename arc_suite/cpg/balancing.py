@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.cpg.commanded import Commanded, Request
+from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.kinematics import Legs, flows, rises, weights
 from arc_suite.models.sizing import GRAVITY
@@ -60,7 +60,7 @@ _DAMPING = 0.02  # of inverse kinematics, in standing heights
 _STEPS = 3  # of it in a control step
 
 
-class Balanced(Commanded):
+class Balanced(CommandLaw):
     """Follows a command, and keeps its balance by where it steps.
 
     Attributes:
@@ -70,7 +70,7 @@ class Balanced(Commanded):
     """
 
     def __init__(self, task: Task, parameters: BalancingParameters):
-        """Fit the law to a task; see `Commanded`.
+        """Fit the law to a task; see `CommandLaw`.
 
         Raises:
             ValueError: `feet` is for another number of ranks of legs.
@@ -94,7 +94,7 @@ class Balanced(Commanded):
         return np.tile(self.angles, (count, 1, 1))
 
     def planned(self, paths, request: Request, observation: Mapping) -> tuple:
-        """Return the next angles, target angles (environments, joints), rad, and their change; see `Commanded`."""
+        """Return the next angles, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
         numpy, p = request.motion.__array_namespace__(), self.parameters
         motion = request.motion.clip(-p.most, p.most) * self.units
         vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame

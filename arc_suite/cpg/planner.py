@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.arenas.pillars import RADIUS
-from arc_suite.cpg.commanded import CommandedState
+from arc_suite.cpg.command_law import CommandLawState
 from arc_suite.cpg.steering import Steered, SteeringParameters
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
@@ -56,15 +56,15 @@ class Planned:
     reads = (*Steered.reads, "goal", "ranges")
 
     def __init__(self, task: Task, parameters: PlanningParameters):
-        """Fit the law that steers to a task; see `Commanded`."""
+        """Fit the law that steers to a task; see `CommandLaw`."""
         self._parameters, self._steered = parameters, Steered(task, parameters.steering)
         self._extent = self._steered.extent / reach(self._steered.body)
 
-    def initial(self, count: int) -> CommandedState:
+    def initial(self, count: int) -> CommandLawState:
         """Return the state of the law that steers."""
         return self._steered.initial(count)
 
-    def __call__(self, state: CommandedState, observation: Mapping) -> tuple:
+    def __call__(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
         p, command = self._parameters, observation["command"].copy()
         for index, (goal, ranges) in enumerate(zip(observation["goal"], observation["ranges"], strict=True)):

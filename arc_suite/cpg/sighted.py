@@ -12,7 +12,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg import footholds
-from arc_suite.cpg.commanded import Commanded, Request
+from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.kinematics import Legs, flows, rises, weights
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
@@ -72,7 +72,7 @@ class Paths(NamedTuple):
     moved: np.ndarray
 
 
-class Sighted(Commanded):
+class Sighted(CommandLaw):
     """Follows a command over ground that the block `scan` shows.
 
     Attributes:
@@ -80,10 +80,10 @@ class Sighted(Commanded):
         places: (legs, 3) of the soles at ease, m.
     """
 
-    reads = (*Commanded.reads, "scan")
+    reads = (*CommandLaw.reads, "scan")
 
     def __init__(self, task: Task, parameters: SightedParameters):
-        """Fit the law to a task; see `Commanded`."""
+        """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
         self.duty_factor -= parameters.longer
         self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.pose.height

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.cpg.commanded import Commanded, Request
+from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.kinematics import flows, rises, weights
 from arc_suite.cpg.stride import lifted
 from arc_suite.models.sizing import sized
@@ -67,7 +67,7 @@ class _Leg(NamedTuple):
     lift: np.ndarray
 
 
-class Steered(Commanded):
+class Steered(CommandLaw):
     """Follows a command on level ground, without sight.
 
     Attributes:
@@ -78,7 +78,7 @@ class Steered(Commanded):
     """
 
     def __init__(self, task: Task, parameters: SteeringParameters):
-        """Fit the law to a task; see `Commanded`."""
+        """Fit the law to a task; see `CommandLaw`."""
         body = sized(task.scene.body)
         self.neutral = _neutral(body, parameters.share)
         super().__init__(task, parameters, tuple(self.neutral))
@@ -87,11 +87,11 @@ class Steered(Commanded):
         self.extent = float(max(np.hypot(*self.feet.T) + [leg.foot.radius for leg in body.legs]))
 
     def initial_paths(self, count: int) -> tuple:
-        """Return nothing: the law remembers no more than `CommandedState` does."""
+        """Return nothing: the law remembers no more than `CommandLawState` does."""
         return ()
 
     def planned(self, none: tuple, request: Request, observation: Mapping) -> tuple:
-        """Return the target angles (environments, joints), rad, and their change in a step; see `Commanded`."""
+        """Return the target angles (environments, joints), rad, and their change in a step; see `CommandLaw`."""
         numpy, quaternion = request.motion.__array_namespace__(), observation["posture"][:, 1:5]
         paths = 0.5 * self.stance * flows(request.motion * self.units, self.feet)
         # The low side of the torso is pushed up: its feet go down.

@@ -77,7 +77,7 @@ class LiveCommands:
 
     def _commanded(self, memory, latest) -> Any:
         for name, (value, mask) in latest.items():
-            changed = self._task.commanded(memory, name, value)
+            changed = self._task.with_command(memory, name, value)
             memory = changed if mask is None else trees.chosen(mask, changed, memory)
         return memory
 

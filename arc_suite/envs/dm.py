@@ -48,7 +48,7 @@ def load(
         task_kwargs: settings of the task; for every task `time_limit` (s), `arena`, `random` (a seed
             or `RandomState`) and `on_divergence` ("raise" an error or "terminate" the episode with
             reward 0), and disturbances, motors and senses, see `arc_suite.tasks.modifiers.Modifiers`;
-            for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.Settings`.
+            for walk `gait`, `weights`, and every target and threshold, see `arc_suite.tasks.walk.WalkSettings`.
         environment_kwargs: `flat_observation=True` gives one vector in place of named blocks. Of what
             else dm_control's environments take, steps and substeps are part of the benchmark and are
             refused, and `time_limit` is a setting of the task.

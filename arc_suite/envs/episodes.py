@@ -16,7 +16,7 @@ class Episodes:
 
     Attributes:
         environment: of `arc_suite.load`.
-        commanded: whether the task has a command of velocities.
+        follows_velocities: whether the task has a command of velocities.
         desired: (3,) command that a person has set; None for that of the task.
         timestep: the latest.
         earned: sum of the rewards of the present episode.
@@ -32,7 +32,7 @@ class Episodes:
             act: maps a `TimeStep` to an action.
         """
         self.environment, self._act = environment, act
-        self.commanded = environment.task.definition.commands.get("command") == 3
+        self.follows_velocities = environment.task.definition.commands.get("command") == 3
         self.desired: np.ndarray | None = None
         self.control_timestep = environment.control_timestep()
         self.restart()
@@ -45,7 +45,7 @@ class Episodes:
 
     def command(self, desired: Sequence[float] | np.ndarray | None) -> None:
         """Set the command, clipped to [-1, 1], or leave it to the task; a task without a command ignores it."""
-        if self.commanded:
+        if self.follows_velocities:
             self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
             self._command()
 
@@ -85,7 +85,7 @@ class Episodes:
         ]
 
     def _command(self) -> None:
-        if self.commanded:
+        if self.follows_velocities:
             self.environment.command("command", self.desired)
 
     def _asked(self) -> list[Marker]:

@@ -9,7 +9,7 @@ import mujoco
 from arc_suite import checks, registry
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.simulation.model import compiled
-from arc_suite.tasks import modified, modifiers, parameters
+from arc_suite.tasks import modified_task, modifiers, parameters
 from arc_suite.tasks.contract import CHANGEABLE, STEPS, Scene, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.readings import layout
@@ -47,7 +47,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
         model={name: getattr(model, name).copy() for name in CHANGEABLE},
     )
     task = kind(scene, settings, _step_limit(time_limit, step))
-    return modified.modified(task, changes) if changes else task, model
+    return modified_task.modified(task, changes) if changes else task, model
 
 
 def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> Symmetry:

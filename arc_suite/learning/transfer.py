@@ -100,7 +100,7 @@ class Comparison(NamedTuple):
         return (self.policy.total - self.zero.total) / gain if gain > 0.0 else math.nan
 
 
-class Result(NamedTuple):
+class TransferResult(NamedTuple):
     """The results of a family.
 
     Attributes:
@@ -160,13 +160,13 @@ def of_family(name: str, network: Network, task: str, settings: Mapping | None =
     return compare(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
 
 
-def result(played: list[Comparison]) -> Result:
+def result(played: list[Comparison]) -> TransferResult:
     """Return the results of comparisons; bodies whose demonstrators gain nothing count in no score."""
     scored = sorted((each for each in played if not math.isnan(each.score)), key=lambda each: each.score)
     worst = scored[: max(1, round(_WORST * len(scored)))]
     tracking = [[episode.tracking for episode in (each.policy, each.demonstrator)] for each in played]
     policy, demonstrator = np.mean(tracking, axis=0)
-    return Result(
+    return TransferResult(
         count=len(played),
         walk=float(np.mean([each.policy.walked for each in played])),
         demonstrated=float(np.mean([each.demonstrator.walked for each in played])),

@@ -9,7 +9,7 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.cpg.law import Clocked, checked, proprioception
 from arc_suite.envs.calls import checked_action
-from arc_suite.tasks.modified import Modified
+from arc_suite.tasks.modified_task import Modified
 
 
 class Policy(Protocol):

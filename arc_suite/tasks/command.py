@@ -89,7 +89,7 @@ class Command(ABC):
         """Return whether (...) another drawn command holds since control step `steps` (...)."""
         return False
 
-    def commanded(self, memory, name: str, value):
+    def with_command(self, memory, name: str, value):
         """Return the memory with a live command (..., 3) in place of the task's own where it is not NaN."""
         return memory._replace(live=value)
 

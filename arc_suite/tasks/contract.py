@@ -212,7 +212,7 @@ class Task(Observed):
         version: raised with any change of dynamics, reward or observation.
         reads: fields of the simulation that `read` takes.
         commands: sizes of what may be set from outside while an episode runs, such as by a player's stick,
-            by name; see `commanded`.
+            by name; see `with_command`.
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
@@ -329,7 +329,7 @@ class Task(Observed):
     def after(self, memory, readings: Readings) -> Any:
         """Return the memory after a control step."""
 
-    def commanded(self, memory, name: str, value) -> Any:
+    def with_command(self, memory, name: str, value) -> Any:
         """Return the memory with a live command: one of `commands` set to (..., size) numbers from outside.
 
         NaN stands for what the task itself would do.

@@ -24,7 +24,7 @@ LARGEST = 1e6  # bound of a setting, in its unit: far beyond sense, and finite w
 
 _TRIPOD, _TROT = (tuple(TWO_PI * offset for offset in offsets) for offsets in (gaits.TRIPOD, gaits.TROT))
 
-# Of walk by robot; units as in `Parameters`, `Noise` and `walk.Settings`.
+# Of walk by robot; units as in `Parameters`, `Noise` and `walk.WalkSettings`.
 _WALK = {
     "queen": {
         "target_velocity": 0.5,

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from arc_suite.arenas import terrain
 from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
-from arc_suite.tasks.commanded import COSTS, CommandTask
+from arc_suite.tasks.command_task import COSTS, CommandTask
 from arc_suite.tasks.ground import Lanes, PillarField
 
 _LEVEL = ("clock", "clearances", "context", "_torques")  # what follows from the body on level ground

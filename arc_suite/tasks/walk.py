@@ -16,7 +16,7 @@ from arc_suite.tasks.parameters import Noise, Parameters
 from arc_suite.tasks.readings import Readings, component
 
 
-class Settings(NamedTuple):
+class WalkSettings(NamedTuple):
     """Settings of a walk.
 
     Attributes:
@@ -34,7 +34,7 @@ class Settings(NamedTuple):
     noise: Noise
 
 
-class Memory(NamedTuple):
+class WalkMemory(NamedTuple):
     """Memory of an episode.
 
     Attributes:
@@ -85,10 +85,10 @@ class Walk(Task):
         return (*parameters.NAMES, "velocity_band", "healthy_range")
 
     @classmethod
-    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> WalkSettings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
         given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere=("arena",))
-        return Settings(
+        return WalkSettings(
             parameters.parameters(body, given),
             parameters.positive("velocity_band", given["velocity_band"]),
             _healthy_range(given["healthy_range"]),
@@ -123,7 +123,7 @@ class Walk(Task):
         """The target velocity, m/s."""
         return self.parameters.target_velocity
 
-    def phase(self, memory: Memory):
+    def phase(self, memory: WalkMemory):
         """Return the phase (...) of the gait, rad."""
         return self.clock.at(self.clock.phases, memory.tick)
 
@@ -132,18 +132,18 @@ class Walk(Task):
         qpos, qvel = self.settings.noise.drawn(self.scene.standing, random)
         still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
         spent = energy.start(len(still))
-        return Start(qpos, qvel, Memory(0, still, still, zero, zero, zero, zero, zero, np.True_, spent))
+        return Start(qpos, qvel, WalkMemory(0, still, still, zero, zero, zero, zero, zero, np.True_, spent))
 
-    def begin(self, memory: Memory, readings: Readings) -> Memory:
+    def begin(self, memory: WalkMemory, readings: Readings) -> WalkMemory:
         """Remember where the torso's frame stands."""
         x = component(readings.frame_position, 0) + 0.0  # not a view
         return memory._replace(x=x, energy=energy.begin(memory.energy, readings.joint_angles))
 
-    def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
+    def before(self, memory: WalkMemory, action) -> tuple[WalkMemory, Inputs]:
         """Remember the action, which is applied as it is."""
         return memory._replace(action=action, previous_action=memory.action), Inputs(action)
 
-    def after(self, memory: Memory, readings: Readings) -> Memory:
+    def after(self, memory: WalkMemory, readings: Readings) -> WalkMemory:
         """Advance the clock, and measure the step's displacement and contact schedule errors."""
         tick, x = memory.tick + 1, component(readings.frame_position, 0) + 0.0
         schedule_errors = clock.schedule_errors(
@@ -162,7 +162,7 @@ class Walk(Task):
             energy=energy.after(memory.energy, self._torques, memory.action, readings.joint_angles),
         )
 
-    def terms(self, memory: Memory, readings: Readings) -> dict:
+    def terms(self, memory: WalkMemory, readings: Readings) -> dict:
         """Return the paper's ten terms."""
         p, band = self.parameters, self.settings.velocity_band
         return {
@@ -172,7 +172,7 @@ class Walk(Task):
             **terms.costs(readings, memory.action, memory.previous_action, memory.schedule_errors, p.default_angles),
         }
 
-    def observe(self, memory: Memory, readings: Readings) -> dict:
+    def observe(self, memory: WalkMemory, readings: Readings) -> dict:
         """Return the paper's observation."""
         return {
             "posture": readings.posture,
@@ -181,11 +181,11 @@ class Walk(Task):
             "gait_clock": self.clock.at(self.clock.circle, memory.tick),
         }
 
-    def ended(self, memory: Memory, readings: Readings) -> tuple:
+    def ended(self, memory: WalkMemory, readings: Readings) -> tuple:
         """Terminate where the torso has left its healthy range; truncate nowhere."""
         return ~memory.healthy, False
 
-    def progress(self, memory: Memory) -> dict:
+    def progress(self, memory: WalkMemory) -> dict:
         """Return the mean `speed`, m/s, `gait_compliance`, the share of feet as prescribed, and `cost_of_transport`."""
         steps = memory.tick + (memory.tick == 0)
         time = steps * self.scene.control_timestep

@@ -44,9 +44,9 @@ class Wrapper(Observed):
         """The innermost task."""
         return self.task.unwrapped
 
-    def commanded(self, memory, name: str, value) -> Any:
+    def with_command(self, memory, name: str, value) -> Any:
         """Return the memory with a live command of the other task."""
-        return memory._replace(task=self.task.commanded(memory.task, name, value))
+        return memory._replace(task=self.task.with_command(memory.task, name, value))
 
 
 Task.register(Wrapper)

@@ -22,7 +22,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import load_body
-from arc_suite.tasks import TASKS, modified, noise
+from arc_suite.tasks import TASKS, modified_task, noise
 from arc_suite.tasks.modifiers import NAMES
 
 SPIDER = load_body("spider")
@@ -157,7 +157,7 @@ GOLDEN += [5, 0.47232399628840227, 0.8414767148983973, 0.13111064234791392, 0.30
 
 
 def test_the_draws_are_these_in_this_order():
-    drawn = modified.draw(np.random.RandomState(7), 6)
+    drawn = modified_task.draw(np.random.RandomState(7), 6)
     first = [*np.diff(drawn.kick_steps, prepend=0)[:5], *drawn.kick_sizes[:5], *drawn.kick_directions[:4]]
     last = [drawn.leg, drawn.strength, drawn.friction, drawn.mass, drawn.delay, drawn.noise_key]
     assert len(first + last) == 20
@@ -166,7 +166,7 @@ def test_the_draws_are_these_in_this_order():
 
 def test_draws_are_spread_as_they_say():
     random = np.random.RandomState(0)
-    drawn = [modified.draw(random, 6) for _ in range(2000)]
+    drawn = [modified_task.draw(random, 6) for _ in range(2000)]
     gaps = np.diff([one.kick_steps for one in drawn], prepend=0, axis=-1)
     assert (gaps.min(), gaps.max()) == (40, 120)
     assert gaps.mean() == pytest.approx(80.0, abs=0.5)
@@ -472,7 +472,7 @@ def test_a_wrong_modifier_is_one_line(settings, message):
             use("tick", "walk", settings)
         assert str(error.value).startswith(message) and "\n" not in str(error.value)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
-        modified.modified(prepared("tick", "walk")[0], {"kick": 1.0})
+        modified_task.modified(prepared("tick", "walk")[0], {"kick": 1.0})
 
 
 GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "modifiers.md").read_text()
@@ -506,7 +506,7 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
     changes = environment.task.memory.changes
     first, kick = changes.kick_steps[0], changes.kicks[0]
     shown = []
-    for _ in range(first + modified.SHOWN + 5):
+    for _ in range(first + modified_task.SHOWN + 5):
         environment.step(np.zeros(18))
         shown.append(kick_arrows(environment))
         if len(shown) == first:
@@ -519,7 +519,7 @@ def test_a_kick_is_a_red_arrow_against_the_torso_while_it_acts(task):
             assert np.linalg.norm(way) == pytest.approx(height * np.hypot(*kick) / math.sqrt(GRAVITY * height))
             red = [geom for geom in drawn(environment) if tuple(geom.rgba) == pytest.approx(arrow.colour)]
             assert [geom.type for geom in red] == [mujoco.mjtGeom.mjGEOM_ARROW]
-    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * modified.SHOWN + [0] * 6
+    assert [len(arrows) for arrows in shown] == [0] * (first - 1) + [1] * modified_task.SHOWN + [0] * 6
 
 
 def test_a_leg_whose_motors_have_failed_is_dark_in_all_pictures():
@@ -527,7 +527,7 @@ def test_a_leg_whose_motors_have_failed_is_dark_in_all_pictures():
     environment.reset(seed=4), envs.reset(seed=3)
     before = environment.physics.render(60, 80, "profile")
     assert environment.task.failed_legs() == ()
-    for _ in range(modified.FAILS_FROM + 1):
+    for _ in range(modified_task.FAILS_FROM + 1):
         environment.step(np.zeros(18)), envs.step(np.zeros((2, 18)))
     (leg,) = environment.task.failed_legs()
     failing = environment.task.memory.changes.failing

@@ -10,7 +10,7 @@ from tiers import tiers
 import arc_suite
 from arc_suite.tasks import TASKS, parameters
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.modified import modified
+from arc_suite.tasks.modified_task import modified
 from arc_suite.tasks.suite import Steer
 
 # Another value of every setting.

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.tasks import TASKS, sensors
-from arc_suite.tasks.commanded import CommandTask
+from arc_suite.tasks.command_task import CommandTask
 from arc_suite.tasks.contract import Task
 from website import markdown
 

@@ -30,7 +30,7 @@ _MEANINGS = {
 MEANINGS = {
     **{
         name: text
-        for kind in (Parameters, Noise, walk.Settings, Lanes, Modifiers)
+        for kind in (Parameters, Noise, walk.WalkSettings, Lanes, Modifiers)
         for name, text in markdown.fields(kind).items()
     },
     **_MEANINGS,

@@ -9,7 +9,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS, ground
-from arc_suite.tasks.commanded import CommandTask
+from arc_suite.tasks.command_task import CommandTask
 from arc_suite.tasks.contract import STEPS, Task
 from website import markdown, observations, returns, settings
 

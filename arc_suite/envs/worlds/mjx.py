@@ -33,7 +33,7 @@ WRITTEN = ("time", "qpos", "qvel", "qacc_warmstart", "mocap_pos")
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass
-class State:
+class WorldState:
     """The state of a world, or with leading axes of many.
 
     Attributes:
@@ -132,11 +132,11 @@ class Env:
         """Itself, as it is no wrapper."""
         return self
 
-    def reset(self, rng) -> State:
+    def reset(self, rng) -> WorldState:
         """Return the start of an episode, one of the table, given a key of JAX."""
         return self.start(np.uint32(self.first_seed) + jax.random.randint(rng, (), 0, self.num_starts).astype("uint32"))
 
-    def start(self, seed) -> State:
+    def start(self, seed) -> WorldState:
         """Return the start of the episode that any environment of the suite has after `reset(seed=seed)`.
 
         Args:
@@ -149,9 +149,9 @@ class Env:
         info = {name: jnp.full(size, jnp.nan) for name, size in self.task.commands.items()}
         info |= {"memory": start.memory, "first_memory": start.memory, "model": start.model, "truncation": zero}
         names = (*(f"reward_{name}" for name in self.task.settings.weights), "diverged", "overflow")
-        return State(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
+        return WorldState(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
 
-    def step(self, state: State, action) -> State:
+    def step(self, state: WorldState, action) -> WorldState:
         """Return the state after a control step.
 
         A world that diverges is done, with reward 0, and goes on from the model's default state, as in MuJoCo.
@@ -193,11 +193,11 @@ class Env:
             raise ValueError(
                 "render: expected neither scene_option nor modify_scene_fns; see arc_suite.envs.worlds.mjx"
             )
-        states = [trajectory] if isinstance(trajectory, State) else trajectory
+        states = [trajectory] if isinstance(trajectory, WorldState) else trajectory
         camera = "tracking" if camera is None else camera
         return [self._picture(state, index, height=height, width=width, camera_id=camera) for state in states]
 
-    def _picture(self, state: State, index: int | None, **options) -> np.ndarray:
+    def _picture(self, state: WorldState, index: int | None, **options) -> np.ndarray:
         scene, fields = self.task.scene, device.fields(state.data, ("mocap_pos", *self.task.reads))
         alone = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], vars(fields))
         memory = jax.tree.map(lambda leaf: np.asarray(leaf)[() if index is None else index], state.info["memory"])
@@ -205,13 +205,13 @@ class Env:
         pose = {"qpos": alone["qpos"], "mocap_pos": alone["mocap_pos"], "markers": markers}
         return pictures.picture(scene.body, scene.arena, **pose, failed_legs=self.task.failed_legs(memory), **options)
 
-    def _step(self, state: State, action) -> State:
+    def _step(self, state: WorldState, action) -> WorldState:
         task, info, before = self.task, state.info, state.data
         # Wrappers may put the data of the start in place, and leave the memory.
         begins = before.time == 0.0
         memory = jax.tree.map(lambda first, now: jnp.where(begins, first, now), info["first_memory"], info["memory"])
         for name in task.commands:
-            memory = task.commanded(memory, name, info[name])
+            memory = task.with_command(memory, name, info[name])
         moved, inputs = task.before(memory, action)
         data = before.replace(ctrl=inputs.ctrl)
         if inputs.kick is not None:
@@ -236,7 +236,7 @@ class Env:
         after = jax.tree.map(lambda new, old: jnp.where(diverged, old, new).astype(old.dtype), after, memory)
         metrics = {f"reward_{name}": jnp.where(diverged, 0.0, term) for name, term in found.items()}
         metrics |= {"diverged": diverged, "overflow": overflow}
-        return State(
+        return WorldState(
             data=data,
             obs=jnp.where(diverged, 0.0, observation),
             reward=_float(jnp.where(diverged, 0.0, reward)),
@@ -246,7 +246,7 @@ class Env:
         )
 
 
-def restarted(state: State, start: State, ended) -> State:
+def restarted(state: WorldState, start: WorldState, ended) -> WorldState:
     """Return the state of a world whose next step is the first of another episode, where one has ended.
 
     Args:

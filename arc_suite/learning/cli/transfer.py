@@ -46,7 +46,7 @@ def main() -> None:
     if FLAGS.output:
         checks.extension(FLAGS.output, [".csv"])
     network, every = universal.load(FLAGS.policy, Setup.of("queen", name, settings).definition), {}
-    print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.Result._fields))
+    print(f"{'family':<10}" + "".join(f"{head:>13}" for head in transfer.TransferResult._fields))
     for family in FLAGS.families:
         played = transfer.of_family(family, network, name, settings)
         print(f"{family:<10}" + "".join(f"{number:>13.4g}" for number in transfer.result(played)), flush=True)

@@ -18,7 +18,7 @@ from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
 from arc_suite.learning.studies.leaderboard import table
-from arc_suite.learning.studies.results import Result
+from arc_suite.learning.studies.results import RunResult
 from arc_suite.policies import named, network, zips
 
 SCORES = "scores.csv"
@@ -35,7 +35,7 @@ NAMES = {
 }
 
 
-class Score(NamedTuple):
+class RunScore(NamedTuple):
     """Result of a run; a line of `SCORES`.
 
     Attributes:
@@ -57,15 +57,15 @@ class Score(NamedTuple):
     heading_error: float
 
 
-COLUMNS = ("division", "learner", *Score._fields)  # of `SCORES`
+COLUMNS = ("division", "learner", *RunScore._fields)  # of `SCORES`
 
 
-def of_results(found: Iterable[Result]) -> list[Score]:
+def of_results(found: Iterable[RunResult]) -> list[RunScore]:
     """Return the scores of the runs that are finished."""
     return [_of_result(each) for each in found if each.steps[-1] >= each.run.configuration.steps]
 
 
-def _of_result(found: Result) -> Score:
+def _of_result(found: RunResult) -> RunScore:
     setup = found.run.configuration.setup
     scale = anchors.anchors(setup)
     enough = np.flatnonzero(scale.score(found.returns.mean(axis=1)) >= HALF)
@@ -73,15 +73,15 @@ def _of_result(found: Result) -> Score:
     return _score(setup, found.run.configuration.seed, found.final, minutes, found.style, scale)
 
 
-def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale) -> Score:
+def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale) -> RunScore:
     clipped = float(np.clip(scale.score(result), *CLIP))
     compliance, error = (results.size(measured[each]) for each in STYLE)
     if setup.kind.name in TURNING:
         error = np.nan
-    return Score(setup.body.name, setup.kind.name, seed, float(result), clipped, float(minutes), compliance, error)
+    return RunScore(setup.body.name, setup.kind.name, seed, float(result), clipped, float(minutes), compliance, error)
 
 
-def of_policies(folder: Path, progress: Callable) -> list[Score]:
+def of_policies(folder: Path, progress: Callable) -> list[RunScore]:
     """Play the protocol's episodes by the policies of a folder, and return their scores.
 
     What has an ending of `ENDINGS` or a name of `NAMES` is a policy, and the folder of a run. Weights, statistics and
@@ -127,7 +127,7 @@ def _is_policy(path: Path) -> bool:
     )
 
 
-def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
+def _of_policy(path: Path, setup: Setup, seed: int) -> RunScore:
     environment = setup.load()
     name = f"{path}:{MAKE}" if path.suffix == named.MODULE else path
     policy = policies.policy(name, setup.body, task=environment.task.definition)
@@ -138,7 +138,7 @@ def _of_policy(path: Path, setup: Setup, seed: int) -> Score:
     return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup))
 
 
-def write(studies: Path, division: str, learner: str, scores: Iterable[Score]) -> None:
+def write(studies: Path, division: str, learner: str, scores: Iterable[RunScore]) -> None:
     """Replace the scores of a learner in a division.
 
     Raises:
@@ -150,18 +150,18 @@ def write(studies: Path, division: str, learner: str, scores: Iterable[Score]) -
     csv_files.write(studies / SCORES, COLUMNS, [*others, *(owner | each._asdict() for each in scores)])
 
 
-def read(studies: Path) -> dict[tuple[str, str], list[Score]]:
+def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """Return the scores in a folder of studies by division and learner.
 
     Raises:
         ValueError: a damaged table.
         OSError: it cannot be read.
     """
-    found: dict[tuple[str, str], list[Score]] = {}
+    found: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
         division, learner, robot, task, seed, *others = row.values()
         checks.name(division, DIVISIONS, "division")
-        found.setdefault((division, learner), []).append(Score(robot, task, int(seed), *map(float, others)))
+        found.setdefault((division, learner), []).append(RunScore(robot, task, int(seed), *map(float, others)))
     return found
 
 
@@ -185,19 +185,19 @@ def text(studies: Path) -> str:
     return table(heads, [line[3:] for line in sorted(lines)])
 
 
-def _by_place(scores: Sequence[Score]) -> list[list[Score]]:
+def _by_place(scores: Sequence[RunScore]) -> list[list[RunScore]]:
     """Scores of each of `PLACES`, by seed; empty where there are none."""
     groups = [[each for each in scores if (each.robot, each.task) == where] for where in PLACES]
     return [sorted(group, key=lambda each: each.seed) for group in groups]
 
 
-def _even(groups: Sequence[Sequence[Score]]) -> list[Score]:
+def _even(groups: Sequence[Sequence[RunScore]]) -> list[RunScore]:
     """Scores of each place that has any, of the same number of seeds, so that all places weigh the same."""
     few = min(len(group) for group in groups if group)
     return [each for group in groups for each in group[:few]]
 
 
-def _cells(groups: Sequence[Sequence[Score]]) -> list[str]:
+def _cells(groups: Sequence[Sequence[RunScore]]) -> list[str]:
     """Cells of a learner; the total is that of all places alone, its interval that over two seeds or more."""
     even, seeds = _even(groups), [len(group) for group in groups if group]
     few, many = min(seeds), max(seeds)

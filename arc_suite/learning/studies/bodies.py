@@ -66,7 +66,7 @@ def text(path: Path) -> str:
     return table(("policy", "task", *transfer.FAMILIES), rows)
 
 
-def _cell(result: transfer.Result | None) -> str:
+def _cell(result: transfer.TransferResult | None) -> str:
     if result is None:
         return "not run"
     if math.isnan(result.tracking):

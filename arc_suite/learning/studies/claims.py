@@ -10,7 +10,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.evaluation.published import FINALS as PAPER
 from arc_suite.learning.studies import results
 from arc_suite.learning.studies.leaderboard import table
-from arc_suite.learning.studies.results import Result
+from arc_suite.learning.studies.results import RunResult
 
 ONLINE = ("sac", "speq", "sope_eo")
 WITH_PRIOR = ("sacfd", "speq_o2o", "sope")
@@ -32,7 +32,7 @@ class Claim(NamedTuple):
 
     text: str
     compared: Callable[[str, _Of], float | None]
-    figure: Callable[[Result], float]
+    figure: Callable[[RunResult], float]
     in_paper: bool = False
 
 
@@ -44,12 +44,12 @@ def _least(values: Sequence[float | None]) -> float | None:
     return None if None in values else min(values)
 
 
-def _metric(name: str) -> Callable[[Result], float]:
+def _metric(name: str) -> Callable[[RunResult], float]:
     """The mean size of a metric of style over the episodes in which it is finite; NaN where there is none."""
     return lambda result: results.size(result.style.get(name, np.empty(0)))
 
 
-def _final(result: Result) -> float:
+def _final(result: RunResult) -> float:
     return result.final
 
 
@@ -103,7 +103,7 @@ TEXT = (
 )
 
 
-def checked(found: Sequence[Result]) -> str:
+def checked(found: Sequence[RunResult]) -> str:
     """Return a table of the margins of all claims in Markdown."""
     own = [each for each in found if is_papers(each) and each.steps[-1] >= each.run.configuration.steps]
     lines = []
@@ -119,11 +119,11 @@ def checked(found: Sequence[Result]) -> str:
     return table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
 
 
-def _robot_and_algorithm(result: Result) -> tuple[str, str]:
+def _robot_and_algorithm(result: RunResult) -> tuple[str, str]:
     return result.run.configuration.setup.body.name, result.run.configuration.algorithm
 
 
-def is_papers(result: Result) -> bool:
+def is_papers(result: RunResult) -> bool:
     """Return whether the paper's table of final returns has a run."""
     setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
     plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label

@@ -13,12 +13,10 @@ from arc_suite.evaluation import anchors
 from arc_suite.evaluation.published import FINALS as PAPER
 from arc_suite.learning.studies import claims, leaderboard, results
 from arc_suite.learning.studies.leaderboard import table
-from arc_suite.learning.studies.results import Result
+from arc_suite.learning.studies.results import Groups, RunResult
 from arc_suite.learning.studies.tables import Run, Study
 
 REPORT, CURVES = "README.md", "curves.png"
-
-Groups = Mapping[str, Mapping[str, Sequence[Result]]]
 
 
 def write(name: str, study: Study, published: Path) -> Path:
@@ -92,12 +90,12 @@ def _page(sections: Mapping[str, Sequence[str]]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _title(study: Study, found: Sequence[Result]) -> str:
+def _title(study: Study, found: Sequence[RunResult]) -> str:
     title = study.title[0].upper() + study.title[1:] + "."
     return title if len(found) == len(study.runs) else f"{title} Begun: {len(found)} of {len(study.runs)} runs."
 
 
-def _reached(found: Sequence[Result]) -> str:
+def _reached(found: Sequence[RunResult]) -> str:
     lines = []
     for each in found:
         run, configuration = each.run, each.run.configuration
@@ -223,7 +221,7 @@ def _style(groups: Groups) -> str:
     return table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
 
 
-def _size(name: str, seeds: Sequence[Result]) -> str:
+def _size(name: str, seeds: Sequence[RunResult]) -> str:
     size = np.mean([results.size(each.style.get(name, np.empty(0))) for each in seeds])
     return "-" if np.isnan(size) else f"{size:.3f}"
 

@@ -22,7 +22,7 @@ STYLE = "style_"  # prefix of the columns with metrics of style, which the lates
 _OTHERS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode that are not the task's metrics
 
 
-class Result(NamedTuple):
+class RunResult(NamedTuple):
     """Result of a run.
 
     Attributes:
@@ -49,7 +49,10 @@ class Result(NamedTuple):
         return float(self.returns[-1].mean())
 
 
-def results(runs: Sequence[Run], published: Path) -> list[Result]:
+Groups = Mapping[str, Mapping[str, Sequence[RunResult]]]  # results by place and kind
+
+
+def results(runs: Sequence[Run], published: Path) -> list[RunResult]:
     """Return the results of those runs of a study that are published.
 
     Raises:
@@ -72,13 +75,13 @@ def episodes_of(published: Path) -> dict[str, list[dict[str, str]]]:
     return found
 
 
-def _result(run: Run, rows: Sequence[Mapping[str, str]], phases: str) -> Result:
+def _result(run: Run, rows: Sequence[Mapping[str, str]], phases: str) -> RunResult:
     def column(name):
         return np.array([row[name] for row in rows], float).reshape(-1, evaluation.EPISODES)
 
     latest = rows[-evaluation.EPISODES :]
     metrics = {name: np.array([row[name] for row in latest], float) for name in latest[0] if name not in _OTHERS}
-    return Result(
+    return RunResult(
         run=run,
         steps=column("step")[:, 0].astype(int),
         returns=column("return"),
@@ -95,15 +98,15 @@ def demonstrators(published: Path) -> dict[str, dict[str, np.ndarray]]:
     return anchors.read(path) if path.exists() else {}
 
 
-def grouped(found: Sequence[Result]) -> dict[str, dict[str, list[Result]]]:
+def grouped(found: Sequence[RunResult]) -> Groups:
     """Return results by place and kind, each with all its seeds."""
-    groups: dict[str, dict[str, list[Result]]] = {}
+    groups: dict[str, dict[str, list[RunResult]]] = {}
     for each in found:
         groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
     return groups
 
 
-def scores(seeds: Sequence[Result]) -> np.ndarray:
+def scores(seeds: Sequence[RunResult]) -> np.ndarray:
     """Return the mean return of each seed, (seeds,)."""
     return np.array([each.final for each in seeds])
 
@@ -114,7 +117,7 @@ def size(values: np.ndarray) -> float:
     return float(sizes.mean()) if sizes.size else np.nan
 
 
-def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
+def until(seeds: Sequence[RunResult], threshold: float) -> tuple[float, float]:
     """Return environment steps and s of the processor up to a mean return of `threshold`.
 
     Returns:
@@ -128,7 +131,7 @@ def until(seeds: Sequence[Result], threshold: float) -> tuple[float, float]:
     return float(steps), float(seconds)
 
 
-def improvement(groups: dict[str, dict[str, list[Result]]], x: str, y: str) -> tuple[float, tuple[float, float]] | None:
+def improvement(groups: Groups, x: str, y: str) -> tuple[float, tuple[float, float]] | None:
     """Return the probability that a run of kind x earns more than one of y, with its interval.
 
     Places in which both have several seeds are strata. Both are compared at the latest step that all their runs have
@@ -143,7 +146,7 @@ def improvement(groups: dict[str, dict[str, list[Result]]], x: str, y: str) -> t
     return evaluation.probability_of_improvement([each[0] for each in strata], [each[1] for each in strata])
 
 
-def _until_step(side: Sequence[Result], both: Sequence[Sequence[Result]]) -> list[Result]:
+def _until_step(side: Sequence[RunResult], both: Sequence[Sequence[RunResult]]) -> list[RunResult]:
     """Results cut back to the latest step at which all have been evaluated."""
     common = set.intersection(*(set(each.steps.tolist()) for seeds in both for each in seeds))
     if not common:

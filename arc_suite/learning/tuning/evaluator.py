@@ -14,7 +14,7 @@ TERMS = ("posture", "smoothness")  # of the reward, unweighted
 STYLE = (*TERMS, "tilt")  # costs by which presets may not be worse than another
 
 
-class Score(NamedTuple):
+class PresetScore(NamedTuple):
     """How presets walk: arrays (presets, episodes).
 
     Attributes:
@@ -55,7 +55,7 @@ class Evaluator:
             name, terms = setup.kind.name, " and ".join(TERMS)
             raise ValueError(f"task {name}: expected a reward with terms {terms}, got {', '.join(there)}")
 
-    def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> Score:
+    def __call__(self, presets: Sequence[Preset], seeds: Sequence[int]) -> PresetScore:
         """Play the episodes of these seeds, which are the same for all presets."""
         count, episodes = self._shape
         split, joints = self._environment.task.split, len(self._body.joint_names)
@@ -80,7 +80,7 @@ class Evaluator:
                 style[name] += cost * counted
             tipping = np.where(upright, np.maximum(tipping, np.where(fallen, 1.0, 0.5 - 0.5 * uprightness)), tipping)
             upright &= ~fallen
-        return Score(
+        return PresetScore(
             rewards=(totals / (self._steps - self._skipped)).reshape(self._shape),
             falls=~upright.reshape(self._shape),
             style={name: (total / lengths.clip(1)).reshape(self._shape) for name, total in style.items()},

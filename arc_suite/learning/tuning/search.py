@@ -14,7 +14,7 @@ import numpy as np
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
-from arc_suite.learning.tuning.evaluator import STYLE, Evaluator, Score
+from arc_suite.learning.tuning.evaluator import STYLE, Evaluator, PresetScore
 from arc_suite.learning.tuning.space import SPACES
 
 SPREAD = 0.5  # of the first generation, in scales of the parameters
@@ -34,7 +34,7 @@ class Generation(NamedTuple):
     Attributes:
         fitness: of its candidates.
         reward: mean over the episodes of the fittest.
-        tipping: of the fittest in the hard starts; see `Score`.
+        tipping: of the fittest in the hard starts; see `PresetScore`.
         style: the fittest's costs of style as shares of medium's, in the order of `evaluator.STYLE`.
     """
 
@@ -142,6 +142,6 @@ class Search:
         return Generation(fitness.tolist(), float(rewards[best]), float(tipping[best]), style[best].tolist())
 
 
-def _evaluated(setup: Setup, presets, seeds, steps: int, skipped: int = 0) -> Score:
+def _evaluated(setup: Setup, presets, seeds, steps: int, skipped: int = 0) -> PresetScore:
     with contextlib.closing(Evaluator(setup, len(presets), len(seeds), steps, skipped)) as evaluator:
         return evaluator(presets, seeds)

@@ -13,9 +13,9 @@ import pytest
 from arc_suite import evaluation
 from arc_suite.evaluation import anchors
 from arc_suite.learning.studies import benchmark, csv_files, results, tables
-from arc_suite.learning.studies.benchmark import Score
+from arc_suite.learning.studies.benchmark import RunScore
 from arc_suite.learning.studies.divisions import FAR, PLACES, SEEDS
-from arc_suite.learning.studies.results import Result
+from arc_suite.learning.studies.results import RunResult
 from arc_suite.policies.network import PACKAGED
 from arc_suite.tasks import TASKS
 
@@ -78,7 +78,7 @@ def result(levels, steps=(50_000, 100_000), **fields):
     returns = np.array([[scale().at(level)] * 10 for level in levels])
     style = {"gait_compliance": np.full(10, 0.9), "heading_error": np.array([np.nan, *[0.2, -0.2] * 4, 0.2])}
     run = tables.run("tick", "sac", 100_000, **fields)
-    return Result(run, np.array(steps), returns, {}, np.array([60.0, 180.0]), style, np.empty(0))
+    return RunResult(run, np.array(steps), returns, {}, np.array([60.0, 180.0]), style, np.empty(0))
 
 
 def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
@@ -103,7 +103,7 @@ def test_headings_are_not_judged_where_commands_turn():
 
 
 def score(place, seed, level, minutes=2.0):
-    return Score(*place, seed, 1000.0, level, minutes, 0.8, 0.1)
+    return RunScore(*place, seed, 1000.0, level, minutes, 0.8, 0.1)
 
 
 def row(page, learner):

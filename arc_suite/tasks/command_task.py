@@ -52,7 +52,7 @@ _SAMPLES = np.linspace(0.0, 1.0, 9)  # of an arrow, which the ground must not co
 _GOING, _TURNING = (1.0, 0.75, 0.1, 1.0), (0.2, 0.8, 1.0, 1.0)  # their colours
 
 
-class Settings(NamedTuple):
+class CommandTaskSettings(NamedTuple):
     """Settings of a task with a command.
 
     Attributes:
@@ -115,7 +115,7 @@ class Core(NamedTuple):
     tracking: np.ndarray
 
 
-class Memory(NamedTuple):
+class CommandTaskMemory(NamedTuple):
     """Memory of an episode: what all tasks with a command have, and that of each of the three values."""
 
     core: Core
@@ -157,11 +157,11 @@ class CommandTask(Task):
         return (*cls.ground.settings, *parameters.NAMES, "cost_limit")
 
     @classmethod
-    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> Settings:
+    def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> CommandTaskSettings:
         """Return the settings for a body, some of them overridden; see `parameters.values`."""
         elsewhere = () if cls.own_arena else ("arena",)
         given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere)
-        return Settings(
+        return CommandTaskSettings(
             parameters.parameters(body, given),
             parameters.weights(cls.weights, given["weights"], overrides.get("weights")),
             parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
@@ -170,7 +170,7 @@ class CommandTask(Task):
         )
 
     @classmethod
-    def arena(cls, body: Body, settings: Settings) -> Arena:
+    def arena(cls, body: Body, settings: CommandTaskSettings) -> Arena:
         """Return the arena of the ground."""
         return settings.ground.arena(body, settings.parameters)
 
@@ -209,7 +209,7 @@ class CommandTask(Task):
             p.gait_frequency, p.duty_factor, p.phase_offsets, self.scene.control_timestep, self.step_limit
         )
 
-    def phase(self, memory: Memory):
+    def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
         return self.clock.at(self.clock.phases, memory.core.tick)
 
@@ -233,7 +233,7 @@ class CommandTask(Task):
         still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
         spent, none = energy.start(len(still)), np.zeros(3)
         core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
-        return Start(qpos, qvel, Memory(core, command_memory, ground_memory, self.health.start()), obstacles)
+        return Start(qpos, qvel, CommandTaskMemory(core, command_memory, ground_memory, self.health.start()), obstacles)
 
     def read(self, data) -> Sensed:
         """Take the readings."""
@@ -245,11 +245,11 @@ class CommandTask(Task):
         readings = reading.read(data, layout, self.scene.arena, forces)
         return Sensed(*readings, heading, self.settings.ground.touches(data))
 
-    def clear_spawn(self, memory: Memory, readings: Sensed) -> np.ndarray:
+    def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
         return self.cleared(readings)
 
-    def begin(self, memory: Memory, readings: Sensed) -> Memory:
+    def begin(self, memory: CommandTaskMemory, readings: Sensed) -> CommandTaskMemory:
         """Remember where the torso is, and what the command asks for there."""
         place = _place(readings)
         command = self.command.begin(self.context, memory.command, place)
@@ -258,12 +258,12 @@ class CommandTask(Task):
         core = memory.core._replace(energy=spent, place=place, desired=desired)
         return memory._replace(core=core, command=command)
 
-    def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
+    def before(self, memory: CommandTaskMemory, action) -> tuple[CommandTaskMemory, Inputs]:
         """Remember the action, which is applied as it is."""
         core = memory.core._replace(action=action, previous_action=memory.core.action)
         return memory._replace(core=core), Inputs(action)
 
-    def after(self, memory: Memory, readings: Sensed) -> Memory:
+    def after(self, memory: CommandTaskMemory, readings: Sensed) -> CommandTaskMemory:
         """Return the memory after a control step, in this order: gait, health, motion, command, ground."""
         core, context, place = memory.core, self.context, _place(readings)
         numpy, steps = place.__array_namespace__(), core.steps + 1
@@ -290,7 +290,7 @@ class CommandTask(Task):
             followed=followed.tracking,
             tracking=core.tracking + followed.tracking,
         )
-        return Memory(core, followed.memory, ground, health)
+        return CommandTaskMemory(core, followed.memory, ground, health)
 
     @functools.cached_property
     def _torques(self) -> np.ndarray:
@@ -303,13 +303,13 @@ class CommandTask(Task):
         moved = numpy.concatenate([rotations.headed(moved[..., :2], core.place[..., 2]), turn[..., None]], axis=-1)
         return (1.0 - context.leaks) * core.motion + context.leaks * moved / context.step_units
 
-    def commanded(self, memory: Memory, name: str, value) -> Memory:
+    def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
-        command = self.command.commanded(memory.command, name, value)
+        command = self.command.with_command(memory.command, name, value)
         desired = self.command.desired(self.context, command, memory.core.steps, memory.core.place)
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
 
-    def terms(self, memory: Memory, readings: Sensed) -> dict:
+    def terms(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
         """Return the paper's costs without scale, and bonuses for following the command.
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
@@ -328,7 +328,7 @@ class CommandTask(Task):
             **self.command.terms(memory.command, core.followed, memory.health.upright),
         }
 
-    def observe(self, memory: Memory, readings: Sensed) -> dict:
+    def observe(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
         """Return the blocks as the torso heads, without a clock at a stop and without negative zeros."""
         core, context, heading = memory.core, self.context, readings.heading
         numpy, posture, velocities = core.motion.__array_namespace__(), readings.posture, readings.velocities
@@ -346,11 +346,11 @@ class CommandTask(Task):
         }
         return {name: block + 0.0 for name, block in observed.items()}
 
-    def ended(self, memory: Memory, readings: Sensed) -> tuple:
+    def ended(self, memory: CommandTaskMemory, readings: Sensed) -> tuple:
         """Terminate where the body fell; the ground may end the episode, too."""
         return self.settings.ground.ended(memory.ground, memory.health.fell)
 
-    def progress(self, memory: Memory) -> dict:
+    def progress(self, memory: CommandTaskMemory) -> dict:
         """Return the mean `tracking`, whether the body `fell`, `gait_compliance`, and what command and ground add.
 
         The cost of transport divides by the path of the leaky motion, whatever its direction.
@@ -366,22 +366,22 @@ class CommandTask(Task):
             **self.settings.ground.progress(memory.ground),
         }
 
-    def resampled(self, memory: Memory) -> Any:
+    def resampled(self, memory: CommandTaskMemory) -> Any:
         """Return whether the latest step began another drawn command."""
         return self.command.resampled(memory.command, memory.core.steps)
 
-    def judged(self, memory: Memory):
+    def judged(self, memory: CommandTaskMemory):
         """Return the steps (...) over which an episode is judged: a full episode once it is over, else those so far."""
         steps, (terminated, truncated) = memory.core.steps, self.ended(memory, None)
         numpy = memory.core.place.__array_namespace__()
         return numpy.where(terminated | truncated, self.context.steps, steps + (steps == 0))
 
-    def stream_state(self, memory: Memory) -> Any:
+    def stream_state(self, memory: CommandTaskMemory) -> Any:
         """Return the stream state of the ground, by the outcome of the episode."""
         outcome = self.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
-    def markers(self, memory: Memory, readings: Sensed) -> list[Marker]:
+    def markers(self, memory: CommandTaskMemory, readings: Sensed) -> list[Marker]:
         """Return arrows on the ground ahead of the torso: the desired velocity, and from its tip the turning.
 
         The latter is the sideways velocity of a point R ahead. At the target velocity an arrow is R long.

@@ -64,7 +64,7 @@ class Changes(NamedTuple):
     speeds: np.ndarray
 
 
-class Memory(NamedTuple):
+class ModifiedMemory(NamedTuple):
     """Memory of a modified task.
 
     Attributes:
@@ -219,13 +219,13 @@ class Modified(Wrapper):
         ):
             if span != (1.0, 1.0):
                 model |= {name: _within(span, share) * model.get(name, self.scene.model[name]) for name in names}
-        return start._replace(memory=Memory(start.memory, own), model=model)
+        return start._replace(memory=ModifiedMemory(start.memory, own), model=model)
 
-    def begin(self, memory: Memory, readings: Readings) -> Memory:
+    def begin(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
         """Return the other task's memory, and the state of the joints."""
-        return Memory(self.task.begin(memory.task, readings), self._sensed(memory.changes, readings))
+        return ModifiedMemory(self.task.begin(memory.task, readings), self._sensed(memory.changes, readings))
 
-    def before(self, memory: Memory, action) -> tuple[Memory, Inputs]:
+    def before(self, memory: ModifiedMemory, action) -> tuple[ModifiedMemory, Inputs]:
         """Return the memory, and what the other task writes as motors and kicks change it.
 
         The other task is given, and its reward judges, the torques commanded of the motors when they
@@ -241,7 +241,7 @@ class Modified(Wrapper):
         if changes.actuator_failure is not False:
             ctrl = ctrl * ~(own.failing & (own.elapsed >= FAILS_FROM))
         kick = self._kick(own, inputs.kick) if changes.kicks else inputs.kick
-        return Memory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick)
+        return ModifiedMemory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick)
 
     def torques(self, changes: Changes, action):
         """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
@@ -259,14 +259,14 @@ class Modified(Wrapper):
         stiffness, damping = self.gains
         return ((angles + (torques + damping * speeds) / stiffness) / self.reach).clip(-1.0, 1.0)
 
-    def after(self, memory: Memory, readings: Readings) -> Memory:
+    def after(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
         """Return the other task's memory, the state of the joints, and whether the body has fallen."""
         inner, own = self.task.after(memory.task, readings), self._sensed(memory.changes, readings)
         terminated, _ = self.task.ended(inner, readings)
         # With the leading axes of the memory, even where the task returns one boolean for all environments.
-        return Memory(inner, own._replace(terminated=(own.terminated & False) | terminated))
+        return ModifiedMemory(inner, own._replace(terminated=(own.terminated & False) | terminated))
 
-    def observe(self, memory: Memory, readings: Readings) -> dict:
+    def observe(self, memory: ModifiedMemory, readings: Readings) -> dict:
         """Return the other task's blocks with noise, without those that are left out."""
         observed, own = self.task.observe(memory.task, readings), memory.changes
         blocks = {name: observed[name] for name in observed if name not in self.changes.exclude_blocks}
@@ -276,12 +276,12 @@ class Modified(Wrapper):
             blocks |= {name: blocks[name] + widths * drawn[..., part] for name, (part, widths) in self.noises.items()}
         return blocks
 
-    def progress(self, memory: Memory) -> dict:
+    def progress(self, memory: ModifiedMemory) -> dict:
         """Return the other task's metrics, and whether the body `fell`, 0 or 1."""
         metrics = self.task.progress(memory.task)
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
-    def markers(self, memory: Memory, readings: Readings) -> list[Marker]:
+    def markers(self, memory: ModifiedMemory, readings: Readings) -> list[Marker]:
         """Return the other task's, and for `SHOWN` steps a red arrow against the torso for a kick."""
         return [*self.task.markers(memory.task, readings), *self._kicked(memory.changes, readings)]
 
@@ -305,7 +305,7 @@ class Modified(Wrapper):
         reach = max(math.hypot(*solid.position[:2]) + max(solid.size) for solid in torso.solids)
         return reach + _APART * torso.standing_height
 
-    def failed_legs(self, memory: Memory) -> tuple[str, ...]:
+    def failed_legs(self, memory: ModifiedMemory) -> tuple[str, ...]:
         """Return the leg whose motors have failed, once they have."""
         own, legs = memory.changes, self.scene.body.legs
         if own.elapsed[0] <= FAILS_FROM:

@@ -17,7 +17,7 @@ _SMOOTHING = 0.25  # cycles over which a new command takes hold
 _ONSET = 1.0  # cycles over which the gait grows to its full size
 
 
-class CommandedState(NamedTuple):
+class CommandLawState(NamedTuple):
     """The state of a law that follows a command.
 
     Attributes:
@@ -53,7 +53,7 @@ class Request(NamedTuple):
     advance: np.ndarray
 
 
-class Commanded(ABC):
+class CommandLaw(ABC):
     """A law that follows the block `command` in the gait of a task, whose phase the block `gait_clock` shows.
 
     Attributes:
@@ -93,24 +93,24 @@ class Commanded(ABC):
         self.units = velocity_units(self.body, gait.target_velocity)
         self.stiffness, self.damping = position_gains(self.body, self.pose.inertias)
 
-    def initial(self, count: int) -> CommandedState:
+    def initial(self, count: int) -> CommandLawState:
         """Return the state at the start of episodes in a number of environments."""
         zeros = np.zeros((count, 3))
-        return CommandedState(zeros, zeros, zeros, zeros[:, :1], zeros[:, 0], self.initial_paths(count))
+        return CommandLawState(zeros, zeros, zeros, zeros[:, :1], zeros[:, 0], self.initial_paths(count))
 
-    def __call__(self, state: CommandedState, observation: Mapping) -> tuple:
+    def __call__(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state and the actions (environments, joints); see `law`."""
         _, angles, velocities = proprioception(observation)
         state, targets, speeds = self.targets(state, observation)
         return state, torques(targets, angles, velocities - speeds, self.stiffness, self.damping)
 
-    def targets(self, state: CommandedState, observation: Mapping) -> tuple:
+    def targets(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state, and the joints' target angles, rad, and velocities, rad/s, (environments, joints)."""
         state, request = self._requested(state, observation["command"], observation["gait_clock"])
         paths, targets, change = self.planned(state.paths, request, observation)
         return state._replace(paths=paths), targets, change / self.step
 
-    def _requested(self, state: CommandedState, command, clock) -> tuple[CommandedState, Request]:
+    def _requested(self, state: CommandLawState, command, clock) -> tuple[CommandLawState, Request]:
         """The next state, and what feet are to do, by proportional and integral feedback on the command."""
         numpy, wanted, motion = clock.__array_namespace__(), command[:, :3], command[:, 3:]
         going = clock.any(axis=-1, keepdims=True)
@@ -123,7 +123,7 @@ class Commanded(ABC):
         advance = self.cycles * going[:, 0]
         requested = smooth + integral + np.array(self.parameters.gain) * (smooth - motion)
         requested = numpy.where(going, requested, state.motion)
-        state = CommandedState(smooth, integral, requested, size, phase + advance, state.paths)
+        state = CommandLawState(smooth, integral, requested, size, phase + advance, state.paths)
         return state, Request(requested, size, phase, advance)
 
     @abstractmethod
