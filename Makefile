@@ -48,7 +48,7 @@ check: lint $(INSTALLED)
 	tools/ensure_egl.sh $(PYTHON)
 	$(PYTHON) -m pytest $(PARALLEL) -m "not slow and not long and not release"
 
-lint: $(VENV)/linter
+lint: $(INSTALLED)
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/lint-imports --no-cache --no-logo
@@ -62,11 +62,7 @@ $(VENV)/demo: setup.cfg pyproject.toml tools/ensure_venv.sh
 
 $(INSTALLED): setup.cfg pyproject.toml tools/ensure_venv.sh
 	tools/ensure_venv.sh $(VENV)
-	$(PYTHON) -m pip install -q -e '.[test]'
-	touch $@
-
-$(VENV)/linter: $(INSTALLED)
-	$(PYTHON) -m pip install -q -e '.[lint]'
+	$(PYTHON) -m pip install -q -e '.[dev]'
 	touch $@
 
 # Warnings are errors. Without Node the site has pictures in place of walking creatures.
@@ -102,7 +98,7 @@ dist: $(VIEWER)
 bench-gpu: VENV := .venv-mjx
 bench-gpu: setup.cfg
 	tools/ensure_venv.sh $(VENV)
-	$(VENV)/bin/python -m pip install -q -e '.[agents,mjx-warp]' 'jax[cuda12]>=0.10'
+	$(VENV)/bin/python -m pip install -q -e '.[learn,gpu]' 'jax[cuda12]>=0.10'
 	$(VENV)/bin/python tools/bench_gpu.py --document docs/gpu.md
 
 bench: $(INSTALLED)
@@ -117,7 +113,7 @@ PYTEST = $(VENV)/bin/python -m pytest
 ENGINES := out/engines
 FAST := -m "not slow and not long and not release"
 
-check-%: EXTRAS := test
+check-%: EXTRAS := dev
 check-%: setup.cfg
 	tools/ensure_venv.sh $(VENV)
 	$(if $(FIRST),$(VENV)/bin/python -m pip install -q $(FIRST))
@@ -157,7 +153,9 @@ check-docs: PACKAGES := pytest playwright==1.65.2
 check-docs: RUN = $(PYTEST) tests/website
 
 check-notebooks: VENV := .venv-notebooks
-check-notebooks: EXTRAS := notebooks
+check-notebooks: EXTRAS := learn,video
+# nbmake runs the cells of notebooks in pytest, with this kernel.
+check-notebooks: PACKAGES := pytest 'nbmake>=1.5' 'ipykernel>=7'
 check-notebooks: RUN = $(PYTEST) --nbmake --nbmake-timeout=600 -p no:cacheprovider -p no:xdist -c /dev/null --rootdir=. \
 	examples/notebooks
 
@@ -173,7 +171,7 @@ check-web: RUN = $(PYTEST) tests/animation/test_pages.py && \
 	$(VENV)/bin/python tests/engines/three.py $(ENGINES) $(ENGINES)/loader.js
 check-play: RUN = $(PYTEST) tests/animation/test_play.py tests/animation/test_play_page.py
 check-studio: VENV := .venv-studio
-check-studio: EXTRAS := test,studio
+check-studio: EXTRAS := dev,animate
 check-studio: RUN = $(PYTEST) tests/animation/studio
 
 check-glb: RUN = mkdir -p .node-glb && cp tests/engines/package.json tests/engines/package-lock.json .node-glb/ && \
@@ -191,12 +189,12 @@ check-godot: RUN = tools/ensure_venv.sh .venv-godot && .venv-godot/bin/python -m
 	$(PYTHON) tests/engines/make_files.py $(ENGINES) few && $(PYTHON) tests/engines/godot.py $(ENGINES)
 
 check-jax: VENV := .venv-jax
-check-jax: EXTRAS := test,jax
+check-jax: EXTRAS := dev,learn
 check-jax: RUN = $(PYTEST) tests/tasks/test_jax.py
 
 # Compiled functions are kept, and Brax and MuJoCo Playground are there for their wrappers and trainers.
 check-mjx check-mjx-release: VENV := .venv-mjx
-check-mjx check-mjx-release: EXTRAS := test,agents,mjx-warp
+check-mjx check-mjx-release: EXTRAS := dev,learn,gpu
 check-mjx check-mjx-release: PACKAGES := playground==0.2.0 brax==0.14.2
 check-mjx check-mjx-release: RUN = JAX_COMPILATION_CACHE_DIR=$(VENV)/compiled $(PYTEST) -m "$(MARKS)" tests/mjx
 check-mjx: MARKS := not release
@@ -204,7 +202,7 @@ check-mjx-release: MARKS := release
 
 # pandas before 3, as what rliable needs does not know it yet.
 check-agents check-agents-release: VENV := .venv-jax
-check-agents check-agents-release: EXTRAS := test,agents,cluster,onnx,tensorboard
+check-agents check-agents-release: EXTRAS := dev,learn
 check-agents check-agents-release: PACKAGES := onnxruntime rliable 'pandas<3'
 check-agents check-agents-release: RUN = $(PYTEST) $(PARALLEL) -m "$(MARKS)" tests/learning/agents \
 	tests/learning/studies/test_study.py tests/learning/cli/test_train.py tests/policies/test_onnx_file.py \

@@ -15,7 +15,7 @@ def clone() -> Path | None:
 
 
 class MissingExtra(ImportError, ValueError):
-    """An extra of the suite is not installed; the message gives the command that installs it."""
+    """An extra of the suite is not installed; in a clone the message gives the command that installs it."""
 
     def __init__(self, need: str, extra: str, error: ImportError):
         """Name the extra.
@@ -25,8 +25,9 @@ class MissingExtra(ImportError, ValueError):
             extra: of setup.cfg.
             error: of the import that failed.
         """
-        place = f"-e '{clone()}[{extra}]'" if clone() else f"'arc_suite[{extra}]'"
-        super().__init__(f"{need}: pip install {place} ({error})")
+        # Outside a clone nobody knows where the package came from: no index has it.
+        remedy = f"pip install -e '{clone()}[{extra}]'" if clone() else f"install arc_suite with the extra {extra!r}"
+        super().__init__(f"{need}: {remedy} ({error})")
 
 
 def installed(package: str) -> str | None:

@@ -1,7 +1,7 @@
 """Measures worlds of `arc_suite.envs.worlds.mjx` on this machine's accelerator, and writes tables into docs/gpu.md.
 
 Prints control steps a second, memory and compile time, whole episodes against a processor's, and the minutes in which
-PPO earns what the demonstrator `medium` does. Needs the extras `agents` and `mjx-warp`.
+PPO earns what the demonstrator `medium` does. Needs the extras `learn` and `gpu`.
 
 Example:
   python tools/bench_gpu.py --document docs/gpu.md

@@ -83,8 +83,7 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
     """
     venv = _ROOT / f".venv-clients-{re.sub('[^a-z0-9]+', '-', client.name.lower())}"
     python = venv / "bin" / "python"
-    packages = [part for package in client.packages for part in _of_this_repository(package)]
-    commands = [[_ROOT / "tools" / "ensure_venv.sh", venv], [python, "-m", "pip", "install", "-q", *packages]]
+    commands = [[_ROOT / "tools" / "ensure_venv.sh", venv], [python, "-m", "pip", "install", "-q", *client.packages]]
     wrong = next(filter(None, (_run(command, os.environ, _ROOT) for command in commands)), "")
     surroundings = surroundings | {"PATH": f"{python.parent}{os.pathsep}{surroundings['PATH']}"}
     for block in client.blocks:
@@ -93,11 +92,6 @@ def check(client: Client, surroundings: Mapping[str, str], folder: pathlib.Path)
         if not block.file:
             wrong = wrong or _run([*_SHELLS[block.kind], script], surroundings, folder)
     return wrong
-
-
-def _of_this_repository(package: str) -> list[str]:
-    extras = package.removeprefix("arc_suite")
-    return ["-e", f"{_ROOT}{extras}"] if package.startswith("arc_suite") else [package]
 
 
 def _run(command: list, surroundings: Mapping[str, str], folder: pathlib.Path) -> str:

@@ -19,7 +19,7 @@ _DOORS = re.compile(r"^## I want to .*?(?=^## )", re.MULTILINE | re.DOTALL)
 
 INSTALL = """\
 ```sh
-pip install 'arc_suite[agents,video]'
+pip install 'arc_suite[learn,animate]'
 arc-suite doctor
 ```
 

@@ -24,7 +24,7 @@ try:
     with contextlib.redirect_stdout(io.StringIO()):  # MJX prints that Warp is missing
         from mujoco import mjx
 except ImportError as error:
-    raise versions.MissingExtra("worlds on a GPU need MJX", "mjx", error) from None
+    raise versions.MissingExtra("worlds on a GPU need MJX", "gpu", error) from None
 
 IMPLEMENTATIONS = ("jax", "warp")
 
@@ -64,7 +64,7 @@ def implementation(name: str | None) -> str:
         return "warp" if jax.default_backend() == "gpu" and _has_warp() else "jax"
     if checks.name(name, IMPLEMENTATIONS, "impl") == "warp" and not _has_warp():
         error = ImportError("No module named 'warp'")
-        raise versions.MissingExtra("impl 'warp' needs warp-lang", "mjx-warp", error)
+        raise versions.MissingExtra("impl 'warp' needs warp-lang", "gpu", error)
     return name
 
 

@@ -1,6 +1,6 @@
 """Brax's PPO in worlds of MJX, by the wrapper of MuJoCo Playground.
 
-pip install 'arc_suite[mjx]' playground==0.2.0 brax==0.14.2
+pip install -e '.[gpu]' playground==0.2.0 brax==0.14.2
 python examples/training/brax_ppo.py --robot queen --worlds 4096 --steps 50000000
 """
 

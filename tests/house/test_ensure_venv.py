@@ -77,7 +77,7 @@ def test_from_3_13_on_dm_control_comes_first_and_alone(run, tmp_path, python, co
     assert (installed.read_text() if installed.exists() else "") == comes * f"install -q --no-deps {pinned}\n"
 
 
-@pytest.mark.parametrize(("target", "extra"), [("demo", ".[video]"), ("test", ".[test]")])
+@pytest.mark.parametrize(("target", "extra"), [("demo", ".[video]"), ("test", ".[dev]")])
 def test_what_a_target_installs(target, extra):
     command = ["make", "--dry-run", "--directory", CONFIG.parent, "VENV=/nonexistent", target]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

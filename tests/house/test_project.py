@@ -16,7 +16,7 @@ SETUP.read(ROOT / "setup.cfg")
 
 
 def test_hooks_and_lint_have_the_same_ruff():
-    (pinned,) = re.findall(r"^ruff==(\S+)$", SETUP["options.extras_require"]["lint"], re.MULTILINE)
+    (pinned,) = re.findall(r"^ruff==(\S+)$", SETUP["options.extras_require"]["dev"], re.MULTILINE)
     assert re.findall(r"ruff==([\d.]+)", (ROOT / ".pre-commit-config.yaml").read_text()) == [pinned, pinned]
 
 

@@ -124,7 +124,7 @@ def test_the_text_for_package_indexes_is_made_from_the_readme():
     """By python tools/package_page.py."""
     page = package_page.page(README)
     assert _page("package") == page
-    assert "](docs/" not in page and "make demo" not in page and "pip install 'arc_suite[agents,video]'" in page
+    assert "](docs/" not in page and "make demo" not in page and "pip install 'arc_suite[learn,animate]'" in page
 
 
 def test_every_program_has_a_row():

@@ -26,8 +26,8 @@ def test_the_command_that_installs_dm_control(monkeypatch, python, options):
 
 def test_an_extra_is_named_for_a_clone_and_for_an_installed_package(monkeypatch, tmp_path):
     def line():
-        return str(versions.MissingExtra("ONNX needs onnx", "onnx", ImportError("No module named 'onnx'")))
+        return str(versions.MissingExtra("ONNX needs onnx", "learn", ImportError("No module named 'onnx'")))
 
-    assert line() == f"ONNX needs onnx: {programs.install('onnx')} (No module named 'onnx')"
+    assert line() == f"ONNX needs onnx: {programs.install('learn')} (No module named 'onnx')"
     monkeypatch.setattr(versions, "__file__", str(tmp_path / "site-packages" / "arc_suite" / "versions.py"))
-    assert line() == "ONNX needs onnx: pip install 'arc_suite[onnx]' (No module named 'onnx')"
+    assert line() == "ONNX needs onnx: install arc_suite with the extra 'learn' (No module named 'onnx')"

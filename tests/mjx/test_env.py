@@ -173,8 +173,8 @@ def test_errors_are_one_line(arguments, message):
 @pytest.mark.parametrize(
     ("module", "code", "extra"),
     [
-        ("mujoco.mjx", "from arc_suite.envs import mjx", "mjx"),
-        ("warp", "from arc_suite.envs import mjx; mjx.load('leaper', 'walk', impl='warp')", "mjx-warp"),
+        ("mujoco.mjx", "from arc_suite.envs.worlds import mjx", "gpu"),
+        ("warp", "from arc_suite.envs.worlds import mjx; mjx.load('leaper', 'walk', impl='warp')", "gpu"),
     ],
 )
 def test_a_missing_extra_is_one_line(module, code, extra):

@@ -46,7 +46,7 @@ def main() -> None:
     try:
         from arc_suite.animation.studio.page import serve
     except ImportError as error:
-        raise versions.MissingExtra("the studio needs viser", "studio", error) from None
+        raise versions.MissingExtra("the studio needs viser", "animate", error) from None
     serve(Session(_sketch()), FLAGS.host, FLAGS.port, lambda url: print(f"the studio is at {url}", flush=True))
 
 

@@ -133,7 +133,7 @@ def pictures(robots: list[str]):
     try:
         from arc_suite.style.plots import OF_GAIT, PICTURES
     except ImportError as error:
-        raise versions.MissingExtra("pictures need matplotlib", "plot", error) from None
+        raise versions.MissingExtra("pictures need matplotlib", "animate", error) from None
     with contextlib.ExitStack() as stack:
         targets = {}
         for robot in robots:

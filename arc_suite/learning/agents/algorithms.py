@@ -51,7 +51,7 @@ class Algorithm(NamedTuple):
         except ImportError as error:
             if not self.learner.startswith("arc_suite."):
                 raise ValueError(f"learner {self.learner}: {error}") from None
-            raise versions.MissingExtra("training needs JAX", "agents", error) from None
+            raise versions.MissingExtra("training needs JAX", "learn", error) from None
 
     def steps_of(self, setup: Setup) -> int:
         """Return the environment steps of a run, by default.

@@ -68,7 +68,7 @@ def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
     try:
         from arc_suite.learning.studies import cluster
     except ImportError as error:
-        raise versions.MissingExtra("--submit needs submitit", "cluster", error) from None
+        raise versions.MissingExtra("--submit needs submitit", "learn", error) from None
     arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
     parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
     for job in cluster.submit(arguments, jobs, FLAGS.hours, folder / "jobs", **parameters):

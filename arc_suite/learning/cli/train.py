@@ -138,7 +138,7 @@ def events(folder: Path) -> Iterator[Callable]:
     try:
         from tensorboardX import SummaryWriter
     except ImportError as error:
-        raise versions.MissingExtra("--tensorboard needs tensorboardX", "tensorboard", error) from None
+        raise versions.MissingExtra("--tensorboard needs tensorboardX", "learn", error) from None
     writers = []
 
     def write(step, metrics):

@@ -62,7 +62,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
         try:
             course = Search(setup, **settings)
         except ImportError as error:
-            raise versions.MissingExtra("a search needs cma", "tune", error) from None
+            raise versions.MissingExtra("a search needs cma", "learn", error) from None
         for generation in journal.generations:
             course.step(generation.fitness)
         done = len(journal.generations)
@@ -104,7 +104,7 @@ def main() -> None:
     try:
         from arc_suite.learning.tuning import plots
     except ImportError as error:
-        raise versions.MissingExtra("the plot needs matplotlib", "tune", error) from None
+        raise versions.MissingExtra("the plot needs matplotlib", "learn", error) from None
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
         course, journal = search(setup, folder)

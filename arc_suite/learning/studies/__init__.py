@@ -11,4 +11,4 @@ try:
     import matplotlib  # noqa: F401
     import minari  # noqa: F401
 except ImportError as error:
-    raise versions.MissingExtra("studies need JAX, Minari and matplotlib", "agents", error) from error
+    raise versions.MissingExtra("studies need JAX, Minari and matplotlib", "learn", error) from error

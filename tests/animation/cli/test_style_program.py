@@ -197,7 +197,7 @@ def test_all_robots(tmp_path):
 @pytest.mark.slow
 def test_pictures_without_matplotlib_say_what_to_install(tmp_path):
     done = programs.without("matplotlib", tmp_path, "style", f"--output={tmp_path}")
-    message = f"pictures need matplotlib: {programs.install('plot')} (No module named 'matplotlib')"
+    message = f"pictures need matplotlib: {programs.install('animate')} (No module named 'matplotlib')"
     assert (done.returncode, done.stderr) == (1, f"arc-suite style: {message}\n")
 
 

@@ -102,7 +102,7 @@ def test_unknown_algorithms(name, line):
 
 
 def test_without_jax_is_one_line():
-    with pytest.raises(ValueError, match=r"^training needs JAX: pip install -e '.*\[agents\]' \(No module named"):
+    with pytest.raises(ValueError, match=r"^training needs JAX: pip install -e '.*\[learn\]' \(No module named"):
         _ = Algorithm("arc_suite.learning.agents.nowhere", SoftActorCritic(), "").module
 
 

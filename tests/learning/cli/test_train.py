@@ -100,7 +100,7 @@ def test_configurations_that_do_not_fit_are_one_line(text, line, tmp_path):
 
 @pytest.mark.skipif(HAS_JAX, reason="JAX is installed")
 def test_without_jax_it_says_what_to_install(tmp_path):
-    one_line(run("train", cwd=tmp_path), f"arc-suite train: training needs JAX: {programs.install('agents')} (")
+    one_line(run("train", cwd=tmp_path), f"arc-suite train: training needs JAX: {programs.install('learn')} (")
 
 
 def test_export_of_what_is_no_run(tmp_path):

@@ -320,14 +320,14 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_without_the_extra_it_says_what_to_install(tmp_path):
     done = programs.without("minari", tmp_path, "study", "--help")
-    line = f"studies need JAX, Minari and matplotlib: {programs.install('agents')} (No module named 'minari')"
+    line = f"studies need JAX, Minari and matplotlib: {programs.install('learn')} (No module named 'minari')"
     assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite study: {line}\n")
 
 
 @pytest.mark.skipif(importlib.util.find_spec("submitit") is not None, reason="submitit is installed")
 def test_without_submitit_it_says_what_to_install(tmp_path):
     done = programs.run("-m", "arc_suite", "study", "paper", "--submit=2", cwd=tmp_path)
-    line = f"arc-suite study: --submit needs submitit: {programs.install('cluster')} ("
+    line = f"arc-suite study: --submit needs submitit: {programs.install('learn')} ("
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith(line) and done.stderr.count("\n") == 1
 
