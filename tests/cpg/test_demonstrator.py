@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -154,9 +155,8 @@ def test_first_timestep_restarts_the_clock():
 def test_wrong_observation_and_names_are_one_line_errors():
     blocks = "observation: expected blocks posture and velocities by name, as `split` of a task gives them, got "
     for wrong, kind in ((np.zeros(199), "ndarray"), ({"observations": np.zeros(199)}, "dict")):
-        with pytest.raises(ValueError) as error:
+        with refused(blocks + kind):
             Demonstrator("queen").act(wrong)
-        assert str(error.value) == blocks + kind
     others = arc_suite.load("bastion", "walk").reset()
     with pytest.raises(ValueError, match=r"^observation: expected those of 18 joints, got 12 angles and 12 velocit"):
         Demonstrator("queen")(others)
@@ -315,9 +315,8 @@ def test_steering_turns_back_to_where_the_robot_started():
     ],
 )
 def test_torques_that_do_not_fit_are_refused_in_one_line(rows, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         Demonstrator("leaper", PRESETS["leaper"]["medium"]._replace(torques=rows))
-    assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("preset", ["medium", "steered"])
@@ -325,9 +324,8 @@ def test_torques_that_do_not_fit_are_refused_in_one_line(rows, message):
 def test_another_robot_of_as_many_joints_is_told_by_its_parts(robot, other, preset):
     timestep = arc_suite.load(other, "steer", {"random": 0}).reset()
     parts, theirs = len(ROBOTS[robot].part_names), len(ROBOTS[other].part_names)
-    with pytest.raises(ValueError) as error:
+    with refused(f"observation: expected contact forces of {parts} rigid bodies, got {theirs}"):
         Demonstrator(robot, preset)(timestep)
-    assert str(error.value) == f"observation: expected contact forces of {parts} rigid bodies, got {theirs}"
 
 
 @pytest.mark.parametrize(("robot", "other", "stands"), [("queen", "tick", "0.75"), ("tick", "queen", "0.18")])

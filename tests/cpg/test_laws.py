@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from gaitless import Stay
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -117,9 +118,8 @@ def test_who_cannot_be_fitted_is_told_in_one_line():
         "task steer: a demonstrator needs a gait_frequency above 0 and a duty_factor between 0 and 1, got 0 and 0.6"
     )
     for preset in ("steered", "medium"):
-        with pytest.raises(ValueError) as error:
+        with refused(message):
             Demonstrator(still, preset)
-        assert str(error.value) == message
     with pytest.raises(ValueError, match="^preset: expected one of Preset, float, SteeringParameters, .*, got dict$"):
         Demonstrator("tick", {})
 
@@ -132,10 +132,8 @@ def test_what_suits_a_task_follows_from_its_attributes(monkeypatch):
     monkeypatch.setitem(arc_suite.tasks.TASKS, "stay", Stay)
     assert suited_preset(arc_suite.load("tick", "ragged").task.definition) == "surefooted"
     assert suited_preset(arc_suite.load("tick", "ragged", {"kicks": 1.0}).task.definition) == "surefooted"
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="^task stay: nothing suits .*steered"):
         suited_preset(arc_suite.load("tick", "stay").task.definition)
-    assert str(error.value).startswith("task stay: nothing suits ") and "steered" in str(error.value)
-    assert "\n" not in str(error.value)
 
 
 def test_guide():

@@ -10,6 +10,7 @@ from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 import arc_suite
 from arc_suite import registry
@@ -332,9 +333,8 @@ def test_pictures_show_each_body():
 )
 def test_bad_arguments_are_one_line(kwargs, message):
     arguments = {"bodies": FEW[:1], "num_envs": 10} | kwargs
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         make(**arguments)
-    assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 def test_bodies_of_too_many_legs_or_joints_are_one_line():

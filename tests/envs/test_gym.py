@@ -22,6 +22,7 @@ from gymnasium.wrappers import (
     RecordEpisodeStatistics,
     RescaleAction,
 )
+from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
@@ -172,14 +173,12 @@ def test_bad_seeds_are_one_line_and_change_nothing(seed):
     env, same = gymnasium.make(IDS[3]), gymnasium.make(IDS[3])
     for e in (env, same):
         e.reset(seed=0)
-    with pytest.raises(ValueError) as caught:
+    with refused(f"seed: expected an integer from 0 to 4294967295, got {seed!r}"):
         env.reset(seed=seed)
-    assert str(caught.value) == f"seed: expected an integer from 0 to 4294967295, got {seed!r}"
     assert_same(env.step(actions(env, 1)[0]), same.step(actions(env, 1)[0]))
     assert_same(env.reset()[0], same.reset()[0])
-    with pytest.raises(ValueError) as caught:
+    with refused(f"seed: expected an integer from 0 to 4294967295, got {seed!r}"):
         arc_suite.load("leaper", "walk", {"random": seed})
-    assert str(caught.value) == f"seed: expected an integer from 0 to 4294967295, got {seed!r}"
 
 
 def test_np_random_seed_is_that_of_the_task_too():
@@ -331,9 +330,8 @@ def test_closed_environments_say_so(env_id):
         ("step", lambda: env.step(np.zeros(env.action_space.shape, np.float32))),
         ("render", env.render),
     ):
-        with pytest.raises(ClosedEnvironmentError) as caught:
+        with refused(f"cannot {call}: the environment is closed; make a new one", ClosedEnvironmentError):
             use()
-        assert str(caught.value) == f"cannot {call}: the environment is closed; make a new one"
 
 
 @pytest.mark.parametrize(
@@ -349,9 +347,8 @@ def test_bad_actions_change_nothing(action, message):
     env, same = gymnasium.make(IDS[1]), gymnasium.make(IDS[1])
     for e in (env, same):
         e.reset(seed=0)
-    with pytest.raises(ValueError) as caught:
+    with refused(message):
         env.step(action)
-    assert str(caught.value) == message
     assert_same(env.step(actions(env, 1)[0]), same.step(actions(env, 1)[0]))
 
 
@@ -373,9 +370,8 @@ def test_bad_actions_change_nothing(action, message):
 def test_actions_that_are_no_real_numbers_are_refused(action, kind, recwarn):
     env = gymnasium.make(IDS[1]).unwrapped
     env.reset(seed=0)
-    with pytest.raises(ValueError) as caught:
+    with refused(f"action: expected 12 numbers, got {kind}"):
         env.step(action)
-    assert str(caught.value) == f"action: expected 12 numbers, got {kind}"
     assert not recwarn
 
 
@@ -415,21 +411,17 @@ def test_actions_out_of_range_are_clipped():
     ],
 )
 def test_bad_arguments_are_one_line(kwargs, message):
-    with pytest.raises(ValueError) as caught:
+    with refused(message):
         gymnasium.make(IDS[0], **kwargs)
-    assert str(caught.value) == message
 
 
 def test_unknown_render_modes_are_one_line(monkeypatch):
     monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda: False)
-    with pytest.warns(UserWarning, match="rgb_aray"), pytest.raises(ValueError) as caught:  # Gymnasium's own warning
+    unknown = "unknown render_mode 'rgb_aray'; did you mean 'rgb_array'? (there are: rgb_array, depth_array)"
+    with pytest.warns(UserWarning, match="rgb_aray"), refused(unknown):  # Gymnasium's own warning
         gymnasium.make(IDS[0], render_mode="rgb_aray")
-    expected = "unknown render_mode 'rgb_aray'; did you mean 'rgb_array'? (there are: rgb_array, depth_array)"
-    assert str(caught.value) == expected
-    with pytest.raises(ValueError) as caught:
+    with refused("render_mode 'human' needs a display, and there is none; use rgb_array or depth_array"):
         gymnasium.make(IDS[0], render_mode="human")
-    expected = "render_mode 'human' needs a display, and there is none; use rgb_array or depth_array"
-    assert str(caught.value) == expected
 
 
 def test_human_is_offered_where_there_is_a_display(monkeypatch):

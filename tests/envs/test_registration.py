@@ -9,6 +9,7 @@ import sys
 import gymnasium
 import programs
 import pytest
+from refusals import refused
 
 import arc_suite
 from arc_suite import registration, registry
@@ -211,24 +212,15 @@ class Misnamed(Walk):
         ({"body": "other"}, "body: expected a spec.Body, got 'other'"),
         ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),
         (
-            {
-                "body": OTHER,
-                "parameters": {"walk": {"base_noise": 0.1, **ROW, "duty_factor": 2}},
-            },
+            {"body": OTHER, "parameters": {"walk": {"base_noise": 0.1, **ROW, "duty_factor": 2}}},
             "duty_factor: expected a number from 0 to 1, got 2",
         ),
         (
             walk({k: v for k, v in ROW.items() if k not in ("velocity_band", "healthy_range")}),
             "parameters of walk: other has no healthy_range and no velocity_band",
         ),
-        (
-            walk(ROW | {"healthy_rang": (0, 1)}),
-            "unknown setting of walk 'healthy_rang'; did you mean 'healthy_range'?",
-        ),
-        (
-            walk(ROW | {"weights": {"contrl": 1.0}}),
-            "unknown weight 'contrl'; did you mean 'control'?",
-        ),
+        (walk(ROW | {"healthy_rang": (0, 1)}), "unknown setting of walk 'healthy_rang'; did you mean 'healthy_range'?"),
+        (walk(ROW | {"weights": {"contrl": 1.0}}), "unknown weight 'contrl'; did you mean 'control'?"),
         (
             walk(ROW | {"phase_offsets": (0.0, 1.0)}),
             "phase_offsets: expected one finite number or 6 of them, got (0.0, 1.0)",
@@ -263,10 +255,8 @@ class Misnamed(Walk):
 def test_mistakes_are_one_line_and_register_nothing(arguments, message):
     tables = (ROBOTS, PARAMETERS["walk"], PRESETS, TASKS, ARENAS)
     before = [dict(table) for table in tables]
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         arc_suite.register(**arguments)
-    assert str(error.value).startswith(message)
-    assert "\n" not in str(error.value)
     assert [dict(table) for table in tables] == before
 
 

@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as wrappers
 from numpy.testing import assert_array_equal
+from refusals import refused
 from tiers import never, tiers, turn
 
 import arc_suite  # noqa: F401 (registers)
@@ -447,9 +448,8 @@ def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
 )
 def test_bad_seeds_are_one_line_errors(seed, message):
     batch = make()
-    with pytest.raises(ValueError) as error:
+    with refused(message):
         batch.reset(seed=seed)
-    assert str(error.value) == message
 
 
 def test_reset_of_some_environments_leaves_handed_out_observations_alone():

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -150,9 +151,8 @@ def test_the_largest_picture_is_at_least_1280_by_960():
 )
 def test_unknown_cameras_are_named(camera, message):
     environment = arc_suite.load("tick", "walk")
-    with pytest.raises(ValueError) as error:
+    with refused(message):
         environment.physics.render(60, 80, camera)
-    assert str(error.value) == message
 
 
 def glow_in(physics) -> np.ndarray:

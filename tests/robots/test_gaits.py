@@ -40,8 +40,7 @@ def test_the_rule_gives_a_tripod_at_half_and_a_tetrapod_at_two_thirds():
 
 
 @pytest.mark.parametrize(
-    ("name", "groups"),
-    [("trot", {"l1 r2", "l2 r1"}), ("pace", {"l1 l2", "r1 r2"}), ("bound", {"l1 r1", "l2 r2"})],
+    ("name", "groups"), [("trot", {"l1 r2", "l2 r1"}), ("pace", {"l1 l2", "r1 r2"}), ("bound", {"l1 r1", "l2 r2"})]
 )
 def test_gaits_of_quadrupeds_pair_their_legs(name, groups):
     gait = gaits.gait(QUAD, name)

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 from dm_control import mjcf
+from refusals import refused
 
 from arc_suite import models
 from arc_suite.models.standing import standing
@@ -73,9 +74,8 @@ def test_even_counts_stand_in_mirrored_pairs_and_odd_ones_around():
     ],
 )
 def test_a_count_out_of_range_is_named(legs, links, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message):
         generator.generate(legs, links)
-    assert str(error.value) == message
 
 
 def test_radial_legs_of_an_even_number_leave_the_front_free():
@@ -128,9 +128,8 @@ def test_what_is_asked_for_leaves_the_rest_of_a_random_body_as_it_is():
         ({"seed": 1, "legs": 13}, "legs: expected an integer from 4 to 12, got 13"),
         ({"seed": 1, "links": 9}, "links: expected an integer from 1 to 4, got 9"),
     ):
-        with pytest.raises(ValueError) as error:
+        with refused(message):
             generator.random_body(**kwargs)
-        assert str(error.value) == message
 
 
 def test_scaled_bodies_have_all_lengths_multiplied():

@@ -6,6 +6,7 @@ import re
 import tracemalloc
 
 import pytest
+from refusals import refused
 
 from arc_suite.models.sizing import sized
 from arc_suite.robots import ROBOTS, generator
@@ -148,9 +149,8 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation, palette"
     ],
 )
 def test_a_malformed_field_is_named_by_its_path(path, value, message):
-    with pytest.raises(SpecError) as error:
+    with refused(message, SpecError):
         body_from_json(changed(path, value))
-    assert str(error.value) == message
 
 
 def leaves(value, path=()):
@@ -220,22 +220,18 @@ def test_refusing_keeps_no_memory():
     ],
 )
 def test_what_is_no_body_is_one_line(text, message):
-    with pytest.raises(SpecError) as error:
+    with refused(message, SpecError, begins=True):
         body_from_json(text)
-    assert str(error.value).startswith(message)
-    assert "\n" not in str(error.value)
 
 
 def test_files_that_hold_no_body_are_named(tmp_path):
     path = tmp_path / "body.json"
     path.write_text(changed(("density",), 0))
-    with pytest.raises(SpecError) as error:
+    with refused(f"{path}: density: expected a number from 1e-09 to 1e+09, got 0", SpecError):
         load_body(path)
-    assert str(error.value) == f"{path}: density: expected a number from 1e-09 to 1e+09, got 0"
     path.write_text(" " * (MAX_BYTES + 1))
-    with pytest.raises(SpecError) as error:
+    with refused(f"{path}: expected at most {MAX_BYTES} bytes", SpecError):
         load_body(path)
-    assert str(error.value) == f"{path}: expected at most {MAX_BYTES} bytes"
     for missing, reason in ((tmp_path / "none.json", "no such file or directory"), (tmp_path, "is a directory")):
         with pytest.raises(OSError, match="cannot read") as error:
             load_body(missing)

@@ -38,10 +38,7 @@ def saved(model):
     return buffer.tobytes()
 
 
-@pytest.mark.parametrize(
-    "body",
-    [*ROBOTS, *EXAMPLES, "random:0", "random:1", *(f"varied:{seed}" for seed in range(8))],
-)
+@pytest.mark.parametrize("body", [*ROBOTS, *EXAMPLES, "random:0", "random:1", *(f"varied:{seed}" for seed in range(8))])
 def test_the_model_on_flat_ground_is_that_of_the_builder_byte_for_byte(body):
     body = load_body(body) if body in EXAMPLES else registry.body_of(body)
     spec = mujoco.MjSpec.from_string(models.assemble(body).to_xml_string())

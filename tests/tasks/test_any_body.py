@@ -7,6 +7,7 @@ import pickle
 import mujoco
 import numpy as np
 import pytest
+from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -158,9 +159,8 @@ def test_a_domain_is_a_name_a_body_or_a_file(tmp_path):
         ),
         (str(tmp_path / "a.json"), OSError, f"cannot read {tmp_path / 'a.json'}: no such file or directory"),
     ):
-        with pytest.raises(error) as caught:
+        with refused(message, error):
             arc_suite.load(domain, "walk")
-        assert str(caught.value) == message
     with pytest.raises(ValueError, match="^unknown task 'wall'; did you mean 'walk'"):
         arc_suite.load(BODY, "wall")
 
@@ -245,9 +245,8 @@ def test_what_a_demonstrator_cannot_do_is_one_line():
         ((BODY, 0.0), "froude: expected 0.001 or more, forwards or backwards, got 0.0"),
         ((BODY, math.nan), "froude: expected a number from -1 to 1, got nan"),
     ):
-        with pytest.raises(ValueError) as error:
+        with refused(message):
             Demonstrator(*arguments)
-        assert str(error.value) == message
     with pytest.raises(ValueError, match="^unknown preset 'quick'"):
         Demonstrator(BODY, "quick")
     assert policies.policy("zero", BODY).act({}, np.zeros(1)).shape == (1, 18)

@@ -22,10 +22,7 @@ JOINTS = {name: len(body.joint_names) for name, body in ROBOTS.items()}
 # Robots take turns from task to task.
 every_task = pytest.mark.parametrize(
     ("domain", "task"),
-    tiers(
-        arc_suite.ALL_TASKS,
-        check=lambda domain, task: turn(domain, JOINTS, list(TASKS).index(task)),
-    ),
+    tiers(arc_suite.ALL_TASKS, check=lambda domain, task: turn(domain, JOINTS, list(TASKS).index(task))),
 )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.testing import assert_array_equal
+from refusals import refused
 from tiers import tiers, turn
 
 import arc_suite
@@ -183,9 +184,8 @@ def test_settings_check_themselves(task_name):
         ({"arena": "bump"}, own or f"unknown arena 'bump'; did you mean 'bumps'? (there are: {', '.join(ARENAS)})"),
         ({"time_limit": 0}, "time_limit: expected a number above 0, at most 1e+06, got 0"),
     ):
-        with pytest.raises(ValueError) as error:
+        with refused(message, begins=True):
             arc_suite.load("tick", task_name, settings)
-        assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 class Careless(Walk):
@@ -229,9 +229,8 @@ def test_blocks_other_than_declared_are_impossible(monkeypatch, task, observed):
     monkeypatch.setitem(TASKS, task.name, task)
     declared = "{'posture': 17, 'velocities': 18, 'contact_forces': 126, 'gait_clock': 2}"
     environment = arc_suite.load("leaper", task.name)
-    with pytest.raises(ValueError) as error:
+    with refused(f"observation of {task.name}: expected blocks {declared}, got {observed}"):
         environment.reset()
-    assert str(error.value) == f"observation of {task.name}: expected blocks {declared}, got {observed}"
 
 
 class Kicked(Walk):

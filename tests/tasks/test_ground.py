@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
@@ -137,9 +138,8 @@ def test_height_is_that_of_rays_on_treads_in_metres():
     ],
 )
 def test_sizes_that_do_not_fit_are_one_line(task, settings, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         arc_suite.load("tick", task, settings)
-    assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 def test_a_lane_is_the_same_beside_others():
@@ -410,9 +410,8 @@ def test_ground_has_no_scale():
     ],
 )
 def test_settings_that_do_not_fit_are_one_line(settings, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         arc_suite.load("tick", "rough", settings)
-    assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 def test_models_of_environments_and_of_one_environment_are_one():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
+from refusals import refused
 from tiers import tiers, turn
 
 import arc_suite
@@ -109,19 +110,14 @@ def test_a_gait_whose_sides_move_together_keeps_its_clock():
     [
         ("queen", {"phase_offsets": (0, 1, 2, 3, 4, 5)}, "phase_offsets: expected legs across from each other to move"),
         ("queen", {"default_angles": np.arange(18) / 9}, "default_angles: expected mirrored poses left and right"),
-        (
-            "queen",
-            {"actuator_failure": 1},
-            "actuator_failure: expected a leg that is drawn, or one on the midline",
-        ),
+        ("queen", {"actuator_failure": 1}, "actuator_failure: expected a leg that is drawn, or one on the midline"),
         (generator.random_body(0), {}, "phase_offsets: expected legs across from each other"),
         (generator.random_body(10), {}, "random_10 is not left-right symmetric: no leg is across from leg1"),
     ],
 )
 def test_what_has_no_mirror_image_is_refused_in_one_line(body, settings, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         arc_suite.symmetry(body, "walk", settings)
-    assert str(error.value).startswith(message) and "\n" not in str(error.value)
 
 
 def test_a_task_that_does_not_tell_is_refused():
@@ -132,8 +128,7 @@ def test_a_task_that_does_not_tell_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("robot", "task"),
-    tiers(arc_suite.ALL_TASKS, lambda robot, task: turn(robot, ROBOTS, list(TASKS).index(task))),
+    ("robot", "task"), tiers(arc_suite.ALL_TASKS, lambda robot, task: turn(robot, ROBOTS, list(TASKS).index(task)))
 )
 def test_every_task_has_a_mirror(robot, task):
     observation, _ = arc_suite.symmetry(robot, task)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import twins
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from tiers import never, tiers, turn
 
 import arc_suite
@@ -455,10 +456,7 @@ def test_live_commands_reach_the_task():
         ({"delay": 1.5}, "delay: expected an integer from 0 to 100, got 1.5"),
         ({"delay": (3, 1)}, "delay: expected an integer from 3 to 100, got 1"),
         ({"actions": "velocity"}, "unknown actions 'velocity' (there are: torque, position)"),
-        (
-            {"exclude_blocks": ("scan",)},
-            "unknown block 'scan' (there are: posture, velocities, contact_forces,",
-        ),
+        ({"exclude_blocks": ("scan",)}, "unknown block 'scan' (there are: posture, velocities, contact_forces,"),
         ({"exclude_blocks": 3}, "exclude_blocks: expected names of blocks, got 3"),
         (
             {"exclude_blocks": ["posture", "velocities", "contact_forces", "gait_clock"]},
@@ -468,9 +466,8 @@ def test_live_commands_reach_the_task():
 )
 def test_a_wrong_modifier_is_one_line(settings, message):
     for use in (arc_suite.load, lambda body, task, kwargs: VectorEnv(body, task, 2, task_kwargs=kwargs)):
-        with pytest.raises(ValueError) as error:
+        with refused(message, begins=True):
             use("tick", "walk", settings)
-        assert str(error.value).startswith(message) and "\n" not in str(error.value)
     with pytest.raises(ValueError, match="^unknown modifier 'kick'; did you mean 'kicks'"):
         modified_task.modified(prepared("tick", "walk")[0], {"kick": 1.0})
 

@@ -7,6 +7,7 @@ import gymnasium
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 
 import arc_suite
 from arc_suite import rotations
@@ -127,10 +128,7 @@ def test_motion_is_measured_in_the_frame_of_the_heading():
     step = task.scene.control_timestep * task.context.units
     moved = place[:2] + forward * step[0] * np.array([np.cos(heading), np.sin(heading)])
     moved += left * step[1] * np.array([-np.sin(heading), np.cos(heading)])
-    readings = readings._replace(
-        frame_position=np.array([*moved, 0.2]),
-        heading=np.float64(heading + turn * step[2]),
-    )
+    readings = readings._replace(frame_position=np.array([*moved, 0.2]), heading=np.float64(heading + turn * step[2]))
     leak = task.parameters.gait_frequency * task.scene.control_timestep
     assert_allclose(task.after(memory, readings).core.motion, leak * np.array([forward, left, turn]), atol=1e-12)
 
@@ -240,9 +238,8 @@ def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, mess
     envs = gymnasium.make_vec(f"arc_suite/tick-{task}-v0", num_envs=2)
     envs.reset(seed=0)
     for environment in (single, envs):
-        with pytest.raises(ValueError) as error:
+        with refused(message):
             environment.command(name, value)
-        assert str(error.value) == message
     envs.close()
 
 

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -178,6 +179,5 @@ def test_a_term_from_outside_counts_and_costs_are_limited_after_it():
     ids=["a weight without a term", "a term without a weight"],
 )
 def test_terms_and_weights_that_do_not_pair_are_one_line(weights, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         reward_of_a_step(type("Unpaired", (Longer,), {"weights": weights}))
-    assert str(error.value).startswith(message) and "\n" not in str(error.value)

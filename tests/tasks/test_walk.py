@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dm_env import StepType
 from numpy.testing import assert_array_equal
+from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -221,14 +222,8 @@ def test_overriding_one_weight_keeps_the_others():
             "weights['forward']: expected a number from -1e+06 to 1e+06, got nan",
         ),
         (("queen", "walk", {"weights": [1.0]}), "weights: expected a mapping of names to numbers, got [1.0]"),
-        (
-            ("queen", "walk", {"duty_factor": 1.5}),
-            "duty_factor: expected a number from 0 to 1, got 1.5",
-        ),
-        (
-            ("queen", "walk", {"velocity_band": 0}),
-            "velocity_band: expected a number above 0, at most 1e+06, got 0",
-        ),
+        (("queen", "walk", {"duty_factor": 1.5}), "duty_factor: expected a number from 0 to 1, got 1.5"),
+        (("queen", "walk", {"velocity_band": 0}), "velocity_band: expected a number above 0, at most 1e+06, got 0"),
         (
             ("queen", "walk", {"target_velocity": 1e308}),
             "target_velocity: expected a number from -1e+06 to 1e+06, got 1e+308",
@@ -241,10 +236,7 @@ def test_overriding_one_weight_keeps_the_others():
         (("queen", "walk", {"healthy_range": (1.0, 0.2)}), "healthy_range: expected low < high, got (1.0, 0.2)"),
         (("queen", "walk", {"base_noise": -1}), "base_noise: expected a number from 0 to 1e+06, got -1"),
         (("queen", "walk", {"angular_velocity_noise": "big"}), "angular_velocity_noise: expected a number from 0 to 1"),
-        (
-            ("queen", "walk", {"time_limit": "long"}),
-            "time_limit: expected a number above 0, at most 1e+06, got 'long'",
-        ),
+        (("queen", "walk", {"time_limit": "long"}), "time_limit: expected a number above 0, at most 1e+06, got 'long'"),
         (
             ("queen", "walk", None, {"flat_observations": True}),
             "unknown environment setting 'flat_observations'; did you mean 'flat_observation'?",
@@ -252,7 +244,5 @@ def test_overriding_one_weight_keeps_the_others():
     ],
 )
 def test_bad_names_and_values_are_one_line_errors(arguments, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         arc_suite.load(*arguments)
-    assert str(error.value).startswith(message)
-    assert "\n" not in str(error.value)
