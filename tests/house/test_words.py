@@ -13,60 +13,23 @@ from arc_suite.cli import main
 
 ROOT = pathlib.Path(__file__).parents[2]
 
-# A word that no identifier has as one of its parts, and the field's word in its place.
+# Words that no identifier has as one of its parts, and the field's word in their place.
+_FORBIDDEN = """
+row: environment, hyperparameters or run; rows: num_envs, mask, indices or runs; numbers: parameters or
+hyperparameters; averaging: tau; trace: gae_lambda; random_steps: start_steps; updates_per_step: utd_ratio; capacity:
+buffer_size; first_divergence: initial_desired_kl; last_divergence: final_desired_kl; first_std: initial_std;
+last_std: final_std; mirrored: symmetry_augmentation; normalising: normalize_until; warm_up: value_warm_up; imitation:
+dagger; cloning: bc; fenced: protected; beside: symmetric_sampling; stage: run context; felt: proprioception;
+following: feedback; manner, tread, balance, plan, build: parameters; look, looks: visuals; mark: debug marker; marks:
+debug markers; motions: root motion; footfalls, events: foot contact events; shot, take: recording; lift: spawn
+clearance; carry: stream state; limp: actuator_failure; without: exclude_blocks; wanted: desired; wrong_feet: contact
+schedule errors; way: displacement or path; tent: triangular; census: survey; obedience: command tracking; judge:
+evaluator; grade, graded: quality; figures: metrics; fitted: settings_for; scene: prepare
+"""
 FORBIDDEN = {
-    "row": "environment, hyperparameters or run",
-    "rows": "num_envs, mask, indices or runs",
-    "numbers": "parameters or hyperparameters",
-    "averaging": "tau",
-    "trace": "gae_lambda",
-    "random_steps": "start_steps",
-    "updates_per_step": "utd_ratio",
-    "capacity": "buffer_size",
-    "first_divergence": "initial_desired_kl",
-    "last_divergence": "final_desired_kl",
-    "first_std": "initial_std",
-    "last_std": "final_std",
-    "mirrored": "symmetry_augmentation",
-    "normalising": "normalize_until",
-    "warm_up": "value_warm_up",
-    "imitation": "dagger",
-    "cloning": "bc",
-    "fenced": "protected",
-    "beside": "symmetric_sampling",
-    "stage": "run context",
-    "felt": "proprioception",
-    "following": "feedback",
-    "manner": "parameters",
-    "tread": "parameters",
-    "balance": "parameters",
-    "plan": "parameters",
-    "build": "parameters",
-    "look": "visuals",
-    "looks": "visuals",
-    "mark": "debug marker",
-    "marks": "debug markers",
-    "motions": "root motion",
-    "footfalls": "foot contact events",
-    "events": "foot contact events",
-    "shot": "recording",
-    "take": "recording",
-    "lift": "spawn clearance",
-    "carry": "stream state",
-    "limp": "actuator_failure",
-    "without": "exclude_blocks",
-    "wanted": "desired",
-    "wrong_feet": "contact schedule errors",
-    "way": "displacement or path",
-    "tent": "triangular",
-    "census": "survey",
-    "obedience": "command tracking",
-    "judge": "evaluator",
-    "grade": "quality",
-    "graded": "quality",
-    "figures": "metrics",
-    "fitted": "settings_for",
-    "scene": "prepare",
+    word: better
+    for words, better in (line.split(": ") for line in " ".join(_FORBIDDEN.split()).split("; "))
+    for word in words.split(", ")
 }
 
 # Where a word has its ordinary meaning: a pattern of the whole place, such as `arc_suite.models.builder build`.
