@@ -205,7 +205,7 @@ check-agents check-agents-release: VENV := .venv-jax
 check-agents check-agents-release: EXTRAS := dev,learn
 check-agents check-agents-release: PACKAGES := onnxruntime rliable 'pandas<3'
 check-agents check-agents-release: RUN = $(PYTEST) $(PARALLEL) -m "$(MARKS)" tests/learning/agents \
-	tests/learning/studies/test_study.py tests/learning/cli/test_train.py tests/policies/test_onnx_file.py \
+	tests/learning/studies/test_study.py tests/learning/cli/test_train.py tests/learning/test_onnx_file.py \
 	tests/evaluation/test_statistics.py
 check-agents: MARKS := not long and not release
 check-agents-release: MARKS := long or release

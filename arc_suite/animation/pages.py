@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from arc_suite import versions
+from arc_suite.animation.colours import of_terms
 from arc_suite.animation.parts import parts as described
 from arc_suite.animation.scenery import scenery
 from arc_suite.models.outline import outline
-from arc_suite.style.colours import of_terms
 from arc_suite.style.tracks import Track
 
 _DIGITS = 6  # behind the point: micrometres, microradians

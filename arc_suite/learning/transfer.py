@@ -16,10 +16,10 @@ from tqdm import tqdm
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.evaluation import protocol
 from arc_suite.learning import survey
+from arc_suite.learning.teachers import Teacher
 from arc_suite.models.families import varied_body
 from arc_suite.policies import Policy, Script
 from arc_suite.policies.network import Network
-from arc_suite.policies.teachers import Teacher
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import Body
 

@@ -8,7 +8,7 @@ import glfw
 import mujoco
 import numpy as np
 
-from arc_suite.envs.episodes import LONGEST, Episodes
+from arc_suite.animation.episodes import LONGEST, Episodes
 from arc_suite.envs.window import Window
 from arc_suite.simulation.pictures import Decorated
 

@@ -131,7 +131,7 @@ def pictures(robots: list[str]):
         yield lambda robot, tracks: None
         return
     try:
-        from arc_suite.style.plots import OF_GAIT, PICTURES
+        from arc_suite.animation.style_plots import OF_GAIT, PICTURES
     except ImportError as error:
         raise versions.MissingExtra("pictures need matplotlib", "animate", error) from None
     with contextlib.ExitStack() as stack:

@@ -4,8 +4,8 @@ import numpy as np
 import viser
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 
+from arc_suite.animation.colours import BLUE, INK, PALE, VERMILION, of_terms
 from arc_suite.animation.studio.history import History
-from arc_suite.style.colours import BLUE, INK, PALE, VERMILION, of_terms
 
 _HEIGHT = 190  # of a chart, pixels
 _CELL, _LINE, _MARGIN = 4, 14, 74  # of the picture of contacts: width of a step, height of a foot, of names, pixels

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.envs.episodes import Episodes
+from arc_suite.animation.episodes import Episodes
 from arc_suite.tasks.clock import desired_contacts
 
 _STEPS = 120  # control steps that are kept

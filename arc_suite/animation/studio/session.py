@@ -9,10 +9,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from arc_suite.animation.episodes import LONGEST, Episodes
 from arc_suite.animation.studio.creature import Creature, opened
 from arc_suite.animation.studio.history import History
 from arc_suite.animation.studio.sketch import Sketch
-from arc_suite.envs.episodes import LONGEST, Episodes
 
 STATES = 30.0  # a second, at most, that are shown
 _WINDOW = 2.0  # s, over which the pace is a mean

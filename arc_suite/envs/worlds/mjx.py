@@ -5,7 +5,7 @@
     state = jax.jit(jax.vmap(env.step))(state, actions)     # state.data .obs .reward .done .metrics .info
 
 Functions take one world and are pure. The wrappers and trainers of MuJoCo Playground take an `Env` as it is.
-Needs the extra `mjx`; docs/gpu.md tells more.
+Needs the extra `gpu`; docs/gpu.md tells more.
 """
 
 import dataclasses

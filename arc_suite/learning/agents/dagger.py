@@ -20,7 +20,7 @@ from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import DAgger
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normaliser import Moments, Normalizer
-from arc_suite.policies.teachers import Teacher
+from arc_suite.learning.teachers import Teacher
 
 CHUNK = 20  # updates of one call
 

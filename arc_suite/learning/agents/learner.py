@@ -13,7 +13,7 @@ from arc_suite import checks
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.policies import teachers
+from arc_suite.learning import teachers
 from arc_suite.policies.graph import Graph
 
 _SEEDS = 100_000  # of the environments of a run; those below are left for evaluation

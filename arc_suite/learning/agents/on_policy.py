@@ -105,7 +105,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
     if hp.simulation == "mujoco":
         return collecting.Environments(hp, context)
-    from arc_suite.learning.agents import worlds  # needs the extra `mjx`
+    from arc_suite.learning.agents import worlds  # needs the extra `gpu`
 
     return worlds.Worlds(hp, context)
 

@@ -27,7 +27,8 @@ from arc_suite.cli.flags import (
     only_setup,
     policy_name,
 )
-from arc_suite.policies import onnx_file, universal
+from arc_suite.learning import onnx_file
+from arc_suite.policies import universal
 
 FLAGS = flags.FLAGS
 define_vecnormalize()

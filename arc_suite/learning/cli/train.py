@@ -26,10 +26,11 @@ from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body,
 from arc_suite.cli.program import progress, use_one_thread
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
+from arc_suite.learning import onnx_file
 from arc_suite.learning.agents import algorithms, configuration, run_folder
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
-from arc_suite.policies import network, onnx_file
+from arc_suite.policies import network
 
 FLAGS = flags.FLAGS
 define_body()

@@ -1,4 +1,4 @@
-"""A picture of a search's course. Needs matplotlib (extra `plot`)."""
+"""A picture of a search's course. Needs matplotlib (extra `learn`)."""
 
 from collections.abc import Sequence
 

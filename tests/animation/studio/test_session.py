@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from arc_suite import style
+from arc_suite.animation.episodes import Episodes
 from arc_suite.animation.studio import session as sessions
 from arc_suite.animation.studio import texts
 from arc_suite.animation.studio.creature import load, opened, policy
 from arc_suite.animation.studio.history import History
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import Sketch
-from arc_suite.envs.episodes import Episodes
 from arc_suite.style import metrics
 
 

@@ -48,4 +48,4 @@ def test_without_viser_a_line_says_how_to_get_it(tmp_path):
     done = programs.without("viser", tmp_path, "studio", "--robot=tick")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
     assert done.stderr.startswith("arc-suite studio: the studio needs viser: pip install")
-    assert programs.install("studio") in done.stderr
+    assert programs.install("animate") in done.stderr

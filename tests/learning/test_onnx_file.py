@@ -5,18 +5,19 @@ import json
 import legs
 import numpy as np
 import pytest
-from test_network import made
+from networks import made
 
 import arc_suite
 from arc_suite import policies
 from arc_suite.envs.setup import Setup
+from arc_suite.learning import onnx_file
 from arc_suite.models.sizing import SUBSTEPS
-from arc_suite.policies import alone, onnx_file, universal
+from arc_suite.policies import alone, universal
 from arc_suite.policies.graph import INPUT
 from arc_suite.policies.universal import Universal
 from arc_suite.robots import generator
 
-pytest.importorskip("onnx", reason="of the extra onnx: make check-agents")
+pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
 runtime = pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
 
 

@@ -1,7 +1,7 @@
 """Pictures of tracks: foot contacts against the schedule, reward by term, speed against target, path of the torso.
 
 Each function takes labelled tracks, one or two to compare, and returns a figure. Needs matplotlib
-(extra `plot`).
+(extra `animate`).
 """
 
 import functools
@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from arc_suite.animation.colours import BLUE, FAINT, INK, PALE, VERMILION, of_terms
 from arc_suite.style import metrics
-from arc_suite.style.colours import BLUE, FAINT, INK, PALE, VERMILION, of_terms
 from arc_suite.style.tracks import Track
 
 _LOOK: dict[Any, Any] = {
