@@ -343,12 +343,9 @@ def test_bodies_of_too_many_legs_or_joints_are_one_line():
     expected = "expected at most 12 legs of at most 4 joints, got"
     with pytest.raises(ValueError, match=f"^many: {expected} 64 legs of up to 3$"):
         make([ROBOTS["tick"].replace(name="many", legs=legs)])
-    links = tuple(
-        link.replace(name=f"{link.name}{i}", joint=link.joint.replace(name=f"j{i}"))
-        for i in range(5)
-        for link in leg.links[:1]
-    )
-    long = leg.replace(links=links)
+    link = leg.links[0]
+    links = (link.replace(name=f"upper{i}", joint=link.joint.replace(name=f"j{i}")) for i in range(5))
+    long = leg.replace(links=tuple(links))
     with pytest.raises(ValueError, match=f"^long: {expected} 6 legs of up to 5$"):
         make([ROBOTS["tick"].replace(name="long", legs=(long, *ROBOTS["tick"].legs[1:]))])
 
@@ -361,12 +358,10 @@ def test_calls_at_the_wrong_time_and_wrong_actions():
     before = env.snapshot()
     wrong = np.zeros((2, 12, 4))
     wrong[1, 2, 3] = np.nan
-    for action, message in (
-        (np.zeros((2, 48)), r"action: expected shape \(2, 12, 4\), got \(2, 48\)"),
-        (wrong, r"action\[1, 2, 3\]: expected a number from -1 to 1, got nan"),
-    ):
-        with pytest.raises(ValueError, match=f"^{message}$"):
-            env.step(action)
+    with refused("action: expected shape (2, 12, 4), got (2, 48)"):
+        env.step(np.zeros((2, 48)))
+    with refused("action[1, 2, 3]: expected a number from -1 to 1, got nan"):
+        env.step(wrong)
     assert same(env.snapshot(), before)
     env.close()
     env.close()

@@ -117,28 +117,6 @@ def test_make_vec_gives_the_native_environment():
     assert (info["reward_forward"].shape, info["progress_speed"].dtype) == ((4,), np.float64)
 
 
-def test_episode_that_ends_starts_anew_in_the_next_step_or_at_once():
-    limits = {"task_kwargs": {"time_limit": 0.1}}
-    following, at_once = make(**limits), make(autoreset_mode="SameStep", **limits)
-    actions = random_actions(following, 4)
-    for envs in (following, at_once):
-        envs.reset(seed=0)
-        envs.step(actions[0])
-    last, *_, truncated, info = following.step(actions[1])
-    assert truncated.all() and "final_obs" not in info
-    first, reward, _, truncated, info = following.step(actions[2])
-    assert_array_equal(reward, 0.0)
-    assert not truncated.any() and info == {}
-    observation, reward, _, truncated, info = at_once.step(actions[1])
-    assert truncated.all() and (reward != 0.0).all()
-    assert_array_equal(observation, first)
-    assert_array_equal(np.stack(info["final_obs"]), last)
-    assert_array_equal(info["_final_obs"], [True] * 3)
-    assert (info["final_info"]["reward_gait_bonus"] > 0.0).all()
-    assert "reward_gait_bonus" not in info
-    assert same(at_once.step(actions[3])[0], following.step(actions[3])[0])
-
-
 def test_episode_that_ends_rests_until_its_reset_where_there_is_no_autoreset():
     """Gymnasium's contract of the mode: who asks for no autoreset resets those that have ended."""
     singles = make_singles("tick", 4, "Disabled", task_kwargs=SHORT["tick"])
@@ -218,13 +196,9 @@ def test_calls_and_attributes_of_environments_are_those_of_single_environments()
     batch.set_attr("note", "all")
     assert batch.note == "all"
     for values in ([1, 2, 3], [1, 1]):
-        with pytest.raises(
-            ValueError, match="^set_attr 'note': environments share it; expected one value for all, got"
-        ):
+        with refused("set_attr 'note': environments share it; expected one value for all, got", begins=True):
             batch.set_attr("note", values)
-    with pytest.raises(
-        ValueError, match="^call 'step': environments do it together; call step of the environment itself$"
-    ):
+    with refused("call 'step': environments do it together; call step of the environment itself"):
         batch.call("step", np.zeros((3, 18)))
     with pytest.raises(AttributeError, match="nothing"):
         batch.get_attr("nothing")
@@ -279,18 +253,16 @@ def test_reset_mask_restarts_some_environments(mode):
     assert same(batch.reset(seed=0), singles.reset(seed=0))
     steps = random_actions(batch, 60)
     for count, actions in enumerate(steps):
-        assert same(batch.step(actions), singles.step(actions))
+        result, expected = batch.step(actions), singles.step(actions)
         if count % 7 == 0:
             seed = 100 * count if count % 2 else None
             mask = np.arange(4) % 2 == count % 2
             before = batch.reset(seed=seed, options={"reset_mask": mask})
             assert same(before, singles.reset(seed=seed, options={"reset_mask": mask.copy()}))
-    with pytest.raises(ValueError, match="^reset_mask: expected 4 booleans, at least one of them true, got array"):
-        batch.reset(options={"reset_mask": np.ones(3, bool)})
-    with pytest.raises(ValueError, match="^reset_mask"):
-        batch.reset(options={"reset_mask": np.zeros(4, bool)})
-    with pytest.raises(ValueError, match="^reset_mask"):
-        batch.reset(options={"reset_mask": np.arange(4)})
+        assert same(result, expected)  # also after the reset: what is handed out stays
+    for wrong in (np.ones(3, bool), np.zeros(4, bool), np.arange(4)):
+        with pytest.raises(ValueError, match="^reset_mask: expected 4 booleans, at least one of them true, got array"):
+            batch.reset(options={"reset_mask": wrong})
     with pytest.raises(ResetNeeded, match="^cannot reset some environments: reset all of them first$"):
         make(num_envs=4).reset(options={"reset_mask": mask})
 
@@ -428,11 +400,8 @@ def test_calls_at_the_wrong_time():
 def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
     ignored = []
     monkeypatch.setattr(sys, "unraisablehook", ignored.append)
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         make(**kwargs)
-    assert str(error.value).startswith(message)
-    assert "\n" not in str(error.value)
-    del error
     gc.collect()
     assert not ignored  # where Gymnasium closes what was never made
 
@@ -450,15 +419,3 @@ def test_bad_seeds_are_one_line_errors(seed, message):
     batch = make()
     with refused(message):
         batch.reset(seed=seed)
-
-
-def test_reset_of_some_environments_leaves_handed_out_observations_alone():
-    environments = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=3)
-    environments.reset(seed=0)
-    observations, *_ = environments.step(np.zeros((3, 18), np.float32))
-    kept = observations.copy()
-    again, _ = environments.reset(options={"reset_mask": np.array([False, True, False])})
-    np.testing.assert_array_equal(observations, kept)
-    np.testing.assert_array_equal(again[[0, 2]], kept[[0, 2]])
-    assert not np.array_equal(again[1], kept[1])
-    environments.close()

@@ -1,11 +1,8 @@
 """Families of bodies: a sound body for every seed, of all kinds, by name wherever a body is asked for."""
 
 import hashlib
-import os
-import pathlib
-import subprocess
-import sys
 
+import interpreters
 import numpy as np
 import programs
 import pytest
@@ -19,8 +16,6 @@ from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import SpecError
 from arc_suite.robots.spec_files import body_from_json, body_to_json, load_body
-
-ROOT = pathlib.Path(__file__).parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -155,10 +150,7 @@ def test_families_of_other_packages_come_before_modules_of_their_names(tmp_path)
         "    except ValueError as error:\n"
         "        print(error)\n"
     )
-    environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
-    done = subprocess.run([sys.executable, "-c", code], env=environ, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.splitlines() == [
+    assert interpreters.printed(code, folder=tmp_path) == [
         "crab_3 5",
         "family 'crab' is already registered",
         "family 'cr ab': expected a name of letters, digits and underscores",

@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 import pytest
-from refusals import refused
 from tiers import tiers
 
 import arc_suite
@@ -132,27 +131,6 @@ def test_pictures_follow_the_simulation_and_leave_it_alone():
     np.testing.assert_array_equal(environment.physics.data.qpos, other.physics.data.qpos)
     np.testing.assert_array_equal(environment.physics.data.cfrc_ext, other.physics.data.cfrc_ext)
     environment.close()
-
-
-@pytest.mark.slow
-def test_the_largest_picture_is_at_least_1280_by_960():
-    environment = arc_suite.load("leaper", "walk")
-    environment.reset()
-    assert environment.physics.render(960, 1280, "portrait").shape == (960, 1280, 3)
-    environment.close()
-
-
-@pytest.mark.parametrize(
-    ("camera", "message"),
-    [
-        ("portait", "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)"),
-        (3, "no camera 3: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
-    ],
-)
-def test_unknown_cameras_are_named(camera, message):
-    environment = arc_suite.load("tick", "walk")
-    with refused(message):
-        environment.physics.render(60, 80, camera)
 
 
 def glow_in(physics) -> np.ndarray:

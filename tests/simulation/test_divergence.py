@@ -6,6 +6,7 @@ import pytest
 from dm_control.rl.control import PhysicsError
 from gymnasium.utils.env_checker import data_equivalence
 from numpy.testing import assert_array_equal
+from refusals import refused
 
 import arc_suite
 
@@ -27,10 +28,6 @@ def load(robot="queen", random=0, **task_kwargs):
     return arc_suite.load(robot, "walk", {"random": random, **task_kwargs}, {"flat_observation": True})
 
 
-def make(robot="queen", num_envs=64, **kwargs):
-    return gymnasium.make_vec(f"arc_suite/{robot}-walk-v0", num_envs=num_envs, num_threads=2, **kwargs)
-
-
 def random_actions(shape, count, seed=0):
     return np.random.RandomState(seed).uniform(-0.5, 0.5, (count, *shape)).astype(np.float32)
 
@@ -43,11 +40,9 @@ def test_single_environment_raises_one_line_with_robot_time_and_cause(accident):
     for action in actions[:3]:
         environment.step(action), twin.step(action)
     spoil(environment.physics.data.ptr, accident)
-    with pytest.raises(PhysicsError) as error:
+    message = f"queen: physics diverged in the step from 0.150 s: {ACCIDENTS[accident][-1]}"
+    with refused(message, PhysicsError, begins=True):
         environment.step(actions[3])
-    cause = ACCIDENTS[accident][-1]
-    assert str(error.value).startswith(f"queen: physics diverged in the step from 0.150 s: {cause}")
-    assert "\n" not in str(error.value)
     # A reset makes good.
     assert_array_equal(environment.reset().observation["observations"], twin.reset().observation["observations"])
     one, two = environment.step(actions[4]), twin.step(actions[4])
@@ -88,49 +83,9 @@ def test_unknown_answer_to_divergence():
         load(on_divergence="stop")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
-@every_accident
-def test_one_environment_of_64_diverges_and_the_others_notice_nothing(accident, mode):
-    batch, calm = (make(autoreset_mode=mode) for _ in range(2))
-    which, others = 17, np.arange(64) != 17
-    first = batch.reset(seed=0)[0]
-    assert_array_equal(calm.reset(seed=0)[0], first)
-    begun = load(random=which)
-    begun.reset()
-    restarted = begun.reset().observation["observations"].astype(np.float32)
-    for count, actions in enumerate(random_actions(batch.action_space.shape, 6)):
-        if count == 2:
-            spoil(batch.batch.data, accident, (which,))
-        observation, reward, terminated, truncated, info = batch.step(actions)
-        expected = calm.step(actions)
-        for value, wanted in zip((observation, reward, terminated, truncated), expected, strict=False):
-            assert_array_equal(value[others], wanted[others])
-        terms = [name for name in expected[4] if name.startswith("reward_")]
-        assert len(terms) == 10
-        for name in terms:
-            assert_array_equal(info[name][others], expected[4][name][others])
-        assert np.isfinite(observation).all()
-        assert not truncated.any()
-        assert_array_equal(np.flatnonzero(terminated), [which] if count == 2 else [])
-        if count == 2:
-            assert reward[which] == 0.0
-            told = info["final_info"] if mode == "SameStep" else info
-            assert_array_equal(np.flatnonzero(told["diverged"]), [which])
-            assert_array_equal(np.flatnonzero(told["_diverged"]), [which])
-            assert all(told[name][which] == 0.0 and told[f"_{name}"][which] for name in terms)
-            if mode == "SameStep":
-                assert np.isfinite(info["final_obs"][which]).all()
-        else:
-            assert "diverged" not in info and "final_info" not in info
-        if count == (2 if mode == "SameStep" else 3):
-            assert_array_equal(observation[which], restarted)
-            assert ("_reward_forward" in info) and not info["_reward_forward"][which]
-
-
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_environments_diverge_as_single_environments_that_terminate_do(mode):
-    batch = make("leaper", 3, autoreset_mode=mode)
+    batch = gymnasium.make_vec("arc_suite/leaper-walk-v0", num_envs=3, num_threads=2, autoreset_mode=mode)
     singles = gymnasium.make_vec(
         "arc_suite/leaper-walk-v0",
         num_envs=3,
@@ -146,6 +101,10 @@ def test_environments_diverge_as_single_environments_that_terminate_do(mode):
             spoil(batch.batch.data, accident, (which,))
             spoil(singles.envs[which].unwrapped.physics.data.ptr, accident)
         result, expected = batch.step(actions), singles.step(actions)
-        assert data_equivalence(result[:4], expected[:4], exact=True)
-        ends += result[2].sum()
+        told = result[4].get("final_info", result[4])
+        diverged, given = (told.pop(name, np.zeros(3, bool)) for name in ("diverged", "_diverged"))
+        assert_array_equal(diverged, given)
+        assert_array_equal(np.flatnonzero(diverged), [which] if count % 3 == 0 and result[2][which] else [])
+        assert data_equivalence(result, expected, exact=True)
+        ends += diverged.sum()
     assert ends >= 10

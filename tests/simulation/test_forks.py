@@ -4,24 +4,20 @@ import copy
 import gc
 import multiprocessing
 import os
-import pathlib
-import subprocess
-import sys
 
 import gymnasium
+import interpreters
 import numpy as np
 import pytest
 from tiers import never, tiers
 
 import arc_suite
 
-ROOT = pathlib.Path(__file__).parents[2]
 WATCHDOG = 120  # s; ends what hangs, and nothing that is only slow
 
-# Makes something, forks, and reports from the child, which then ends as any script does. The child's
-# seconds are appended to the file that the variable TIMES names.
+# Makes something, forks, and reports from the child, which then ends as any script does.
 SCRIPT = """
-import gc, os, signal, sys, time
+import gc, os, signal, sys
 import gymnasium
 import numpy as np
 import arc_suite
@@ -54,7 +50,6 @@ if os.fork():
         thing.physics.render(32, 32)
     sys.exit(status != 0)
 signal.alarm(60)  # ends a child that hangs
-start = time.perf_counter()
 if then == "use":
     for name, use in uses.items():
         try:
@@ -64,7 +59,6 @@ if then == "use":
 elif then == "collect":
     del thing, uses
     gc.collect()
-print(f"{time.perf_counter() - start:.3f} s", file=open(os.environ["TIMES"], "a"))
 print("ends")
 """
 MADE_BEFORE = (
@@ -83,6 +77,7 @@ REFUSED = {
     + ["close returned None"],
 }
 
+SLOW, LONG = pytest.mark.slow, pytest.mark.long
 forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 
 
@@ -90,11 +85,8 @@ forks = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not
 @pytest.mark.parametrize("then", tiers(["use", "collect", "exit"], never, lambda then: then == "use"))
 @pytest.mark.parametrize("what", REFUSED)
 def test_what_was_made_before_a_fork(what, then):
-    environ = {"TIMES": os.devnull} | os.environ | {"PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-c", SCRIPT, what, then]
-    done = subprocess.run(command, env=environ, capture_output=True, text=True, timeout=WATCHDOG)
     expected = [*(REFUSED[what] if then == "use" else []), "ends"]
-    assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, expected, "")
+    assert interpreters.printed(SCRIPT, what, then) == expected
 
 
 def rollout(seed, picture, sender=None):
@@ -123,8 +115,10 @@ def test_environments_made_in_the_child_work(method):
     assert child.exitcode == 0
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+@pytest.mark.parametrize(
+    "method",
+    [pytest.param(m, marks=SLOW if m == "spawn" else LONG) for m in multiprocessing.get_all_start_methods()],
+)
 def test_async_vector_environments_work(method):
     kwargs = {"vectorization_mode": "async", "vector_kwargs": {"context": method}}
     envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2, **kwargs)
@@ -149,9 +143,7 @@ def test_pictures_in_forked_children_of_a_process_that_made_none():
         "if child: sys.exit(int(picture.std() < 5))\n"
         "sys.exit(os.wait()[1])\n"
     )
-    environ = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, "-c", code], env=environ, capture_output=True, text=True, timeout=WATCHDOG)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert interpreters.printed(code) == []
 
 
 @forks

@@ -2,10 +2,9 @@
 
 import concurrent.futures
 import os
-import pathlib
-import subprocess
 import sys
 
+import interpreters
 import numpy as np
 import pytest
 
@@ -13,8 +12,6 @@ import arc_suite
 from arc_suite import models
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import opengl
-
-ROOT = pathlib.Path(__file__).parents[2]
 
 # Imports, simulates and renders, and prints what came of it.
 SCRIPT = """
@@ -49,77 +46,59 @@ REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJO
 NO_DRIVER = {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}  # libEGL loads, and finds nobody to draw
 
 
-def run(tmp_path, sitecustomize="", **variables):
-    """Runs the script without a display; returns its lines, none of them on standard error."""
-    unset = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL")
-    environ = {name: value for name, value in os.environ.items() if name not in unset}
-    (tmp_path / "sitecustomize.py").write_text(sitecustomize)
-    environ |= {"PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])} | variables
-    done = subprocess.run(
-        [sys.executable, "-W", "default::UserWarning", "-c", SCRIPT], env=environ, capture_output=True, text=True
-    )
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    return done.stdout.splitlines()
+UNSET = dict.fromkeys(("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL"))
+EGL = {"MUJOCO_GL": "egl"}
+PICTURE = "picture (48, 64, 3)"
 
 
-def lines(outcome, changed=None):
-    return [f"changed {changed or {}} removed []", "reward True", outcome, outcome, "reward True"]
+def outcome(folder, sitecustomize="", **variables):
+    """Return what importing changes, and what comes of pictures, by the script without a display."""
+    (folder / "sitecustomize.py").write_text(sitecustomize)
+    variables = UNSET | variables
+    changed, *lines = interpreters.printed(SCRIPT, folder=folder, options=("-W", "default::UserWarning"), **variables)
+    assert lines == ["reward True", lines[1], lines[1], "reward True"]
+    return changed, lines[1]
 
 
-@pytest.mark.slow
-def test_chooses_egl_where_there_is_no_display(tmp_path):
-    assert run(tmp_path) == lines("picture (48, 64, 3)", {"MUJOCO_GL": "egl"})
+def told(changed):
+    return f"changed {changed} removed []"
 
 
 @pytest.mark.slow
-def test_users_choice_stays(tmp_path):
-    assert run(tmp_path, MUJOCO_GL="egl") == lines("picture (48, 64, 3)")
-
-
-@pytest.mark.slow
-def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
-    assert run(tmp_path, DISPLAY=":9876") == lines("picture (48, 64, 3)")
+@pytest.mark.parametrize(
+    ("variables", "changed"), [({}, EGL), (EGL, {}), ({"DISPLAY": ":9876"}, {})], ids=["no display", "chosen", "dead"]
+)
+def test_egl_where_no_display_answers_and_the_users_choice_stays(tmp_path, variables, changed):
+    assert outcome(tmp_path, **variables) == (told(changed), PICTURE)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("sitecustomize", "variables", "changed", "message"),
     [
-        (WITHOUT_LIBRARIES, {}, None, f"cannot render: the OpenGL library is missing; {REMEDY}"),
+        (WITHOUT_LIBRARIES, {}, {}, f"cannot render: the OpenGL library is missing; {REMEDY}"),
         (
-            WITHOUT_LIBRARIES,
-            {"MUJOCO_GL": "egl"},
-            None,
+            *(WITHOUT_LIBRARIES, EGL, {}),
             f"cannot render with MUJOCO_GL=egl: the OpenGL library is missing; {REMEDY}",
         ),
         (
-            "",
-            NO_DRIVER,
-            {"MUJOCO_GL": "egl"},
+            *("", NO_DRIVER, EGL),
             f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
         ),
         (
-            "",
-            NO_DRIVER | {"MUJOCO_GL": "egl"},
-            None,
+            *("", NO_DRIVER | EGL, {}),
             f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
         ),
         (
-            "",
-            {"MUJOCO_GL": "disable"},
-            None,
+            *("", {"MUJOCO_GL": "disable"}, {}),
             "cannot render: MUJOCO_GL=disable turns it off; unset it, or set MUJOCO_GL=egl",
         ),
         (
-            "",
-            {"MUJOCO_GL": "glfw"},
-            None,
+            *("", {"MUJOCO_GL": "glfw"}, {}),
             "cannot render with MUJOCO_GL=glfw: (65550) b'X11: The DISPLAY environment variable is missing'; " + REMEDY,
         ),
         (
-            "",
-            {"MUJOCO_GL": "vulkan"},
-            None,
+            *("", {"MUJOCO_GL": "vulkan"}, {}),
             "cannot render with MUJOCO_GL=vulkan: Environment variable MUJOCO_GL must be one of ['', '0', '1', "
             "'disable', 'disabled', 'egl', 'enable', 'enabled', 'false', 'glfw', 'off', 'on', 'osmesa', 'true']: "
             f"got 'vulkan'; {REMEDY}",
@@ -128,24 +107,16 @@ def test_display_that_does_not_answer_gives_way_to_egl(tmp_path):
     ids=["no library", "egl, no library", "no driver", "egl, no driver", "disable", "glfw, no display", "unknown"],
 )
 def test_simulates_without_opengl_and_says_what_is_missing(tmp_path, sitecustomize, variables, changed, message):
-    assert run(tmp_path, sitecustomize, **variables) == lines(f"RenderingUnavailable: {message}", changed)
-
-
-def script(code, *arguments):
-    """Runs code in a process of its own; returns its lines, none of them on standard error."""
-    environ = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run([sys.executable, "-c", code, *arguments], env=environ, capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, ""), done.stderr
-    return done.stdout.splitlines()
+    assert outcome(tmp_path, sitecustomize, **variables) == (told(changed), f"RenderingUnavailable: {message}")
 
 
 @pytest.mark.slow
 def test_where_there_is_no_egl_the_remedy_is_another(monkeypatch):
     monkeypatch.setattr(sys, "platform", "win32")
     monkeypatch.setenv("MUJOCO_GL", "egl")
-    with pytest.raises(opengl.RenderingUnavailable) as error, opengl._errors():
+    remedy = ": egl; unset MUJOCO_GL: pictures are drawn by GLFW here$"
+    with pytest.raises(opengl.RenderingUnavailable, match=remedy), opengl._errors():
         raise RuntimeError("invalid value for environment variable MUJOCO_GL: egl")
-    assert str(error.value).endswith(": egl; unset MUJOCO_GL: pictures are drawn by GLFW here")
 
 
 def test_import_opens_nothing():
@@ -156,7 +127,7 @@ def test_import_opens_nothing():
         "environment.physics.render(32, 32)\n"
         "print(threading.active_count(), sys.modules['dm_control._render'].BACKEND)"
     )
-    assert script(code) == ["1 ['dm_control._render']", "2 egl"]
+    assert interpreters.printed(code) == ["1 ['dm_control._render']", "2 egl"]
 
 
 # Draws next to other users of OpenGL in this process, and leaves all of it to the interpreter's exit.
@@ -180,9 +151,8 @@ print(dm_control._render.BACKEND)
 
 @pytest.mark.long
 @pytest.mark.parametrize("order", ["first", "last"])
-def test_dm_control_draws_in_the_same_process(order, monkeypatch):
-    monkeypatch.setenv("MUJOCO_GL", "egl")
-    assert script(NEIGHBOURS, order) == ["egl"]
+def test_dm_control_draws_in_the_same_process(order):
+    assert interpreters.printed(NEIGHBOURS, order, **EGL) == ["egl"]
 
 
 @pytest.mark.long
@@ -239,7 +209,7 @@ def test_pictures_while_the_interpreter_ends_are_refused():
         "atexit.register(late)\n"
         "environment.physics.render(32, 32)\n"
     )
-    assert script(code) == ["cannot render: the interpreter is ending, and has closed OpenGL"]
+    assert interpreters.printed(code) == ["cannot render: the interpreter is ending, and has closed OpenGL"]
 
 
 def test_mistakes_in_drawing_arrive_as_they_are():
@@ -271,5 +241,5 @@ for count in map(int, sys.argv[1:]):
 @pytest.mark.long
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="reads memory from Linux's /proc")
 def test_a_further_rendering_environment_costs_little():
-    few, many = (float(line.split()[1]) for line in script(MANY, "2", "12"))
+    few, many = (float(line.split()[1]) for line in interpreters.printed(MANY, "2", "12"))
     assert (many - few) / 10 < 8
