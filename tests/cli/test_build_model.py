@@ -31,17 +31,14 @@ def compiled(body, decorated=False):
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
     path = tmp_path / "robot.xml"
-    done = build_model("--robot", robot, "--output", path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert programs.passed(build_model("--robot", robot, "--output", path)) == ""
     reloaded = mujoco.MjModel.from_xml_path(str(path))
     assert saved(reloaded) == saved(compiled(ROBOTS[robot]))
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.xml"]
 
 
 def test_visuals_dump_and_reload_bit_for_bit():
-    done = build_model("--robot", "queen", "--visuals")
-    assert (done.returncode, done.stderr) == (0, "")
-    reloaded = mujoco.MjModel.from_xml_string(done.stdout)
+    reloaded = mujoco.MjModel.from_xml_string(programs.passed(build_model("--robot", "queen", "--visuals")))
     assert saved(reloaded) == saved(compiled(ROBOTS["queen"], decorated=True))
     assert saved(reloaded) != saved(compiled(ROBOTS["queen"]))
 
@@ -65,15 +62,12 @@ def test_bit_equality_would_notice_one_bit():
     ],
 )
 def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):
-    done = build_model(*arguments)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert saved(mujoco.MjModel.from_xml_string(done.stdout)) == saved(compiled(body))
+    assert saved(mujoco.MjModel.from_xml_string(programs.passed(build_model(*arguments)))) == saved(compiled(body))
 
 
 def test_json_is_the_spec_and_builds_the_same_model(tmp_path):
     path = tmp_path / "body.json"
-    done = build_model("--seed=5", "--json", "--output", path)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert programs.passed(build_model("--seed=5", "--json", "--output", path)) == ""
     assert load_body(path) == generator.random_body(5)
     assert build_model("--spec", path).stdout == build_model("--seed=5").stdout
     assert build_model("--spec", path, "--json").stdout == path.read_text()
@@ -81,20 +75,12 @@ def test_json_is_the_spec_and_builds_the_same_model(tmp_path):
 
 def test_summary_prints_the_figures_alone():
     lines = build_model("--robot=queen", "--summary").stdout.splitlines()
-    figures = dict(line.split("  ", 1) for line in lines)
-    assert {name: value.strip() for name, value in figures.items()} == {
-        "name": "queen",
-        "legs": "6",
-        "links": "3 actuated a leg",
-        "degrees of freedom": "18 + 6",
-        "mass": "12.09 kg",
-        "standing height": "0.75 m",
-        "observation": "199 numbers",
-        "stability margin": "0.67 m (0.89 of the height)",
-        "control step": "0.05 s",
-        "target velocity": "0.5 m/s",
-        "gait": "1.5 Hz, duty factor 0.60",
-    }
+    figures = "; ".join(": ".join(part.strip() for part in line.split("  ", 1)) for line in lines)
+    assert figures == (
+        "name: queen; legs: 6; links: 3 actuated a leg; degrees of freedom: 18 + 6; mass: 12.09 kg; "
+        "standing height: 0.75 m; observation: 199 numbers; stability margin: 0.67 m (0.89 of the height); "
+        "control step: 0.05 s; target velocity: 0.5 m/s; gait: 1.5 Hz, duty factor 0.60"
+    )
 
 
 def test_three_links_are_the_default():
@@ -126,8 +112,7 @@ def test_three_links_are_the_default():
     ],
 )
 def test_bad_arguments_are_one_line(arguments, message):
-    done = build_model(*arguments)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite build_model: {message}\n")
+    programs.refused(build_model(*arguments), f"arc-suite build_model: {message}\n")
 
 
 def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
@@ -137,9 +122,8 @@ def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
         (tmp_path / "file" / "a.xml", "not a directory"),
         (tmp_path, "is a directory"),
     ):
-        done = build_model("--robot=tick", "--output", path)
-        assert (done.returncode, done.stdout) == (1, "")
-        assert done.stderr == f"arc-suite build_model: cannot write {path}: {reason}\n"
+        line = f"arc-suite build_model: cannot write {path}: {reason}\n"
+        programs.refused(build_model("--robot=tick", "--output", path), line)
     assert [entry.name for entry in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_text() == "kept"
 
@@ -147,11 +131,10 @@ def test_a_path_that_cannot_be_written_is_one_line_and_leaves_no_file(tmp_path):
 @pytest.mark.slow
 def test_a_task_brings_its_ground(tmp_path):
     path = tmp_path / "stairs.xml"
-    result = build_model("--robot=tick", "--task=stairs", "--set=difficulty=1", f"--output={path}")
-    assert (result.returncode, result.stderr) == (0, "")
+    programs.passed(build_model("--robot=tick", "--task=stairs", "--set=difficulty=1", f"--output={path}"))
     model = mujoco.MjModel.from_xml_path(str(path))
     assert {"floor_0", "floor_10"} <= {model.geom(index).name for index in range(model.ngeom)}
     rough = mujoco.MjModel.from_xml_string(build_model("--robot=tick", "--task=rough").stdout)
     assert rough.nhfield == 1 and rough.hfield_data.max() == 1.0
     wrong = build_model("--robot=tick", "--task=stairs", "--set=difficulty=2")
-    assert wrong.stderr == "arc-suite build_model: difficulty: expected a number from 0 to 1, got 2\n"
+    programs.refused(wrong, "arc-suite build_model: difficulty: expected a number from 0 to 1, got 2\n")

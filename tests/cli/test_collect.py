@@ -27,16 +27,12 @@ def run(*arguments):
 
 @pytest.mark.slow
 def test_collect_continue_verify_and_minaris_own_command(root):
-    done = run("--steps=20", "--episodes=3")
-    assert done.returncode == 0, done.stderr
+    out = programs.passed(run("--steps=20", "--episodes=3"))  # no progress bar where nobody watches
     total = sum(summary["return"] for summary in data.open(ID).summaries()) / 3
-    assert done.stdout.startswith(f"{ID}: 3 episodes, return {total:.1f} +- ")
-    assert done.stdout.endswith(f", length 20.0, 0.1 MB in {root / ID}\n")
-    assert done.stderr == ""  # no progress bar where nobody watches
-    again = run("--steps=20", "--episodes=3")
-    assert (again.returncode, again.stdout, again.stderr) == (0, f"{ID}: has its 3 episodes already\n", "")
-    verified = run(f"--verify={ID}")
-    assert (verified.returncode, verified.stdout) == (0, f"{ID}: 3 episodes replayed, all bit-equal\n")
+    assert out.startswith(f"{ID}: 3 episodes, return {total:.1f} +- ")
+    assert out.endswith(f", length 20.0, 0.1 MB in {root / ID}\n")
+    assert programs.passed(run("--steps=20", "--episodes=3")) == f"{ID}: has its 3 episodes already\n"
+    assert programs.passed(run(f"--verify={ID}")) == f"{ID}: 3 episodes replayed, all bit-equal\n"
     minari = pathlib.Path(sys.executable).with_name("minari")
     listed = subprocess.run([minari, "list", "local"], capture_output=True, text=True, check=True).stdout
     assert ID in listed
@@ -47,12 +43,11 @@ def test_collect_continue_verify_and_minaris_own_command(root):
 @pytest.mark.slow
 def test_a_mixture_with_noise_on_a_body_made_to_order():
     done = run("--legs=4", "--links=2", "--preset=slow,fast", "--noise=0.1", "--steps=10", "--episodes=2")
-    assert done.returncode == 0, done.stderr
     dataset_id = "arc_suite/walker_4x2/walk/cpg-slow-fast-noise0_1-10steps-v0"
-    assert done.stdout.startswith(f"{dataset_id}: 2 episodes")
+    assert programs.passed(done).startswith(f"{dataset_id}: 2 episodes")
     assert len(data.open(dataset_id).settings.setup.body.legs) == 4
-    done = run(f"--verify={dataset_id}", "--robot=queen")
-    assert done.stderr == f"arc-suite collect: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
+    line = f"arc-suite collect: dataset {dataset_id!r} holds episodes of walker_4x2, and not of queen\n"
+    programs.refused(run(f"--verify={dataset_id}", "--robot=queen"), line)
 
 
 @pytest.mark.parametrize(
@@ -65,10 +60,7 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
             "characters at least before the last '/', and a version at the end alone, such as "
             "'arc_suite/queen/mine-v0'",
         ),
-        (
-            ["--episodes=4294967296"],
-            "flag --episodes=4294967296: expected an integer in the range [1, 100000]",
-        ),
+        (["--episodes=4294967296"], "flag --episodes=4294967296: expected an integer in the range [1, 100000]"),
         (
             ["--id="],
             "dataset id '': expected names of letters, digits, '-' and '_' with '/' between, two characters at least "
@@ -79,36 +71,17 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
-    done = programs.arc_suite("collect", "--episodes=2", *arguments)
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", f"arc-suite collect: {message}\n")
+    programs.refused(run("--episodes=2", *arguments), f"arc-suite collect: {message}\n")
     assert not root.exists()
 
 
-def test_an_unknown_dataset_is_one_line_with_the_nearest(root):
-    done = run("--verify=arc_suite/queen/cpg-v0")
-    assert done.returncode == 1
-    assert done.stderr == f"arc-suite collect: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
+def test_an_unknown_dataset_is_one_line_with_the_folder(root):
+    line = f"arc-suite collect: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
+    programs.refused(run("--verify=arc_suite/queen/cpg-v0"), line)
 
 
 @pytest.mark.slow
 def test_without_minari_a_line_says_what_to_install(tmp_path):
     done = programs.without("minari", tmp_path, "collect", "--episodes=1")
     line = f"arc-suite collect: datasets need Minari: {programs.install('data')} (No module named 'minari')\n"
-    assert (done.returncode, done.stdout, done.stderr) == (1, "", line)
-
-
-def test_help_shows_examples_and_the_flags():
-    done = run("--help")
-    assert "arc-suite collect --robot queen --policy cpg --preset medium --episodes 1000\n" in done.stdout
-    for flag in (
-        "--preset",
-        "--noise",
-        "--episodes",
-        "--steps",
-        "--seed",
-        "--id",
-        "--[no]overwrite",
-        "--verify",
-        "--num_envs",
-    ):
-        assert flag in done.stdout
+    programs.refused(done, line)
