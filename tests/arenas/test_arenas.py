@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+import rays
 from numpy.testing import assert_allclose, assert_array_equal
 from tiers import tiers, turn
 
@@ -27,16 +28,8 @@ def test_height_is_that_of_rays(arena, body):
     body = BODIES[body]
     place, height = ARENAS[arena](body), body.torso.standing_height
     model = mujoco.MjModel.from_xml_string(models.assemble(body, place).to_xml_string())
-    data = mujoco.MjData(model)
-    data.qpos[2] = 1e3 * height  # out of the way
-    mujoco.mj_forward(model, data)
     points = np.random.RandomState(0).uniform((-3.9, -19.0), 19.0, (1000, 2)) * height
-    hit, above = np.zeros(1, np.int32), 50.0 * height
-    for x, y in points:
-        start, down = np.array([x, y, above]), np.array([0.0, 0.0, -1.0])
-        distance = mujoco.mj_ray(model, data, start, down, None, 1, -1, hit)
-        assert model.geom(hit[0]).name.startswith("floor")
-        assert abs(above - distance - place.height(np.float64(x), np.float64(y))) < 1e-6 * height
+    rays.assert_heights(place, model, points, height)
     heights = place.height(points[:, 0], points[:, 1])
     assert_array_equal(heights, [place.height(x, y) for x, y in points])
     assert place.is_level == (np.ptp(heights) == 0.0)
@@ -68,11 +61,17 @@ def test_bodies_start_with_every_foot_clear_of_the_ground(task, body):
     assert np.isclose(nearest, 0.01, atol=1e-9).any(), "some starts are noisy enough to be lifted"
 
 
-def test_what_is_read_is_over_the_ground():
-    environment = arc_suite.load("queen", "walk", {"arena": "bumps", "random": 0})
-    timestep, policy = environment.reset(), Demonstrator("queen", "tuned")
-    for _ in range(200):
+def walked(robot, steps):
+    """An environment with bumps after steps of a demonstrator, and the last time step."""
+    environment = arc_suite.load(robot, "walk", {"arena": "bumps", "random": 0})
+    timestep, policy = environment.reset(), Demonstrator(robot, "tuned")
+    for _ in range(steps):
         timestep = environment.step(policy(timestep))
+    return environment, timestep
+
+
+def test_what_is_read_is_over_the_ground():
+    environment, timestep = walked("queen", 200)
     x, y, z = environment.physics.position()[:3]
     arena, data = environment.task.definition.scene.arena, environment.physics.data.ptr
     under = arena.height(np.float64(x), np.float64(y))
@@ -84,25 +83,14 @@ def test_what_is_read_is_over_the_ground():
 
 
 def test_bodies_walk_on_bumps():
-    environment = arc_suite.load("tick", "walk", {"arena": "bumps", "random": 0})
-    timestep, policy = environment.reset(), Demonstrator("tick", "tuned")
-    for _ in range(300):
-        timestep = environment.step(policy(timestep))
+    environment, timestep = walked("tick", 300)
     assert not timestep.last()
     assert environment.task.progress["speed"] > 0.15
 
 
-def test_flat_is_the_default_and_costs_no_bits():
-    default, named = (
-        arc_suite.load("leaper", "walk", {"random": 0}),
-        arc_suite.load("leaper", "walk", {"random": 0, "arena": "flat"}),
-    )
-    assert default.task.definition.scene.arena is FLAT is named.task.definition.scene.arena
-    default.reset(), named.reset()
-    for _ in range(10):
-        a, b = default.step(np.zeros(12)), named.step(np.zeros(12))
-        for name, block in a.observation.items():
-            assert_array_equal(block, b.observation[name])
+def test_flat_is_the_default():
+    for settings in ({}, {"arena": "flat"}):
+        assert arc_suite.load("leaper", "walk", settings).task.definition.scene.arena is FLAT
 
 
 def test_an_arena_is_a_value():

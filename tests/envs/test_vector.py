@@ -16,7 +16,7 @@ from numpy.testing import assert_array_equal
 from refusals import refused
 from tiers import never, tiers, turn
 
-import arc_suite  # noqa: F401 (registers)
+import arc_suite
 from arc_suite.envs.vector import VectorEnv
 
 ROBOTS = ("queen", "bastion", "tick", "leaper")
@@ -366,6 +366,17 @@ def test_render_shows_each_environment_and_disturbs_nothing():
     depth = make("queen", 2, render_mode="depth_array", **size)
     depth.reset(seed=4)
     assert depth.render()[0].shape == (60, 80) and depth.render()[0].dtype == np.float32
+
+
+@pytest.mark.parametrize(("task", "steps"), [("steer", 3), ("navigate", 3), ("limp", 42)])
+def test_pictures_show_arrows_pillars_and_dark_legs_as_those_of_single_environments(task, steps):
+    envs = VectorEnv("tick", task, 2, render_mode="rgb_array", height=60, width=80)
+    single = arc_suite.load("tick", task)
+    envs.reset(seed=3), single.reset(seed=4)
+    for _ in range(steps):
+        envs.step(np.zeros((2, 18))), single.step(np.zeros(18))
+    assert_array_equal(envs.render([1])[0], single.physics.render(60, 80))
+    envs.close()
 
 
 def test_calls_at_the_wrong_time():

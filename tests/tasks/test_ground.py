@@ -3,15 +3,17 @@
 import hashlib
 
 import gymnasium
-import mujoco
 import numpy as np
 import pytest
+import rays
+import twins
+from episodes import opened
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite import policies, rotations
+from arc_suite import rotations
 from arc_suite.arenas import terrain
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.prepare import prepared
@@ -27,48 +29,32 @@ KINDS = ("rough", "slopes", "stairs", "gaps")
 every_kind = pytest.mark.parametrize("kind", tiers(KINDS, lambda kind: kind == "gaps"))
 
 
-def opened(kind="stairs", robot="tick", **settings):
-    environment = arc_suite.load(robot, kind, {"random": 0, **settings})
-    environment.reset(seed=0)
-    return environment, environment.task.definition, environment.task.memory
-
-
 def inner(memory):
     """The memory of the task itself, without modifiers."""
     return getattr(memory, "task", memory)
 
 
 @pytest.mark.parametrize(
-    ("name", "curriculum", "kinds", "lanes"),
+    ("name", "settings", "kinds", "lanes"),
     [
-        ("course", False, KINDS, 8),
-        pytest.param("course", True, KINDS, 4 * LEVELS, marks=pytest.mark.slow),
-        pytest.param("stairs", False, ["stairs"], 4, marks=pytest.mark.slow),
+        ("course", {}, KINDS, 8),
+        ("stairs", {"rise": 0.07, "width": 0.23}, ["stairs"], 4),
+        pytest.param("course", {"curriculum": True}, KINDS, 4 * LEVELS, marks=pytest.mark.slow),
+        pytest.param("stairs", {}, ["stairs"], 4, marks=pytest.mark.slow),
     ],
 )
-def test_height_is_that_of_rays_in_every_lane(name, curriculum, kinds, lanes):
-    task, model = prepared("leaper", name, {"curriculum": curriculum})
-    arena, data = task.scene.arena, mujoco.MjData(model)
+def test_height_is_that_of_rays_in_every_lane(name, settings, kinds, lanes):
+    task, model = prepared("leaper", name, settings)
+    arena, random = task.scene.arena, np.random.RandomState(0)
     assert len(arena.lanes) == lanes
     assert {kind for kind, _ in arena.lanes} == set(kinds)
-    data.qpos[2] = 1e3
-    mujoco.mj_forward(model, data)
-    random, hit = np.random.RandomState(0), np.zeros(1, np.int32)
     for lane in range(lanes):
-        for x, y in random.uniform((-terrain.BACK, -11.9), (arena.length, 11.9), (40, 2)) * arena.unit:
-            y += arena.start(lane)
-            start = np.array([x, y, 50.0])
-            distance = mujoco.mj_ray(model, data, start, np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
-            assert abs(50.0 - distance - arena.height(np.float64(x), np.float64(y))) < 1e-6 * arena.unit, (lane, x, y)
+        places = random.uniform((-terrain.BACK, -11.9), (arena.length, 11.9), (40, 2)) * arena.unit
+        rays.assert_heights(arena, model, places + (0.0, arena.start(lane)), arena.unit)
 
 
 # Of (robot's heights at fixed places) by kind of ground: the ground of a setting never changes.
-DIGESTS = {
-    "rough": "eeeaf6d1f9e96022",
-    "slopes": "20855599f2a44947",
-    "stairs": "65c2f128f3489abc",
-    "gaps": "c388d4d14fd3b8b6",
-}
+DIGESTS = ("eeeaf6d1f9e96022", "20855599f2a44947", "65c2f128f3489abc", "c388d4d14fd3b8b6")
 
 
 @every_kind
@@ -78,7 +64,7 @@ def test_ground_is_a_function_of_its_settings(kind):
         x, y = np.random.RandomState(0).uniform((-3.0, -80.0), (40.0, 80.0), (500, 2)).T
         return np.round(arena.height(x * arena.unit, y * arena.unit), 9)
 
-    assert hashlib.sha256(heights().tobytes()).hexdigest()[:16] == DIGESTS[kind]
+    assert hashlib.sha256(heights().tobytes()).hexdigest()[:16] == DIGESTS[KINDS.index(kind)]
     assert_array_equal(heights(), heights(terrain_seed=0, difficulty=2.0 / 3.0))
     assert not np.array_equal(heights(), heights(terrain_seed=1))
     assert abs(heights(difficulty=1.0)).max() > abs(heights(difficulty=0.3)).max() or kind == "gaps"
@@ -115,17 +101,6 @@ def test_a_rise_in_metres_equals_its_difficulty():
     )
 
 
-def test_height_is_that_of_rays_on_treads_in_metres():
-    task, model = prepared("leaper", "stairs", {"rise": 0.07, "width": 0.23})
-    arena, data, hit = task.scene.arena, mujoco.MjData(model), np.zeros(1, np.int32)
-    data.qpos[2] = 1e3
-    mujoco.mj_forward(model, data)
-    for x in np.random.RandomState(0).uniform(0.0, arena.length * arena.unit, 60):
-        start = np.array([x, arena.start(0), 50.0])
-        distance = mujoco.mj_ray(model, data, start, np.array([0.0, 0.0, -1.0]), None, 1, -1, hit)
-        assert abs(50.0 - distance - arena.height(np.float64(x), np.float64(start[1]))) < 1e-6 * arena.unit, x
-
-
 @pytest.mark.parametrize(
     ("task", "settings", "message"),
     [
@@ -135,9 +110,15 @@ def test_height_is_that_of_rays_on_treads_in_metres():
         ("slopes", {"slope": "steep"}, "slope: expected a number from 0 to 1.2, got 'steep'"),
         ("stairs", {"width": 0.01}, "width: expected a finite number of at least 0.02"),
         ("course", {"rise": 0.1}, "unknown setting of course 'rise'"),
+        ("rough", {"difficulty": 1.5}, "difficulty: expected a number from 0 to 1, got 1.5"),
+        ("rough", {"dificulty": 0.5}, "unknown setting of rough 'dificulty'; did you mean 'difficulty'?"),
+        ("rough", {"timelimit": 3}, "unknown setting of rough 'timelimit'; did you mean 'time_limit'?"),
+        ("rough", {"curriculum": 1}, "curriculum: expected true or false, got 1"),
+        ("rough", {"level": 10}, "level: expected an integer from 0 to 9, got 10"),
+        ("rough", {"terrain_seed": -1}, "terrain_seed: expected an integer from 0"),
     ],
 )
-def test_sizes_that_do_not_fit_are_one_line(task, settings, message):
+def test_settings_that_do_not_fit_are_one_line(task, settings, message):
     with refused(message, begins=True):
         arc_suite.load("tick", task, settings)
 
@@ -165,6 +146,15 @@ def test_difficulty_0_is_level(kind):
     assert not arena.height(x, y).any()
 
 
+def walked(envs, preset, steps):
+    """Yield the rewards and infos of steps of a demonstrator."""
+    policy, observations = Demonstrator(envs, preset), envs.reset(seed=0)[0]
+    for _ in range(steps):
+        observations, rewards, *_, infos = envs.step(policy.act(envs.task.split(observations.astype(float))))
+        yield rewards, infos
+    envs.close()
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "bastion"))
 def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
@@ -174,14 +164,7 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
         envs = VectorEnv(
             ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0}
         )  # none is lifted
-        policy = policies.policy("cpg", robot, "tuned", num_envs=6)
-        observations, rewards, total = envs.reset(seed=0)[0], np.zeros(6), 0.0
-        policy.reset(range(6), range(6))
-        for _ in range(300):
-            observations, rewards, *_ = envs.step(policy.act(envs.task.split(observations.astype(float)), rewards))
-            total += rewards.mean()
-        envs.close()
-        returns.append(total)
+        returns.append(sum(rewards.mean() for rewards, _ in walked(envs, "tuned", 300)))
     # Bastion's speed sways more on a height field, which touches a foot in several points: 2.4 % once it walks.
     assert abs(returns[0] / returns[1] - 1.0) < (0.04 if robot == "bastion" else 0.01)
 
@@ -194,7 +177,7 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
     ),
 )
 def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
-    environment, task, _ = opened(name, "bastion")
+    environment, task, _ = opened("bastion", name)
     arena, radii = task.scene.arena, np.array([leg.foot.radius for leg in task.scene.body.legs])
     lanes = set()
     for _ in range(40):
@@ -230,7 +213,7 @@ def test_what_is_drawn_and_in_which_order():
 
 
 def test_the_scan_is_the_ground_about_the_torso():
-    environment, task, _ = opened("gaps", "queen", difficulty=1.0)
+    environment, task, _ = opened("queen", "gaps", difficulty=1.0)
     demonstrator, timestep = Demonstrator("queen", "steered"), environment.reset(seed=3)
     for _ in range(60):
         timestep = environment.step(demonstrator(timestep))
@@ -247,7 +230,7 @@ def test_the_scan_is_the_ground_about_the_torso():
 
 
 def test_the_command_leads_along_the_lane():
-    _, task, memory = opened()
+    _, task, memory = opened("tick", "stairs")
 
     def desired(heading, live=(np.nan,) * 3):
         own = memory.command._replace(live=np.array(live))
@@ -265,7 +248,7 @@ def test_the_command_leads_along_the_lane():
 
 
 def test_how_an_episode_ends():
-    environment, task, memory = opened()
+    environment, task, memory = opened("tick", "stairs")
     readings, unit = task.read(environment.physics.data.ptr), task.scene.arena.unit
 
     def ended(x, y):
@@ -288,7 +271,7 @@ def test_how_an_episode_ends():
 
 
 def test_distance_is_the_share_of_what_was_asked_for():
-    _, task, memory = opened(time_limit=10.0)
+    _, task, memory = opened("tick", "stairs", time_limit=10.0)
     step = task.context.units[0] * task.scene.control_timestep
     walked = memory._replace(
         core=memory.core._replace(steps=100), command=memory.command._replace(distance=50.0 * step)
@@ -349,29 +332,16 @@ def test_environments_of_a_curriculum_are_single_environments(name, threads):
     assert_array_equal(envs.reset(seed=10)[0][1], single.reset(seed=11)[0])
     random, levels, ended = np.random.RandomState(0), [], False
     for _ in range(80):
-        actions = random.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
-        observations, rewards, _, truncated, infos = envs.step(actions)
-        if ended:
-            (observation, _), ended = single.reset(), False
-        else:
-            observation, reward, _, ended, info = single.step(actions[1])
-            assert (rewards[1], truncated[1]) == (reward, ended)
-            assert {figure: infos[figure][1] for figure in info} == info
-            levels.append(info["progress_level"])
-        assert_array_equal(observations[1], observation)
+        ended = twins.step(envs, single, random.uniform(-1.0, 1.0, 12).astype(np.float32), ended)
+        levels.append(single.unwrapped.task.progress["level"])
     assert levels[0] == 4.0 and len(set(levels)) >= 3
     envs.close()
 
 
 @pytest.mark.long
 def test_a_curriculum_rises_for_who_walks():
-    settings = {"curriculum": True, "time_limit": 12.0}
-    environment, demonstrator, levels = (
-        arc_suite.load("tick", "stairs", settings),
-        Demonstrator("tick", "surefooted"),
-        [],
-    )
-    environment.reset(seed=0)
+    environment, *_ = opened("tick", "stairs", curriculum=True, time_limit=12.0)
+    demonstrator, levels = Demonstrator("tick", "surefooted"), []
     for _ in range(3):
         timestep = environment.reset()
         levels.append(environment.task.memory.ground.level)
@@ -386,32 +356,9 @@ def test_ground_has_no_scale():
     for scale in (0.075, 1.0, 10.0):
         body = generator.scaled(generator.generate(6, 3), scale)
         envs = VectorEnv(body, "rough", 6, task_kwargs={"terrain_seed": 3})
-        policy = policies.policy("cpg", body, "surefooted", num_envs=6)
-        observations, rewards = envs.reset(seed=0)[0], np.zeros(6)
-        policy.reset(range(6), range(6))
-        for _ in range(250):
-            actions = policy.act(envs.task.split(observations.astype(float)), rewards)
-            observations, rewards, *_, infos = envs.step(actions)
+        *_, (_, infos) = walked(envs, "surefooted", 250)
         distances.append(infos["progress_distance"].mean())
-        envs.close()
     assert np.ptp(distances) < 0.02 and min(distances) > 0.8
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"difficulty": 1.5}, "difficulty: expected a number from 0 to 1, got 1.5"),
-        ({"dificulty": 0.5}, "unknown setting of rough 'dificulty'; did you mean 'difficulty'?"),
-        ({"timelimit": 3}, "unknown setting of rough 'timelimit'; did you mean 'time_limit'?"),
-        ({"curriculum": 1}, "curriculum: expected true or false, got 1"),
-        ({"level": 10}, "level: expected an integer from 0 to 9, got 10"),
-        ({"terrain_seed": -1}, "terrain_seed: expected an integer from 0"),
-        ({"arena": "flat"}, "arena: task rough has a ground of its own, expected none"),
-    ],
-)
-def test_settings_that_do_not_fit_are_one_line(settings, message):
-    with refused(message, begins=True):
-        arc_suite.load("tick", "rough", settings)
 
 
 def test_models_of_environments_and_of_one_environment_are_one():
@@ -434,7 +381,7 @@ def test_a_stream_begins_at_the_level_of_its_settings():
 
 
 def test_roaming_follows_commands_from_the_middle_of_the_lane():
-    environment, task, memory = opened("roam")
+    environment, task, memory = opened("tick", "roam")
     task, memory = task.task, memory.task  # without its kicks
     middle = 0.5 * task.scene.arena.length * task.scene.arena.unit
     assert abs(environment.physics.data.qpos[0] - middle) < 0.1 * middle

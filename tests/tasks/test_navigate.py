@@ -1,12 +1,12 @@
 """Navigate: goals and pillars as they are drawn, seen, reached and hit."""
 
-import copy
 import math
 import types
 
 import mujoco
 import numpy as np
 import pytest
+from episodes import begun, opened
 from numpy.testing import assert_allclose, assert_array_equal
 from tiers import tiers
 
@@ -14,7 +14,6 @@ import arc_suite
 from arc_suite import rotations
 from arc_suite.arenas.pillars import COUNT, PITCH, RADIUS, SHIFT
 from arc_suite.cpg import Demonstrator
-from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import command, sensors
 from arc_suite.tasks.fitting import reach
@@ -94,9 +93,7 @@ def test_ranges_are_those_of_mujocos_rays(robot):
 
 
 def test_bearing_and_distance_of_the_goal():
-    environment = arc_suite.load("tick", "navigate", {"random": 0})
-    environment.reset()
-    task, memory = environment.task.definition, environment.task.memory
+    environment, task, memory = opened("tick", "navigate")
     unit = task.scene.arena.unit
 
     def observed(goal, place):
@@ -118,9 +115,7 @@ def moved(environment, place):
 
 
 def test_a_goal_that_is_reached_counts_and_gives_way_to_the_next():
-    environment = arc_suite.load("tick", "navigate", {"random": 0})
-    environment.reset()
-    task, memory = environment.task.definition, environment.task.memory
+    environment, task, memory = opened("tick", "navigate")
     readings, unit = task.read(environment.physics.data.ptr), task.scene.arena.unit
     goals, start = memory.command.goals, memory.core.place[:2]
     near = moved(environment, goals[0] + (0.0, 0.71 * unit))
@@ -139,9 +134,7 @@ def test_a_goal_that_is_reached_counts_and_gives_way_to_the_next():
 
 
 def test_at_the_end_of_the_chain_it_goes_back():
-    environment = arc_suite.load("tick", "navigate", {"random": 0})
-    environment.reset()
-    task, memory = environment.task.definition, environment.task.memory
+    environment, task, memory = opened("tick", "navigate")
     order = []
     place = memory.core.place
     for reached in range(35):
@@ -153,9 +146,7 @@ def test_at_the_end_of_the_chain_it_goes_back():
 
 
 def test_a_collision_is_counted_once_on_every_way():
-    environment = arc_suite.load("tick", "navigate", {"random": 0})
-    environment.reset()
-    task, memory = environment.task.definition, environment.task.memory
+    environment, task, memory = opened("tick", "navigate")
     readings = task.read(environment.physics.data.ptr)
     assert not readings.touches
     data = fields(environment)
@@ -189,37 +180,15 @@ def test_a_pillar_in_the_way_is_touched_and_stops_a_body():
     assert (progress["goals"], progress["collisions"]) == (0.0, 1.0)
 
 
-def test_environments_are_single_environments_and_carry_on_after_a_copy():
-    envs, single = VectorEnv("tick", "navigate", 3, 2), arc_suite.load("tick", "navigate")
-    demonstrator = Demonstrator("tick", "steered")
-    observations, timestep = envs.reset(seed=4)[0], single.reset(seed=5)
-    for step in range(60):
-        if step == 30:
-            envs = copy.deepcopy(envs)
-        actions = demonstrator.act(envs.task.split(observations))
-        observations, rewards, *_ = envs.step(actions)
-        timestep = single.step(actions[1])
-        assert_array_equal(observations[1], single.task.definition.vector(timestep.observation, np.float32))
-        assert rewards[1] == timestep.reward
-    envs.close()
-
-
 @pytest.mark.slow
 def test_pictures_show_the_goal_and_pillars():
-    envs = VectorEnv("tick", "navigate", 2, 1, render_mode="rgb_array", height=60, width=80)
-    single = arc_suite.load("tick", "navigate")
-    envs.reset(seed=4), single.reset(seed=5)
-    for _ in range(3):
-        envs.step(np.zeros(envs.action_space.shape)), single.step(np.zeros(18))
+    single, task, memory = opened("tick", "navigate")
     shown = single.physics.render(60, 80)
-    assert_array_equal(envs.render()[1], shown)
-    task, memory = single.task.definition, single.task.memory
     disc = task.markers(memory, task.read(single.physics.data.ptr))[-1]
     assert (disc.shape, disc.radius) == ("cylinder", 0.7 * task.context.reach)
     assert_array_equal(disc.start[:2], memory.command.goals[0])
     single.physics.data.mocap_pos[:, :2] += 100.0
     assert not np.array_equal(single.physics.render(60, 80), shown)
-    envs.close()
 
 
 @pytest.mark.long
@@ -242,10 +211,7 @@ def test_the_ring_in_a_mirror():
     assert_allclose(mirror(sensors.RAYS), sensors.RAYS * [[1.0], [-1.0]], atol=1e-15)
 
 
-def test_it_has_a_ground_of_its_own_and_no_stick():
-    with pytest.raises(ValueError, match="^arena: task navigate has a ground of its own, expected none$"):
-        arc_suite.load("tick", "navigate", {"arena": "flat"})
-    environment = arc_suite.load("tick", "navigate")
-    environment.reset()
+def test_it_has_no_stick():
+    environment = begun("tick", "navigate")
     with pytest.raises(ValueError, match="^command 'command': task navigate has no commands$"):
         environment.command("command", (1.0, 0.0, 0.0))

@@ -6,6 +6,7 @@ import types
 import gymnasium
 import numpy as np
 import pytest
+from episodes import begun, opened
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
 
@@ -37,9 +38,8 @@ def test_commands_are_within_their_ranges_and_one_in_ten_stops():
 
 
 def test_the_schedule_holds_each_command_and_begins_again():
-    environment = arc_suite.load("tick", "steer", {"random": 0})
-    environment.reset()
-    memory, task = environment.task.memory.command, environment.task.definition
+    _, task, memory = opened("tick", "steer")
+    memory = memory.command
     held = np.diff(memory.ends, prepend=0)
     assert held.min() >= 60 and held.max() <= 160
 
@@ -117,9 +117,7 @@ def test_the_command_is_observed_and_changes_on_schedule():
 
 
 def test_motion_is_measured_in_the_frame_of_the_heading():
-    environment = arc_suite.load("tick", "steer", {"random": 0, "base_noise": 0.0, "joint_noise": 0.0})
-    environment.reset()
-    task, memory = environment.task.definition, environment.task.memory
+    environment, task, memory = opened("tick", "steer", base_noise=0.0, joint_noise=0.0)
     heading = 2.0
     place = np.array([5.0, -3.0, heading])
     memory = memory._replace(core=memory.core._replace(place=place, motion=np.zeros(3)))
@@ -164,8 +162,7 @@ def test_progress_is_the_projection_of_the_motion_onto_the_command(wanted, motio
 
 
 def test_progress_is_paid_from_the_first_step_and_at_most_in_full():
-    environment = arc_suite.load("tick", "steer", {"random": 0})
-    environment.reset()
+    environment = begun("tick", "steer")
     environment.command("command", (0.6, 0.0, 0.4))
     task, memory = environment.task.definition, environment.task.memory
     readings = task.read(environment.physics.data.ptr)
@@ -180,8 +177,7 @@ def test_progress_is_paid_from_the_first_step_and_at_most_in_full():
 
 
 def test_a_live_command_takes_the_place_of_the_schedule_until_the_next_episode():
-    environment = arc_suite.load("leaper", "steer", {"random": 1, "time_limit": 1.0})
-    environment.reset()
+    environment = begun("leaper", "steer", random=1, time_limit=1.0)
     scheduled = commands(environment).copy()
     environment.command("command", (0.5, np.nan, -0.25))
     timestep = environment.step(np.zeros(12))
@@ -233,8 +229,7 @@ def test_live_commands_of_environments_add_up_between_two_steps():
     ],
 )
 def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, message):
-    single = arc_suite.load("tick", task)
-    single.reset()
+    single = begun("tick", task)
     envs = gymnasium.make_vec(f"arc_suite/tick-{task}-v0", num_envs=2)
     envs.reset(seed=0)
     for environment in (single, envs):
@@ -280,21 +275,15 @@ def test_at_a_stop_all_feet_are_to_stand_and_the_clock_rests():
 @pytest.mark.parametrize("robot", ["queen", "leaper"])
 def test_nothing_tells_where_the_body_heads(robot):
     """The same state, turned about the vertical: the same observation."""
-    environment = arc_suite.load(robot, "steer", {"random": 3})
-    environment.reset()
+    environment = begun(robot, "steer", random=3)
     for _ in range(10):
         environment.step(np.full(len(ROBOTS[robot].joint_names), 0.1))
     task, memory, turn = environment.task.definition, environment.task.memory, 1.234
     data = types.SimpleNamespace(**{name: getattr(environment.physics.data.ptr, name).copy() for name in task.reads})
     before = task.observe(memory, task.read(data))
     data.qpos[3:7] = rotations.turned(data.qpos[3:7], turn)
-    for array in (
-        data.qpos[None, :2],
-        data.qvel[None, :2],
-        data.xpos[:, :2],
-        data.cfrc_ext[:, :2],
-        data.cfrc_ext[:, 3:5],
-    ):
+    forces = data.cfrc_ext
+    for array in (data.qpos[None, :2], data.qvel[None, :2], data.xpos[:, :2], forces[:, :2], forces[:, 3:5]):
         array[:] = rotations.headed(array.copy(), -turn)
     assert np.abs(before["contact_forces"]).max() > 0.01
     for name, block in task.observe(memory, task.read(data)).items():
@@ -307,11 +296,8 @@ def test_the_same_shape_earns_the_same_at_any_size():
     returns = []
     for scale in (0.1, 1.0, 10.0):
         body = generator.scaled(generator.generate(6, 3), scale)
-        environment, policy = (
-            arc_suite.load(body, "steer", {"random": 1, "base_noise": 0.0}),
-            Demonstrator(body, "steered"),
-        )
-        timestep, total = environment.reset(), 0.0
+        environment = arc_suite.load(body, "steer", {"random": 1, "base_noise": 0.0})
+        policy, timestep, total = Demonstrator(body, "steered"), environment.reset(), 0.0
         for _ in range(200):
             timestep = environment.step(policy(timestep))
             total += timestep.reward
@@ -320,9 +306,7 @@ def test_the_same_shape_earns_the_same_at_any_size():
 
 
 def test_who_is_carried_by_the_torso_has_fallen():
-    environment = arc_suite.load("tick", "steer", {"random": 0})
-    environment.reset()
-    task = environment.task.definition
+    environment, task, _ = opened("tick", "steer")
     readings = task.read(environment.physics.data.ptr)
     for share, healthy in ((0.4, True), (0.6, False)):
         forces = np.zeros_like(readings.contact_forces)
@@ -343,8 +327,7 @@ def test_a_body_that_lies_on_its_torso_is_not_healthy():
 
 
 def test_pictures_show_the_command_as_arrows():
-    environment = arc_suite.load("queen", "steer", {"random": 0})
-    environment.reset()
+    environment = begun("queen", "steer")
     environment.command("command", (0.5, -0.25, 0.5))
     task, memory = environment.task.definition, environment.task.memory
     readings, heading, reach = task.read(environment.physics.data.ptr), memory.core.place[2], task.context.reach
@@ -363,10 +346,3 @@ def test_pictures_show_the_command_as_arrows():
     assert [mark.shape for mark in task.markers(environment.task.memory, readings)] == ["cylinder"]
     stopped = environment.physics.render(60, 80)
     assert not np.array_equal(shown, stopped)
-    envs = VectorEnv("queen", "steer", 2, render_mode="rgb_array", height=60, width=80)
-    single = arc_suite.load("queen", "steer")
-    envs.reset(seed=3), single.reset(seed=4)
-    for _ in range(3):
-        envs.step(np.zeros(envs.action_space.shape)), single.step(np.zeros(18))
-    assert_array_equal(envs.render([1])[0], single.physics.render(60, 80))
-    envs.close()

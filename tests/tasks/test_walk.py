@@ -5,73 +5,22 @@ import math
 import numpy as np
 import pytest
 from dm_env import StepType
+from episodes import begun
 from numpy.testing import assert_array_equal
 from refusals import refused
 from tiers import tiers
 
 import arc_suite
 from arc_suite import registry
-from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
-SIZES = {"queen": 199, "bastion": 151, "tick": 199, "leaper": 163}
 JOINTS = {"queen": 18, "bastion": 12, "tick": 18, "leaper": 12}
-every_robot = pytest.mark.parametrize("domain", tiers(SIZES, lambda domain: domain == "leaper"))
-
-
-def load(domain, random=0, **task_kwargs):
-    return arc_suite.load(domain, "walk", {"random": random, **task_kwargs})
-
-
-def flat(timestep):
-    return np.concatenate(list(timestep.observation.values()))
-
-
-def random_actions(environment, count, seed=0):
-    """Actions too weak for a robot to fall within a few dozen steps."""
-    return np.random.RandomState(seed).uniform(-0.3, 0.3, (count, *environment.action_spec().shape))
-
-
-def test_registry():
-    assert SIZES.keys() <= arc_suite.TASKS_BY_DOMAIN.keys() == ROBOTS.keys()
-    assert {(name, "walk") for name in SIZES} <= set(arc_suite.ALL_TASKS)
-
-
-@every_robot
-def test_blocks(domain):
-    n, parts = JOINTS[domain], (SIZES[domain] - 13 - 2 * JOINTS[domain]) // 6
-    assert load(domain).task.sizes == {
-        "posture": 5 + n,
-        "velocities": 6 + n,
-        "contact_forces": 6 * parts,
-        "gait_clock": 2,
-    }
-    assert parts == {"queen": 25, "bastion": 19, "tick": 25, "leaper": 21}[domain]
-
-
-@every_robot
-def test_observation_is_the_papers_vector(domain):
-    environment = load(domain)
-    data, n = environment.physics.data.ptr, JOINTS[domain]
-    environment.reset()
-    frequency = {"leaper": 1.2}.get(domain, 1.5)
-    phase = 0.0
-    for action in random_actions(environment, 30):
-        observation = flat(environment.step(action))
-        phase += 2 * math.pi * frequency * 0.05
-        assert observation[0] == data.qpos[2]
-        assert_array_equal(observation[1:5], data.qpos[3:7])
-        assert_array_equal(observation[5 : 5 + n], data.qpos[7:])
-        assert_array_equal(observation[5 + n : 11 + n], data.qvel[:6])
-        assert_array_equal(observation[11 + n : 11 + 2 * n], data.qvel[6:])
-        assert_array_equal(observation[11 + 2 * n : -2], data.cfrc_ext[1:].ravel().clip(-1, 1))
-        np.testing.assert_allclose(observation[-2:], [math.sin(phase), math.cos(phase)], atol=1e-12)
-    assert np.abs(observation[11 + 2 * n : -2]).max() > 0.1, "no contact was felt in 30 steps"
+every_robot = pytest.mark.parametrize("domain", tiers(JOINTS, lambda domain: domain == "leaper"))
 
 
 @every_robot
 def test_first_observation_has_the_clock_at_zero_and_contact_forces_filled(domain):
-    environment = load(domain, base_noise=0.0, joint_noise=0.0)
+    environment = begun(domain, base_noise=0.0, joint_noise=0.0)
     timestep = environment.reset()
     assert_array_equal(timestep.observation["gait_clock"], [0.0, 1.0])
     assert timestep.observation["posture"][0] == environment.task.body.torso.standing_height
@@ -83,7 +32,7 @@ def test_first_observation_has_the_clock_at_zero_and_contact_forces_filled(domai
 @every_robot
 def test_reset_noise(domain):
     base = {"queen": 0.02, "tick": 0.02, "bastion": 0.1, "leaper": 0.1}[domain]
-    environment = load(domain)
+    environment = begun(domain)
     height = environment.task.body.torso.standing_height
     positions, velocities = [], []
     for _ in range(400):
@@ -102,13 +51,13 @@ def test_reset_noise(domain):
 
 
 def test_fall_ends_the_episode_with_discount_0_and_the_time_limit_with_1():
-    environment = load("bastion", healthy_range=(0.4, 1.0))
+    environment = begun("bastion", healthy_range=(0.4, 1.0))
     timestep = environment.reset()
     while not timestep.last():
         timestep = environment.step(np.ones(12))
     assert timestep.discount == 0.0
     assert environment.physics.position()[2] < 0.4
-    environment = load("queen", time_limit=0.5)
+    environment = begun("queen", time_limit=0.5)
     timesteps = [environment.reset()] + [environment.step(np.zeros(18)) for _ in range(10)]
     assert [t.step_type for t in timesteps] == [StepType.FIRST] + [StepType.MID] * 9 + [StepType.LAST]
     assert timesteps[-1].discount == 1.0
@@ -117,49 +66,17 @@ def test_fall_ends_the_episode_with_discount_0_and_the_time_limit_with_1():
 
 @pytest.mark.parametrize("healthy_range", [(0.9, 1.2), (0.1, 0.6)])
 def test_both_ends_of_the_healthy_range_end_the_episode(healthy_range):
-    environment = load("queen", healthy_range=healthy_range)
-    environment.reset()
-    assert environment.step(np.zeros(18)).discount == 0.0
-
-
-OVERRIDES = {
-    "weights": {"forward": 3.0, "posture": -1.0},
-    "target_velocity": 0.1,
-    "velocity_band": 1.0,
-    "gait_frequency": 0.7,
-    "duty_factor": 0.3,
-    "phase_offsets": [0.1, 0.2, 0.3, 0.4],
-    "stance_threshold": 0.3,
-    "default_angles": 0.5,
-    "base_noise": 0.0,
-    "position_noise": 0.0,
-    "orientation_noise": 0.0,
-    "linear_velocity_noise": 0.0,
-    "angular_velocity_noise": 0.0,
-    "joint_noise": 0.0,
-    "joint_angle_noise": 0.0,
-    "joint_velocity_noise": 0.0,
-}
-
-
-@pytest.mark.parametrize("name", OVERRIDES)
-def test_every_number_can_be_overridden(name):
-    usual, changed = load("leaper"), load("leaper", **{name: OVERRIDES[name]})
-    starts = flat(usual.reset()), flat(changed.reset())
-    rewards = []
-    for environment in (usual, changed):
-        rewards.append([environment.step(action).reward for action in random_actions(environment, 10)])
-    assert rewards[0] != rewards[1]
-    assert np.array_equal(*starts) == ("noise" not in name)
+    assert begun("queen", healthy_range=healthy_range).step(np.zeros(18)).discount == 0.0
 
 
 def test_one_number_sets_all_noise_of_the_torso_and_one_all_of_the_joints():
-    published = load("leaper").task.settings.noise
-    assert published == (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
-    assert load("leaper", base_noise=0.3).task.settings.noise == (0.3, 0.3, 0.3, 0.3, 0.1, 0.1)
-    assert load("leaper", joint_noise=0.3).task.settings.noise == (0.1, 0.1, 0.1, 0.1, 0.3, 0.3)
-    both = load("leaper", orientation_noise=0.0, base_noise=0.3, joint_velocity_noise=0.2)
-    assert both.task.settings.noise == (0.3, 0.0, 0.3, 0.3, 0.1, 0.2)
+    def noise(**settings):
+        return arc_suite.load("leaper", "walk", settings).task.settings.noise
+
+    assert noise() == (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+    assert noise(base_noise=0.3) == (0.3, 0.3, 0.3, 0.3, 0.1, 0.1)
+    assert noise(joint_noise=0.3) == (0.1, 0.1, 0.1, 0.1, 0.3, 0.3)
+    assert noise(orientation_noise=0.0, base_noise=0.3, joint_velocity_noise=0.2) == (0.3, 0.0, 0.3, 0.3, 0.1, 0.2)
 
 
 def test_every_kind_of_noise_moves_what_it_is_named_after():
@@ -174,9 +91,7 @@ def test_every_kind_of_noise_moves_what_it_is_named_after():
     silence = {"base_noise": 0.0, "joint_noise": 0.0}
 
     def start(**noise):
-        environment = load("tick", **silence | noise)
-        environment.reset()
-        physics = environment.physics
+        physics = begun("tick", **silence | noise).physics
         return {"position": np.array(physics.position()), "velocity": np.array(physics.velocity())}
 
     still = start()
@@ -187,23 +102,6 @@ def test_every_kind_of_noise_moves_what_it_is_named_after():
             expected = np.zeros_like(moved)
             expected[part] = kind == which
             assert_array_equal(moved, expected, err_msg=name)
-
-
-def test_overriding_one_weight_keeps_the_others():
-    weights = load("tick", weights={"contact": -1}).task.settings.weights
-    assert weights == {
-        "forward": 1.5,
-        "healthy": 1.0,
-        "gait_bonus": 1.5,
-        "gait_cost": -0.1,
-        "control": -0.05,
-        "smoothness": -0.02,
-        "contact": -1.0,
-        "angular_velocity": -0.05,
-        "vertical_velocity": -0.02,
-        "posture": -0.001,
-    }
-    assert load("tick").task.settings.weights["contact"] == -0.0005
 
 
 @pytest.mark.parametrize(
