@@ -24,8 +24,7 @@ def transfer(*arguments):
 @pytest.mark.long
 def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
     done = transfer(f"--policy={policy}", "--families=robots", "-o", tmp_path / "table.csv", "--name=mine")
-    assert (done.returncode, done.stderr) == (0, "")
-    heads, row = (line.split() for line in done.stdout.splitlines())
+    heads, row = (line.split() for line in programs.passed(done).splitlines())
     assert heads[:4] == ["family", "count", "walk", "demonstrated"] and row[:4] == ["robots", "4", "0", "1"]
     with (tmp_path / "table.csv").open() as file:
         lines = list(csv.DictReader(file))
@@ -47,6 +46,4 @@ def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
     ],
 )
 def test_what_does_not_fit_is_one_line(arguments, message):
-    done = transfer(*arguments)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.startswith(f"arc-suite transfer: {message}") and done.stderr.count("\n") == 1
+    programs.refused(transfer(*arguments), f"arc-suite transfer: {message}")
