@@ -7,6 +7,7 @@ import sys
 
 import h5py
 import numpy as np
+import programs
 import pytest
 from datasets import ID, QUEEN, SHORT, collect, digests, edited, verify
 from tiers import never, tiers
@@ -14,7 +15,6 @@ from tiers import never, tiers
 from arc_suite import data, style
 
 SETTINGS = data.DatasetSettings(QUEEN, **SHORT)
-COLLECT = (sys.executable, "-m", "arc_suite", "collect")
 READERS = {"open": lambda dataset_id: list(data.open(dataset_id)), "verify": verify}
 
 STROLL = """
@@ -29,6 +29,12 @@ arc_suite.register(module=__name__, tasks=(Stroll,), arenas={"lawn": lambda body
 """
 
 
+def collected(*arguments):
+    """Run the program in an interpreter of its own."""
+    command = [sys.executable, "-m", "arc_suite", "collect", *arguments]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
 @pytest.fixture
 def module(tmp_path, monkeypatch):
     """Write a module that can be imported, and return the file that its import leaves."""
@@ -38,13 +44,18 @@ def module(tmp_path, monkeypatch):
     return tmp_path / "imported"
 
 
-def refused(use, *parts):
+def assert_refused(use, *parts):
     with pytest.raises(ValueError) as error:
         use(ID)
     message = str(error.value)
     assert message.startswith(f"dataset {ID!r}") and "\n" not in message and len(message) < 600
     for part in parts:
         assert part in message
+
+
+def about(root, **changes):
+    """Change what the metadata say of the dataset's settings."""
+    edited(root, lambda metadata: metadata["arc_suite"].update(changes))
 
 
 @pytest.mark.slow
@@ -55,41 +66,38 @@ def refused(use, *parts):
 )
 def test_metadata_import_nothing(root, module, change):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"].update(change))
+    about(root, **change)
     for use in (*READERS.values(), style.source):
-        refused(use, "files import nothing; import 'strolling' first")
-    done = subprocess.run([*COLLECT, f"--verify={ID}"], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (1, "")
-    assert done.stderr.count("\n") == 1 and "import 'strolling' first" in done.stderr
+        assert_refused(use, "files import nothing; import 'strolling' first")
+    done = collected(f"--verify={ID}")
+    programs.refused(done, f"arc-suite collect: dataset {ID!r}")
+    assert "import 'strolling' first" in done.stderr
     assert not module.exists()
 
 
 @pytest.mark.long
 def test_what_the_caller_names_is_imported(module):
     def run(*arguments):
-        command = [*COLLECT, f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments]
-        return subprocess.run(command, capture_output=True, text=True)
+        return collected(f"--id={ID}", "--policy=zero", "--steps=3", "--episodes=1", *arguments)
 
-    named = ("--task=strolling:stroll", "--set=arena=strolling:lawn")
-    assert run(*named).returncode == 0
-    assert run(f"--verify={ID}").stderr == (
-        f"arc-suite collect: dataset {ID!r}: metadata.json: task 'strolling:stroll': files import nothing; "
-        "import 'strolling' first\n"
-    )
-    assert run(f"--verify={ID}", *named).stdout == f"{ID}: 1 episodes replayed, all bit-equal\n"
-    assert run(f"--verify={ID}", "--set=arena=strolling:lawn", "--task=walk").stderr == (
-        f"arc-suite collect: dataset {ID!r} holds episodes of the task strolling:stroll, and not of walk\n"
-    )
+    named, verify = ("--task=strolling:stroll", "--set=arena=strolling:lawn"), f"--verify={ID}"
+    programs.passed(run(*named))
+    line = "task 'strolling:stroll': files import nothing; import 'strolling' first"
+    programs.refused(run(verify), f"arc-suite collect: dataset {ID!r}: metadata.json: {line}\n")
+    assert programs.passed(run(verify, *named)) == f"{ID}: 1 episodes replayed, all bit-equal\n"
+    line = "holds episodes of the task strolling:stroll, and not of walk"
+    done = run(verify, "--set=arena=strolling:lawn", "--task=walk")
+    programs.refused(done, f"arc-suite collect: dataset {ID!r} {line}\n")
 
 
 @pytest.mark.parametrize("value", tiers(["1\n2", "x" * 10_000, ["\n"] * 1000], lambda value: value == "1\n2"))
 def test_versions_are_told_in_one_line(root, value):
     collect(ID, SETTINGS, 1)
     edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=value))
-    refused(verify, "was collected with numpy ")
+    assert_refused(verify, "was collected with numpy ")
     edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=np.__version__))
-    edited(root, lambda metadata: metadata["arc_suite"].update(task_version=value))
-    refused(verify, "was collected with version ", " of walk; ")
+    about(root, task_version=value)
+    assert_refused(verify, "was collected with version ", " of walk; ")
 
 
 @pytest.mark.slow
@@ -98,8 +106,8 @@ def test_versions_are_told_in_one_line(root, value):
 )
 def test_robots_are_registered_names_and_inline_bodies_alone(root, robot):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"].update(robot=robot))
-    refused(data.open, "metadata.json: ")
+    about(root, robot=robot)
+    assert_refused(data.open, "metadata.json: ")
 
 
 @pytest.mark.slow
@@ -116,9 +124,9 @@ def test_robots_are_registered_names_and_inline_bodies_alone(root, robot):
 )
 def test_settings_of_another_type_are_named(root, name, value):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"].update({name: value}))
+    about(root, **{name: value})
     for use in READERS.values():
-        refused(use, f"metadata.json: {name}" if name in ("seed", "steps", "noise") else f"expected {name} ")
+        assert_refused(use, f"metadata.json: {name}" if name in ("seed", "steps", "noise") else f"expected {name} ")
 
 
 @pytest.mark.parametrize("value", tiers(["1", -1, 2**70, 1.0, None], lambda value: value == -1))
@@ -126,14 +134,14 @@ def test_settings_of_another_type_are_named(root, name, value):
 def test_counts_of_another_type_are_named(root, name, value):
     collect(ID, SETTINGS, 1)
     edited(root, lambda metadata: metadata.update({name: value}))
-    refused(data.open, name)
+    assert_refused(data.open, name)
 
 
 def test_steps_that_no_episode_has_are_not_allocated(root):
     collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"].update(steps=10**15))
+    about(root, steps=10**15)
     edited(root, lambda metadata: metadata.pop("env_spec"))
-    refused(verify, "20 steps were recorded, 21 replayed")
+    assert_refused(verify, "20 steps were recorded, 21 replayed")
 
 
 def altered(root, change):
@@ -141,73 +149,38 @@ def altered(root, change):
         change(file)
 
 
-def replaced(path, make):
-    """Return a change that puts something else in the place of an array or a group."""
+def replaced(path, method, *arguments, **settings):
+    """Return a change that puts what a method of a group makes in the place of an array or a group."""
 
     def change(file):
         parent, _, name = path.rpartition("/")
-        old = file[path]
         del file[path]
-        make(file[parent or "/"], name, old)
+        getattr(file[parent or "/"], method)(name, *arguments, **settings)
 
     return change
 
 
-def claimed(shape):
-    """Return a change that gives the rewards a size that nobody wrote."""
-    return replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, shape, "f8"))
-
-
-HUGE = 1 << 40
+REWARDS, LINK, HUGE = "episode_0/rewards", "a link to elsewhere", 1 << 40
+SOFT, EXTERNAL = h5py.SoftLink("/episode_1"), h5py.ExternalLink("../x.hdf5", "episode_0")
+ELSEWHERE = [("/etc/hostname", 0, 160)]
 ALTERED = {
-    "huge": (claimed((HUGE,)), "claims"),
-    "huge in two axes": (claimed((HUGE, HUGE >> 20)), "expected"),
+    "huge": (replaced(REWARDS, "create_dataset", (HUGE,), "f8"), "claims"),
+    "huge in two axes": (replaced(REWARDS, "create_dataset", (HUGE, HUGE >> 20), "f8"), "expected"),
     "huge term": (
-        replaced(
-            "episode_0/infos/reward_terms/forward", lambda group, name, old: group.create_dataset(name, (HUGE,), "f4")
-        ),
+        replaced("episode_0/infos/reward_terms/forward", "create_dataset", (HUGE,), "f4"),
         "expected 20 of float64",
     ),
-    "chunked": (
-        replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, (20,), "f8", chunks=(5,))),
-        "in one piece",
-    ),
-    "stored elsewhere": (
-        replaced(
-            "episode_0/rewards",
-            lambda group, name, old: group.create_dataset(name, (20,), "f8", external=[("/etc/hostname", 0, 160)]),
-        ),
-        "in one piece",
-    ),
-    "external link": (
-        replaced("episode_0/rewards", lambda group, name, old: group.__setitem__(name, h5py.ExternalLink("/x", "/y"))),
-        "a link to elsewhere",
-    ),
-    "soft link": (
-        replaced("episode_0/rewards", lambda group, name, old: group.__setitem__(name, h5py.SoftLink("/episode_1"))),
-        "a link to elsewhere",
-    ),
-    "external episode": (
-        replaced("episode_0", lambda group, name, old: group.__setitem__(name, h5py.ExternalLink("../x.hdf5", name))),
-        "a link to elsewhere",
-    ),
-    "soft episode": (
-        replaced("episode_0", lambda group, name, old: group.__setitem__(name, h5py.SoftLink("/episode_1"))),
-        "a link to elsewhere",
-    ),
-    "group": (replaced("episode_0/rewards", lambda group, name, old: group.create_group(name)), "expected a dataset"),
-    "text": (replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, data="x")), "expected"),
-    "complex": (
-        replaced("episode_0/rewards", lambda group, name, old: group.create_dataset(name, data=np.zeros(20, complex))),
-        "complex128",
-    ),
-    "no steps": (claimed((0,)), "episode_0: "),
-    "other joints": (
-        replaced(
-            "episode_0/actions", lambda group, name, old: group.create_dataset(name, data=np.zeros((20, 3), "f4"))
-        ),
-        "expected",
-    ),
+    "chunked": (replaced(REWARDS, "create_dataset", (20,), "f8", chunks=(5,)), "in one piece"),
+    "stored elsewhere": (replaced(REWARDS, "create_dataset", (20,), "f8", external=ELSEWHERE), "in one piece"),
+    "external link": (replaced(REWARDS, "__setitem__", h5py.ExternalLink("/x", "/y")), LINK),
+    "soft link": (replaced(REWARDS, "__setitem__", SOFT), LINK),
+    "external episode": (replaced("episode_0", "__setitem__", EXTERNAL), LINK),
+    "soft episode": (replaced("episode_0", "__setitem__", SOFT), LINK),
+    "group": (replaced(REWARDS, "create_group"), "expected a dataset"),
+    "text": (replaced(REWARDS, "create_dataset", data="x"), "expected"),
+    "complex": (replaced(REWARDS, "create_dataset", data=np.zeros(20, complex)), "complex128"),
+    "no steps": (replaced(REWARDS, "create_dataset", (0,), "f8"), "episode_0: "),
+    "other joints": (replaced("episode_0/actions", "create_dataset", data=np.zeros((20, 3), "f4")), "expected"),
     "seed": (lambda file: file["episode_0"].attrs.create("seed", "five"), "attribute seed to be one int"),
     "length": (lambda file: file["episode_0"].attrs.create("length", np.zeros(9)), "attribute length to be one int"),
     "sha256": (lambda file: file["episode_0"].attrs.create("sha256", 3), "attribute sha256 to be one str"),
@@ -223,7 +196,7 @@ def test_episodes_that_are_stored_otherwise_are_one_line(root, name):
     collect(ID, SETTINGS, 2)
     altered(root, change)
     for use in (*READERS.values(), lambda dataset_id: collect(dataset_id, SETTINGS, 3)):
-        refused(use, "main_data.hdf5: ", reason)
+        assert_refused(use, "main_data.hdf5: ", reason)
     collect(ID, SETTINGS, 2, overwrite=True)
     assert verify(ID) == 2
 
@@ -238,14 +211,14 @@ def test_an_array_of_one_place_many_times_is_not_read(root):
             group[f"again{number}"] = group["forward"]
 
     altered(root, change)
-    refused(READERS["open"], "its arrays claim")
+    assert_refused(READERS["open"], "its arrays claim")
 
 
 @pytest.mark.slow
 def test_continuing_compares_what_it_keeps(root):
     collect(ID, SETTINGS, 2)
     altered(root, lambda file: file["episode_1/rewards"].__setitem__(3, 7.0))
-    refused(lambda dataset_id: collect(dataset_id, SETTINGS, 3), "main_data.hdf5: episode_1: expected ")
+    assert_refused(lambda dataset_id: collect(dataset_id, SETTINGS, 3), "main_data.hdf5: episode_1: expected ")
     collect(ID, SETTINGS, 3, overwrite=True)
     assert len(digests()) == 3
 
@@ -253,7 +226,7 @@ def test_continuing_compares_what_it_keeps(root):
 def test_episodes_of_no_index_are_named(root):
     collect(ID, SETTINGS, 1)
     altered(root, lambda file: file.move("episode_0", "episode_00"))
-    refused(lambda dataset_id: collect(dataset_id, SETTINGS, 2), "'episode_00': expected the name of an episode")
+    assert_refused(lambda dataset_id: collect(dataset_id, SETTINGS, 2), "'episode_00': expected the name of an episode")
 
 
 def test_nothing_outside_is_deleted(root, tmp_path):
@@ -261,7 +234,7 @@ def test_nothing_outside_is_deleted(root, tmp_path):
     (tmp_path / "home" / ".profile").touch()
     (root / ID).mkdir(parents=True)
     (root / ID / "data").symlink_to(tmp_path / "home")
-    refused(lambda dataset_id: collect(dataset_id, SETTINGS, 1), "is a link")
+    assert_refused(lambda dataset_id: collect(dataset_id, SETTINGS, 1), "is a link")
     assert (tmp_path / "home" / ".profile").exists()
 
 
@@ -271,13 +244,13 @@ def test_a_pipe_is_not_waited_for(root, name):
     path = root / ID / "data" / name
     path.unlink()
     os.mkfifo(path)
-    refused(READERS["open"], f"{name}: expected a file")
+    assert_refused(READERS["open"], f"{name}: expected a file")
 
 
 def test_metadata_of_any_size_are_not_read(root):
     collect(ID, SETTINGS, 1)
     os.truncate(root / ID / "data" / "metadata.json", 1 << 40)
-    refused(data.open, "metadata.json: expected at most 16777216 bytes")
+    assert_refused(data.open, "metadata.json: expected at most 16777216 bytes")
 
 
 def test_author_and_code_are_in_the_metadata_where_they_are_said(root):
@@ -297,22 +270,16 @@ def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(root
     spec = json.loads(data.open(ID).metadata["env_spec"])
     for change, line in (
         ({"max_episode_steps": 40}, "max_episode_steps of its env_spec is 40, and its settings say 20"),
-        (
-            {"id": "arc_suite/tick-walk-v0"},
-            'id of its env_spec is "arc_suite/tick-walk", and its settings say "arc_suite',
-        ),
-        (
-            {"entry_point": "elsewhere:Env"},
-            'entry_point of its env_spec is "elsewhere:Env", and its settings say "arc_',
-        ),
+        ({"id": "arc_suite/tick-walk-v0"}, 'id of its env_spec is "arc_suite/tick-walk", and its settings say "arc'),
+        ({"entry_point": "elsewhere:Env"}, 'entry_point of its env_spec is "elsewhere:Env", and its settings say "a'),
         ({"kwargs": spec["kwargs"] | {"domain_name": "tick"}}, 'kwargs of its env_spec is {"domain_name": "tick", "ta'),
         ({"kwargs": spec["kwargs"] | {"task_kwargs": {"gait": "wave"}}}, "kwargs of its env_spec is "),
     ):
         edited(root, lambda metadata, change=change: metadata.update(env_spec=json.dumps(spec | change)))
-        refused(data.open, "metadata.json: ", line)
-        refused(verify, line)
+        assert_refused(data.open, "metadata.json: ", line)
+        assert_refused(verify, line)
     for damaged in ("{", "[]", "{}", 3, "[" * 9999):
         edited(root, lambda metadata, damaged=damaged: metadata.update(env_spec=damaged))
-        refused(data.open, "metadata.json: ")
+        assert_refused(data.open, "metadata.json: ")
     edited(root, lambda metadata: metadata.update(env_spec=json.dumps(spec | {"id": "arc_suite/queen-walk-v7"})))
     assert len(data.open(ID)) == 1  # of a version that this one does not replay

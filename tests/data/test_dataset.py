@@ -7,6 +7,7 @@ import minari
 import numpy as np
 import pytest
 from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
+from refusals import refused
 from tiers import tiers
 
 from arc_suite import data, style, versions
@@ -14,24 +15,16 @@ from arc_suite.cpg.presets import PRESETS
 
 
 def test_metadata():
-    collect(ID, data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20), 3)
+    settings = data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
+    collect(ID, settings, 3)
     dataset = data.open(ID)
-    assert dataset.settings == data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
-    assert len(dataset) == 3
+    assert dataset.settings == settings and len(dataset) == 3
     about = dataset.metadata["arc_suite"]
     assert about["versions"] == versions.recorded()
     assert len(about["model_sha256"]) == 64
-    assert {name: about[name] for name in about if not name.endswith(("versions", "_sha256"))} == {
-        "robot": "queen",
-        "policy": "cpg",
-        "presets": ["slow", "fast"],
-        "noise": 0.1,
-        "seed": 7,
-        "steps": 20,
-        "task": "walk",
-        "task_kwargs": {},
-        "task_version": 0,
-    }
+    told = {"policy": "cpg", "presets": ["slow", "fast"], "noise": 0.1, "seed": 7, "steps": 20}
+    told |= {"robot": "queen", "task": "walk", "task_kwargs": {}, "task_version": 0}
+    assert {name: about[name] for name in about if not name.endswith(("versions", "_sha256"))} == told
     numbers = [repr(PRESETS["queen"][name]) for name in ("slow", "fast")]
     assert about["presets_sha256"] == [hashlib.sha256(text.encode()).hexdigest() for text in numbers]
     summaries = dataset.summaries()
@@ -84,9 +77,7 @@ def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length)
     before, path = digests(), root / ID / "data" / name
     os.truncate(path, length)
     for use in (verify, lambda dataset_id: collect(dataset_id, settings, 3)):
-        with pytest.raises(ValueError) as error:
+        with refused(f"dataset {ID!r} is damaged: {path}: ", begins=True):
             use(ID)
-        assert str(error.value).startswith(f"dataset {ID!r} is damaged: {path}: ")
-        assert "\n" not in str(error.value)
     collect(ID, settings, 2, overwrite=True)
     assert digests() == before

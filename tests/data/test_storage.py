@@ -11,22 +11,22 @@ import subprocess
 import sys
 import threading
 
+import datasets
 import minari
+import programs
 import pytest
+from datasets import ID, collect
+from refusals import refused
 from tiers import never, tiers
-from tqdm import tqdm
 
 from arc_suite import data, files
 from arc_suite.data.storage import Storage
 from arc_suite.envs.setup import Setup
 
 COLLECT = (sys.executable, "-m", "arc_suite", "collect")
-ID = "arc_suite/test/some-v0"
 PARTS = "arc_suite/test/.some-v0.parts"
 slowly = functools.partial(pytest.param, marks=pytest.mark.slow)
 SETTINGS = data.DatasetSettings(Setup.of("tick"), "random", (), steps=4)
-
-collect = functools.partial(data.collect, progress=functools.partial(tqdm, disable=True))
 
 # Policies to which an accident happens in the episode of seed 5: the eighth that is made, as two are made for trial.
 OWN = """
@@ -48,20 +48,17 @@ def short(robot): return accident(robot, lambda: np.zeros(3))
 
 
 @pytest.fixture(autouse=True)
-def root(tmp_path, monkeypatch):
-    """Where Minari keeps datasets, and policies are found."""
-    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
+def own(tmp_path, monkeypatch):
+    """Let programs find the policies."""
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     (tmp_path / "own.py").write_text(OWN)
-    return tmp_path / "datasets"
 
 
 def digests(dataset_id=ID):
     """Of the episodes that Minari sees; all of them open."""
-    episodes = list(minari.load_dataset(dataset_id))
-    summaries = data.open(dataset_id).summaries()
-    assert len(episodes) == len(summaries)
-    return [summary["sha256"] for summary in summaries]
+    found = datasets.digests(dataset_id)
+    assert len(list(minari.load_dataset(dataset_id))) == len(found)
+    return found
 
 
 def kept_in_parts():
@@ -147,24 +144,18 @@ def last_line(text):
     return text.rstrip("\n").rpartition("\n")[2].rpartition("\r")[2].strip()
 
 
+PLACE = "arc-suite collect: policy 'own:{}': episode of seed 5, step 2:"
+KEPT = f"5 of 8 episodes of {ID!r} are kept"
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("accident", "status", "line"),
     [
         slowly("kill", -signal.SIGKILL, None),
-        ("interrupt", 130, f"arc-suite collect: interrupted; 5 of 8 episodes of {ID!r} are kept"),
-        (
-            "nan",
-            1,
-            "arc-suite collect: policy 'own:nan': episode of seed 5, step 2: action[0]: "
-            f"expected a number from -1 to 1, got nan; 5 of 8 episodes of {ID!r} are kept",
-        ),
-        (
-            "short",
-            1,
-            "arc-suite collect: policy 'own:short': episode of seed 5, step 2: action: expected shape (18,), got (3,); "
-            f"5 of 8 episodes of {ID!r} are kept",
-        ),
+        ("interrupt", 130, f"arc-suite collect: interrupted; {KEPT}"),
+        ("nan", 1, f"{PLACE.format('nan')} action[0]: expected a number from -1 to 1, got nan; {KEPT}"),
+        ("short", 1, f"{PLACE.format('short')} action: expected shape (18,), got (3,); {KEPT}"),
     ],
 )
 def test_finished_episodes_are_kept(accident, status, line):
@@ -193,22 +184,17 @@ def test_a_full_disk_is_one_line_and_keeps_what_is_finished():
     few = ("--policy=random", "--episodes=8", "--num_envs=1")
     done = run(*few, preexec_fn=full)
     assert done.returncode == 1
-    line = last_line(done.stderr)
-    assert line.startswith("arc-suite collect: cannot write ")
-    assert "file too large" in line
-    kept = len(kept_in_parts())
-    assert line.endswith(f"; {kept} of 8 episodes of {ID!r} are kept")
-    assert kept
-    done = run(*few)
-    assert done.returncode == 0, done.stderr
+    line, kept = last_line(done.stderr), len(kept_in_parts())
+    assert line.startswith("arc-suite collect: cannot write ") and "file too large" in line
+    assert kept and line.endswith(f"; {kept} of 8 episodes of {ID!r} are kept")
+    programs.passed(run(*few))
     assert len(digests()) == 8
 
 
 def test_two_processes_do_not_collect_into_one_dataset():
     collect(ID, SETTINGS, 2)
-    with Storage.opened(ID, overwrite=False), pytest.raises(ValueError) as error:
+    with Storage.opened(ID, overwrite=False), refused(f"dataset {ID!r} is being collected by another process"):
         collect(ID, SETTINGS, 3)
-    assert str(error.value) == f"dataset {ID!r} is being collected by another process"
 
 
 def test_a_process_that_waits_finds_what_the_other_has_collected():
@@ -262,6 +248,5 @@ def test_an_unfinished_dataset_is_one_line_and_fewer_episodes_finish_it(root):
 def test_a_folder_that_cannot_be_made_is_named(root):
     (root / ID).mkdir(parents=True)
     (root / ID / "data").touch()
-    with pytest.raises(OSError) as error:
-        collect(ID, data.DatasetSettings(Setup.of("queen")), 1)
-    assert str(error.value) == f"cannot make folder {root / ID / 'data'}: file exists"
+    with refused(f"cannot make folder {root / ID / 'data'}: file exists", OSError):
+        collect(ID, SETTINGS, 1)

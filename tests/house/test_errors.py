@@ -8,6 +8,7 @@ import dm_env
 import gymnasium
 import numpy as np
 import pytest
+from refusals import refused
 
 import arc_suite
 from arc_suite import policies, registry
@@ -27,7 +28,10 @@ CAMERAS = "['tracking', 'portrait', 'profile']"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
-FINITE = "expected a finite number"
+POLICIES = "(there are: cpg, zero, random, ppo, universal)"
+MODULE = "expected module:name, with a module that can be imported"
+OWN = "is the suite's own, expected without a module"
+MASK = "reset_mask: expected 3 booleans, at least one of them true, got"
 POSITIVE = "expected a number above 0, at most 1e+06"
 COMMAND = "command 'command': expected 3 numbers from -1e+06 to 1e+06, got"
 
@@ -72,8 +76,20 @@ def world(tmp_path_factory):
     os.chdir(before)
 
 
+def load(*arguments):
+    return lambda world: arc_suite.load(*arguments)
+
+
 def walk(**task_kwargs):
-    return lambda world: arc_suite.load("queen", "walk", task_kwargs)
+    return load("queen", "walk", task_kwargs)
+
+
+def policy(*arguments, **settings):
+    return lambda world: policies.policy(*arguments, **settings)
+
+
+def render(*arguments):
+    return lambda world: world.dm.physics.render(*arguments)
 
 
 def make(**kwargs):
@@ -121,54 +137,33 @@ CASES = [
     (lambda w: w.envs.reset(seed=1.5), f"{SEED} 1.5"),
     (lambda w: w.envs.reset(seed=[1, 2]), "seed: expected one for each of 3 environments, got 2"),
     (lambda w: w.envs.reset(seed=[1, 2, "x"]), f"{SEED} 'x'"),
-    (
-        lambda w: w.envs.reset(options={"reset_mask": np.zeros(3, bool)}),
-        "reset_mask: expected 3 booleans, at least one of them true, got array([False, False, False])",
-    ),
-    (
-        lambda w: w.envs.reset(seed=3, options={"reset_mask": np.array([1, 0, 1])}),
-        "reset_mask: expected 3 booleans, at least one of them true, got array([1, 0, 1])",
-    ),
+    (lambda w: w.envs.reset(options={"reset_mask": np.zeros(3, bool)}), f"{MASK} array([False, False, False])"),
+    (lambda w: w.envs.reset(seed=3, options={"reset_mask": np.array([1, 0, 1])}), f"{MASK} array([1, 0, 1])"),
     (envs(task_kwargs={"random": [1, 2, 3]}), "seed: expected one for each of 2 environments, got 3"),
     (lambda w: policies.alone(policies.policy("random", "queen"), seed=-1), f"{SEED} -1"),
     # Ids.
-    (lambda w: arc_suite.load("Queen", "walk"), f"unknown robot 'Queen'; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: arc_suite.load(7, "walk"), f"unknown robot 7 {DOMAINS}"),
-    (lambda w: arc_suite.load(["queen"], "walk"), f"unknown robot ['queen']; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: arc_suite.load("queen", None), f"unknown task None {TASK_NAMES}"),
-    (
-        lambda w: arc_suite.load("creature:hopper", "walk"),
-        "robot 'hopper': cannot import creature: No module named 'creature'",
-    ),
-    (
-        lambda w: arc_suite.load("..:queen", "walk"),
-        "robot '..:queen': expected module:name, with a module that can be imported",
-    ),
-    (
-        lambda w: arc_suite.load(":queen", "walk"),
-        "robot ':queen': expected module:name, with a module that can be imported",
-    ),
-    (
-        lambda w: arc_suite.load("os:queen", "walk"),
-        "robot 'os:queen': queen is the suite's own, expected without a module",
-    ),
-    (
-        lambda w: arc_suite.load("queen", "json:walk"),
-        "task 'json:walk': walk is the suite's own, expected without a module",
-    ),
+    (load("Queen", "walk"), f"unknown robot 'Queen'; did you mean 'queen'? {DOMAINS}"),
+    (load(7, "walk"), f"unknown robot 7 {DOMAINS}"),
+    (load(["queen"], "walk"), f"unknown robot ['queen']; did you mean 'queen'? {DOMAINS}"),
+    (load("queen", None), f"unknown task None {TASK_NAMES}"),
+    (load("creature:hopper", "walk"), "robot 'hopper': cannot import creature: No module named 'creature'"),
+    (load("..:queen", "walk"), f"robot '..:queen': {MODULE}"),
+    (load(":queen", "walk"), f"robot ':queen': {MODULE}"),
+    (load("os:queen", "walk"), f"robot 'os:queen': queen {OWN}"),
+    (load("queen", "json:walk"), f"task 'json:walk': walk {OWN}"),
     (make(domain_name="bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (envs(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
     # Cameras and sizes.
-    (lambda w: w.dm.physics.render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),
-    (lambda w: w.dm.physics.render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 2, or one of {CAMERAS}"),
     (
         make(camera_id="prtrait"),
         "unknown camera 'prtrait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
     ),
     (envs(camera_id=9), f"no camera 9: expected -1 (free) to 2, or one of {CAMERAS}"),
-    (lambda w: w.dm.physics.render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
-    (lambda w: w.dm.physics.render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),
-    (lambda w: w.dm.physics.render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),
+    (render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
+    (render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),
+    (render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),
     (make(width=-1), "width: expected an integer from 1 to 3840, got -1"),
     (envs(height=2.5), "height: expected an integer from 1 to 2160, got 2.5"),
     (lambda w: w.envs.render([5]), "indices: expected integers from 0 to 2, got 5"),
@@ -186,63 +181,42 @@ CASES = [
         "observation: expected those of 12 joints, got 12 angles and 18 velocities",
     ),
     (lambda w: w.envs.task.split(np.zeros((2, 199))), "observation: expected 151 numbers, got shape (2, 199)"),
-    (
-        lambda w: policies.policy("cgp", "queen"),
-        "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)",
-    ),
-    (
-        lambda w: policies.policy(None, "queen"),
-        "unknown policy None (there are: cpg, zero, random, ppo, universal)",
-    ),
-    (lambda w: policies.policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
-    (lambda w: policies.policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),
+    (policy("cgp", "queen"), f"unknown policy 'cgp'; did you mean 'cpg'? {POLICIES}"),
+    (policy(None, "queen"), f"unknown policy None {POLICIES}"),
+    (policy("cpg", "quene"), f"unknown robot 'quene'; did you mean 'queen'? {DOMAINS}"),
+    (policy("nowhere:policy", "queen"), "policy 'nowhere:policy': No module named 'nowhere'"),
     # Paths.
-    (lambda w: arc_suite.load("missing.json", "walk"), "cannot read missing.json: no such file or directory"),
-    (lambda w: arc_suite.load("folder.json", "walk"), "cannot read folder.json: is a directory"),
-    (lambda w: arc_suite.load(pathlib.Path("nothing"), "walk"), "cannot read nothing: no such file or directory"),
-    (
-        lambda w: arc_suite.load("text.json", "walk"),
-        "text.json: expected a body in JSON: Expecting value: line 1 column 1 (char 0)",
-    ),
-    (
-        lambda w: arc_suite.load("list.json", "walk"),
-        "list.json: expected an object with the fields of a Body, got a list",
-    ),
-    (lambda w: arc_suite.load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
+    (load("missing.json", "walk"), "cannot read missing.json: no such file or directory"),
+    (load("folder.json", "walk"), "cannot read folder.json: is a directory"),
+    (load(pathlib.Path("nothing"), "walk"), "cannot read nothing: no such file or directory"),
+    (load("text.json", "walk"), "text.json: expected a body in JSON: Expecting value: line 1 column 1 (char 0)"),
+    (load("list.json", "walk"), "list.json: expected an object with the fields of a Body, got a list"),
+    (load("empty.json", "walk"), "empty.json: name: missing; a Body needs it"),
     # Keyword arguments.
     (walk(time_limit=0), f"time_limit: {POSITIVE}, got 0"),
     (walk(time_limit=1e308), f"time_limit: {POSITIVE}, got 1e+308"),
     (walk(target_velocity=10**400), f"target_velocity: expected a number from -1e+06 to 1e+06, got {10**400}"),
-    (
-        lambda w: policies.policy("zero", "queen", noise=10**400),
-        f"noise: expected a finite number of at least 0, got {10**400}",
-    ),
+    (policy("zero", "queen", noise=10**400), f"noise: expected a finite number of at least 0, got {10**400}"),
     (walk(time_limit=float("nan")), f"time_limit: {POSITIVE}, got nan"),
     (walk(target_velocity=True), "target_velocity: expected a number from -1e+06 to 1e+06, got True"),
     (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),
     (walk(phase_offsets=None), "phase_offsets: expected one finite number or 6 of them, got None"),
     (walk(joint_noise=float("inf")), "joint_noise: expected a number from 0 to 1e+06, got inf"),
     (walk(weights={"forward": None}), "weights['forward']: expected a number from -1e+06 to 1e+06, got None"),
-    (
-        walk(on_divergence="ignore"),
-        "unknown on_divergence 'ignore' (there are: raise, terminate)",
-    ),
+    (walk(on_divergence="ignore"), "unknown on_divergence 'ignore' (there are: raise, terminate)"),
     (walk(gait=7), f"unknown gait 7 {GAITS}"),
-    (lambda w: arc_suite.load("queen", "walk", [1]), "task_kwargs: expected a mapping of names to values, got [1]"),
+    (load("queen", "walk", [1]), "task_kwargs: expected a mapping of names to values, got [1]"),
+    (load("queen", "walk", None, "flat"), "environment_kwargs: expected a mapping of names to values, got 'flat'"),
     (
-        lambda w: arc_suite.load("queen", "walk", None, "flat"),
-        "environment_kwargs: expected a mapping of names to values, got 'flat'",
-    ),
-    (
-        lambda w: arc_suite.load("queen", "walk", None, {"control_timestep": 0.02}),
+        load("queen", "walk", None, {"control_timestep": 0.02}),
         "environment setting 'control_timestep': reward and observation are made for control steps of 25 substeps",
     ),
     (
-        lambda w: arc_suite.load("queen", "walk", None, {"time_limit": 5}),
+        load("queen", "walk", None, {"time_limit": 5}),
         "environment setting 'time_limit': it is a setting of the task: task_kwargs={'time_limit': seconds}",
     ),
     (
-        lambda w: arc_suite.load("queen", "walk", None, {"flat_observations": True}),
+        load("queen", "walk", None, {"flat_observations": True}),
         "unknown environment setting 'flat_observations'; did you mean 'flat_observation'? "
         "(there are: flat_observation)",
     ),
@@ -264,10 +238,7 @@ CASES = [
         envs(task_kwargs={"on_divergence": "raise"}),
         "unknown on_divergence of many environments 'raise' (there are: terminate)",
     ),
-    (
-        make(render_mode="ansi"),
-        "unknown render_mode 'ansi' (there are: rgb_array, depth_array)",
-    ),
+    (make(render_mode="ansi"), "unknown render_mode 'ansi' (there are: rgb_array, depth_array)"),
 ]
 
 
@@ -276,9 +247,8 @@ CASES = [
 def test_bad_input(world, use, message, monkeypatch):
     monkeypatch.setattr("arc_suite.simulation.opengl.has_display", lambda: False)
     before = world.state()
-    with pytest.raises((ValueError, OSError)) as error:
+    with refused(message, (ValueError, OSError)):
         use(world)
-    assert str(error.value) == message
     assert world.state() == before
 
 
@@ -288,7 +258,3 @@ def test_the_world_goes_on_as_one_that_met_nothing_bad(world):
         assert world.dm.step(ZEROS).reward == fresh.dm.step(ZEROS).reward
         np.testing.assert_array_equal(world.env.step(ZEROS)[0], fresh.env.step(ZEROS)[0])
         np.testing.assert_array_equal(world.envs.step(np.zeros((3, 12)))[0], fresh.envs.step(np.zeros((3, 12)))[0])
-
-
-def test_there_are_enough():
-    assert len(CASES) >= 60
