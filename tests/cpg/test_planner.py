@@ -89,20 +89,6 @@ def test_commands_turn_to_where_they_lead():
     assert toward(-2.0, PLAN) == (forward, -left, -turn)
 
 
-def test_environments_act_as_each_alone():
-    envs = VectorEnv("tick", "navigate", 3, 1)
-    together, alone = Demonstrator("tick", "planned"), [Demonstrator("tick", "planned") for _ in range(3)]
-    observations, _ = envs.reset(seed=0)
-    for _ in range(40):
-        blocks = envs.task.split(observations.astype(float))
-        actions = together.act(blocks)
-        for index, demonstrator in enumerate(alone):
-            single = {name: block[index : index + 1] for name, block in blocks.items()}
-            assert_array_equal(demonstrator.act(single)[0], actions[index])
-        observations, *_ = envs.step(actions)
-    envs.close()
-
-
 def test_another_task_is_refused_in_one_line():
     environment = arc_suite.load("tick", "steer")
     with pytest.raises(ValueError, match="^observation: expected a block goal, as the task navigate has$"):

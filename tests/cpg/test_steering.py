@@ -73,6 +73,8 @@ def test_an_open_loop_does_not():
         ("queen", "gaps", "surefooted", 60),
         ("queen", "gaps", "sighted", 60),
         ("leaper", "rough", "balanced", 40),
+        ("tick", "navigate", "planned", 40),
+        (generator.generate(6, 3), "walk", "medium", 30),
     ],
 )
 def test_environments_are_single_demonstrators(robot, task, preset, steps):

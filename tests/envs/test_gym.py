@@ -329,24 +329,23 @@ def test_real_numbers_of_all_kinds_are_actions(kind):
     assert_same(env.unwrapped.step(np.ones(12, kind) if given is None else given), same.unwrapped.step(np.ones(12)))
 
 
+CAMERAS = ["tracking", "portrait", "profile"]
+WRONG = {"weights": {"controll": 1.0}}
+
+
+def there(names):
+    return f"there are: {', '.join(names)}"
+
+
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        (
-            {"camera_id": "trackin"},
-            "unknown camera 'trackin'; did you mean 'tracking'? (there are: tracking, portrait, profile)",
-        ),
-        ({"camera_id": 3}, "no camera 3: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
-        ({"camera_id": None}, "no camera None: expected -1 (free) to 2, or one of ['tracking', 'portrait', 'profile']"),
-        (
-            {"task_kwargs": {"weights": {"controll": 1.0}}},
-            f"unknown weight 'controll'; did you mean 'control'? (there are: {', '.join(Walk.weights)})",
-        ),
-        (
-            {"domain_name": "quen"},
-            f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.words())})",
-        ),
-        ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? (there are: {', '.join(TASKS)})"),
+        ({"camera_id": "trackin"}, f"unknown camera 'trackin'; did you mean 'tracking'? ({there(CAMERAS)})"),
+        ({"camera_id": 3}, f"no camera 3: expected -1 (free) to 2, or one of {CAMERAS}"),
+        ({"camera_id": None}, f"no camera None: expected -1 (free) to 2, or one of {CAMERAS}"),
+        ({"task_kwargs": WRONG}, f"unknown weight 'controll'; did you mean 'control'? ({there(Walk.weights)})"),
+        ({"domain_name": "quen"}, f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.words())})"),
+        ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)})"),
     ],
 )
 def test_bad_arguments_are_one_line(kwargs, message):

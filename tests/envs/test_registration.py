@@ -192,11 +192,18 @@ for program, *arguments in (
 TICK = ROBOTS["tick"]
 OTHER = TICK.replace(name="other")
 ROW = PARAMETERS["walk"]["tick"]
+WITHOUT_BANDS = {name: value for name, value in ROW.items() if name not in ("velocity_band", "healthy_range")}
+BALANCED = PRESETS["leaper"]["balanced"]
 
 
 def walk(row):
     """The arguments that register OTHER with parameters in walk."""
     return {"body": OTHER, "parameters": {"walk": row}}
+
+
+def presets(**given):
+    """The arguments that register OTHER with presets."""
+    return {"body": OTHER, "presets": given}
 
 
 class Other(Walk):
@@ -216,38 +223,17 @@ class Misnamed(Walk):
         ({"parameters": {"walk": ROW}}, "parameters, presets and visuals belong to a body, and none is given"),
         ({"body": "other"}, "body: expected a spec.Body, got 'other'"),
         ({"body": TICK.replace(density=7.0)}, "robot 'tick' is already registered"),
-        (
-            {"body": OTHER, "parameters": {"walk": {"base_noise": 0.1, **ROW, "duty_factor": 2}}},
-            "duty_factor: expected a number from 0 to 1, got 2",
-        ),
-        (
-            walk({k: v for k, v in ROW.items() if k not in ("velocity_band", "healthy_range")}),
-            "parameters of walk: other has no healthy_range and no velocity_band",
-        ),
+        (walk({"base_noise": 0.1, **ROW, "duty_factor": 2}), "duty_factor: expected a number from 0 to 1, got 2"),
+        (walk(WITHOUT_BANDS), "parameters of walk: other has no healthy_range and no velocity_band"),
         (walk(ROW | {"weights": {"contrl": 1.0}}), "unknown weight 'contrl'; did you mean 'control'?"),
-        (
-            {"body": OTHER, "parameters": {"wlak": ROW}},
-            "unknown task of parameters 'wlak'; did you mean 'walk'? (there are: walk, ",
-        ),
-        (
-            {"body": OTHER, "presets": PRESETS["leaper"]},
-            "preset 'slow': preset: other has 6 legs, and phase_offsets is for 4",
-        ),
-        ({"body": OTHER, "presets": PRESETS["bastion"]}, "preset 'slow': preset: does not fit other: KeyError: 'knee'"),
-        (
-            {"body": OTHER, "presets": {"balanced": PRESETS["leaper"]["balanced"]}},
-            "preset 'balanced': preset: other has 3 ranks of legs, and feet is for 2",
-        ),
-        (
-            {"body": OTHER, "presets": {"trot": {"lead": 0.1}}},
-            "preset 'trot': preset: expected one of Preset, float, SteeringParameters, SightedParameters, ",
-        ),
+        ({"body": OTHER, "parameters": {"wlak": ROW}}, "unknown task of parameters 'wlak'; did you mean 'walk'?"),
+        (presets(**PRESETS["leaper"]), "preset 'slow': preset: other has 6 legs, and phase_offsets is for 4"),
+        (presets(**PRESETS["bastion"]), "preset 'slow': preset: does not fit other: KeyError: 'knee'"),
+        (presets(balanced=BALANCED), "preset 'balanced': preset: other has 3 ranks of legs, and feet is for 2"),
+        (presets(trot={"lead": 0.1}), "preset 'trot': preset: expected one of Preset, float, SteeringParameters"),
         ({"tasks": (Other,)}, "task 'walk' is already registered"),
         ({"tasks": (Misnamed,)}, "task 'walk-slowly': expected a name of letters, digits and underscores"),
-        (
-            {"tasks": (len,)},
-            "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in function len>",
-        ),
+        ({"tasks": (len,)}, "tasks: expected classes by the contract of arc_suite.tasks.Task, got <built-in"),
         (walk(ROW) | {"tasks": (Other,)}, "task 'walk' is already registered"),
         ({"arenas": {"flat": lambda body: None}}, "arena 'flat' is already registered"),
     ],

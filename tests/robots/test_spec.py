@@ -37,6 +37,8 @@ CAMERA = TrackingCamera(position=(0.0, -3.0, 1.0))
 BODY = Body(name="beast", torso=TORSO, legs=(LEG, LEG.mirrored("r1")), camera=CAMERA, density=10.0, ballast=(SHELL,))
 
 NAME = "expected 1 to 32 characters out of [a-z0-9_], got "
+RANGE = "Joint(hip).range_deg: expected low <= 0 <= high and low < high, got "
+SHAPE = "Solid(chassis).shape: expected one of sphere, capsule, cylinder, ellipsoid, box, got "
 LENGTH = "expected a number from 1e-06 to 100, got "
 
 
@@ -77,18 +79,8 @@ LENGTH = "expected a number from 1e-06 to 100, got "
         (HIP, "axis", (0.0, 1.0), "Joint(hip).axis: expected 3 numbers, got (0.0, 1.0)"),
         (HIP, "axis", "001", "Joint(hip).axis: expected 3 numbers, got '001'"),
         (HIP, "range_deg", (-200.0, 0.0), "Joint(hip).range_deg: expected a number from -180 to 180, got -200.0"),
-        (
-            HIP,
-            "range_deg",
-            (10.0, 20.0),
-            "Joint(hip).range_deg: expected low <= 0 <= high and low < high, got (10.0, 20.0)",
-        ),
-        (
-            HIP,
-            "range_deg",
-            (0.0, 0.0),
-            "Joint(hip).range_deg: expected low <= 0 <= high and low < high, got (0.0, 0.0)",
-        ),
+        (HIP, "range_deg", (10.0, 20.0), f"{RANGE}(10.0, 20.0)"),
+        (HIP, "range_deg", (0.0, 0.0), f"{RANGE}(0.0, 0.0)"),
         (LEG, "mount", (0.0, math.inf, 0.0), "Leg(l1).mount: expected a number from -100 to 100, got inf"),
         (UPPER, "end", (0.0, 0.0, 0.0), "Link(upper).end: expected a point away from the link's origin"),
         (UPPER, "end", {"x": 1.0}, "Link(upper).end: expected 3 numbers, got a dict"),
@@ -97,18 +89,8 @@ LENGTH = "expected a number from 1e-06 to 100, got "
         (CAMERA, "xyaxes", (1, 0, 0, 2, 0, 0), "TrackingCamera.xyaxes: expected a number from -1 to 1, got 2"),
         (CAMERA, "position", None, "TrackingCamera.position: expected 3 numbers, got None"),
         # shapes
-        (
-            CHASSIS,
-            "shape",
-            "mesh",
-            "Solid(chassis).shape: expected one of sphere, capsule, cylinder, ellipsoid, box, got 'mesh'",
-        ),
-        (
-            CHASSIS,
-            "shape",
-            [],
-            "Solid(chassis).shape: expected one of sphere, capsule, cylinder, ellipsoid, box, got []",
-        ),
+        (CHASSIS, "shape", "mesh", f"{SHAPE}'mesh'"),
+        (CHASSIS, "shape", [], f"{SHAPE}[]"),
         (CHASSIS, "size", (0.2, 0.1), "Solid(chassis).size: expected 3 lengths for a box, got 2"),
         (CHASSIS, "size", (), "Solid(chassis).size: expected 1 to 3 lengths, got ()"),
         (CHASSIS, "size", 0.2, "Solid(chassis).size: expected 1 to 3 lengths, got 0.2"),

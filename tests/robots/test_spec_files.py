@@ -10,7 +10,7 @@ from refusals import refused
 
 from arc_suite.models.sizing import sized
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec import Body, SpecError
+from arc_suite.robots.spec import SpecError
 from arc_suite.robots.spec_files import EXAMPLES, MAX_BYTES, body_from_json, body_to_json, load_body, save_body
 
 SOUND = json.loads(body_to_json(sized(generator.generate(4, 2))))
@@ -71,10 +71,9 @@ def test_a_standing_height_that_is_left_out_puts_the_lowest_foot_on_the_floor():
     feet = [leg.foot.radius - leg.foot_position[2] for leg in spider.legs]
     opened = spider.replace(torso=spider.torso.replace(standing_height=None))
     assert opened.torso.standing_height == pytest.approx(max(feet), rel=1e-12)
-    with pytest.raises(SpecError) as error:
+    above = r"^torso: standing_height cannot be derived: feet end 0\.\d+ m above the torso's origin$"
+    with pytest.raises(SpecError, match=above):
         body_from_json(changed(("torso",), torso).replace("-0.", "0."))
-    assert str(error.value).startswith("torso: standing_height cannot be derived: feet end 0.")
-    assert str(error.value).endswith(" m above the torso's origin")
 
 
 def changed(path, value):
@@ -93,6 +92,10 @@ def changed(path, value):
 
 HIP = ("legs", 1, "links", 0, "joint")
 AT_HIP = "legs[1].links[0].joint"
+SOLID, FOOT = ("torso", "solids", 0), ("legs", 3, "foot")
+IN_SOLID = "name, shape, size, position, euler_deg"
+THIN = "legs: r2_foot: expected a radius from 0.0009 at density 10, got "
+PARALLEL = "camera.xyaxes: expected two directions that are not parallel, got "
 SHAPES = "sphere, capsule, cylinder, ellipsoid, box"
 IN_BODY = "name, torso, legs, camera, density, ballast, simulation, palette"
 
@@ -102,48 +105,23 @@ IN_BODY = "name, torso, legs, camera, density, ballast, simulation, palette"
     [
         (("name",), "Großer Käfer", "name: expected 1 to 32 characters out of [a-z0-9_], got 'Großer Käfer'"),
         (("name",), ..., "name: missing; a Body needs it"),
-        (("torso", "standing_height"), -0.4, "torso.standing_height: expected a number from 1e-06 to 100, got -0.4"),
         (("torso", "solids"), {}, "torso.solids: expected a list of Solids, got an object"),
-        (("torso", "solids", 0, "shape"), "mesh", f"torso.solids[0].shape: expected one of {SHAPES}, got 'mesh'"),
-        (
-            ("torso", "solids", 0, "file"),
-            "a.stl",
-            "torso.solids[0]: unknown field 'file' (there are: name, shape, size, position, euler_deg)",
-        ),
-        ((*HIP, "axis"), [0, math.nan, 1], f"{AT_HIP}.axis: expected a number from -1000 to 1000, got nan"),
+        ((*SOLID, "shape"), "mesh", f"torso.solids[0].shape: expected one of {SHAPES}, got 'mesh'"),
+        ((*SOLID, "file"), "a.stl", f"torso.solids[0]: unknown field 'file' (there are: {IN_SOLID})"),
         ((*HIP, "damping"), -1, f"{AT_HIP}.damping: expected a number from 0 to 1e+35, got -1"),
         ((*HIP, "motor"), 120, f"{AT_HIP}.motor: expected an object with the fields of a Motor, got a number"),
         ((*HIP, "motor", "gear"), math.inf, f"{AT_HIP}.motor.gear: expected a number from 1e-20 to 1e+30, got inf"),
-        ((*HIP, "motor", "gear"), 1e300, f"{AT_HIP}.motor.gear: expected a number from 1e-20 to 1e+30, got 1e+300"),
-        (
-            (*HIP, "range_deg"),
-            [30, -30],
-            f"{AT_HIP}.range_deg: expected low <= 0 <= high and low < high, got (30.0, -30.0)",
-        ),
         (("legs", 2, "mount"), "here", "legs[2].mount: expected 3 numbers, got 'here'"),
         (("legs", 2, "mount", 1), 10**400, "legs[2].mount: expected a number from -100 to 100, got inf"),
         (("legs", 2, "name"), "l1", "legs: the name 'l1' occurs twice"),
         (("legs", 2, "links"), [], "legs[2].links: expected 1 to 16 Links, got 0"),
         (("legs", 2, "links", 1), None, "legs[2].links[1]: expected an object with the fields of a Link, got null"),
-        (("legs", 3, "foot", "radius"), True, "legs[3].foot.radius: expected a number from 1e-06 to 100, got True"),
-        (("legs", 3, "foot", "radius"), 1e-5, "legs: r2_foot: expected a radius from 0.0009 at density 10, got 1e-05"),
-        (
-            ("legs", 3, "foot", "radius"),
-            8e-4,
-            "legs: r2_foot: expected a radius from 0.0009 at density 10, got 0.0008 (density 20 fits)",
-        ),
+        ((*FOOT, "radius"), True, "legs[3].foot.radius: expected a number from 1e-06 to 100, got True"),
+        ((*FOOT, "radius"), 1e-5, f"{THIN}1e-05"),
+        ((*FOOT, "radius"), 8e-4, f"{THIN}0.0008 (density 20 fits)"),
         (("simulation", "timestep"), 0.05, "simulation.contact_time: expected at least two timesteps, got 0.023094"),
-        (
-            ("camera", "xyaxes"),
-            [1, 0, 0.5, -0.5, 0, -0.25],
-            "camera.xyaxes: expected two directions that are not parallel, got (1.0, 0.0, 0.5, -0.5, 0.0, -0.25)",
-        ),
-        (
-            ("camera", "xyaxes"),
-            [0, 0, 0, 0, 1, 0],
-            "camera.xyaxes: expected two directions that are not parallel, got (0.0, 0.0, 0.0, 0.0, 1.0, 0.0)",
-        ),
-        (("legs",), [], "legs: expected 1 to 64 Legs, got 0"),
+        (("camera", "xyaxes"), [1, 0, 0.5, -0.5, 0, -0.25], f"{PARALLEL}(1.0, 0.0, 0.5, -0.5, 0.0, -0.25)"),
+        (("camera", "xyaxes"), [0, 0, 0, 0, 1, 0], f"{PARALLEL}(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)"),
         (("legs",), None, "legs: expected a list of Legs, got null"),
         (("include",), "a.xml", f"unknown field 'include' (there are: {IN_BODY})"),
     ],
@@ -233,15 +211,10 @@ def test_files_that_hold_no_body_are_named(tmp_path):
     with refused(f"{path}: expected at most {MAX_BYTES} bytes", SpecError):
         load_body(path)
     for missing, reason in ((tmp_path / "none.json", "no such file or directory"), (tmp_path, "is a directory")):
-        with pytest.raises(OSError, match="cannot read") as error:
+        with refused(f"cannot read {missing}: {reason}", OSError):
             load_body(missing)
-        assert str(error.value) == f"cannot read {missing}: {reason}"
 
 
 def test_a_million_legs_are_counted_not_built():
     with pytest.raises(SpecError, match=r"^legs\[0\]: expected an object with the fields of a Leg, got a number$"):
         body_from_json('{"name": "a", "torso": ' + json.dumps(SOUND["torso"]) + ', "legs": [' + "1," * 999_999 + "1]}")
-    legs = ROBOTS["queen"].legs[:1] * 1_000_000
-    with pytest.raises(SpecError, match=r"^Body\(queen\).legs: expected 1 to 64 Legs, got 1000000$"):
-        ROBOTS["queen"].replace(legs=legs)
-    assert isinstance(body_from_json(json.dumps(SOUND)), Body)

@@ -23,6 +23,8 @@ from arc_suite.simulation.model import compiled, euler_suffices, list_contacts
 
 BODIES = ROBOTS | {f"random {seed}": random_body(seed) for seed in range(4)}
 EULER, IMPLICITFAST = mujoco.mjtIntegrator.mjINT_EULER, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+AFFINE, AFFINE_BIAS = mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtBias.mjBIAS_AFFINE
+UNDAMPED = mujoco.mjtDisableBit.mjDSBL_EULERDAMP
 STATE = ("time", "qpos", "qvel", "qacc_warmstart", "cfrc_ext", "xpos", "sensordata")
 CONTACT = ("geom", "pos", "frame", "dist", "includemargin", "dim", "friction", "solref", "solimp")
 
@@ -179,33 +181,18 @@ def final_state(model, integrator):
     return data.qvel.tobytes()
 
 
-def undamped(model):
-    model.dof_damping[:] = 0.0
+# Where Euler is another integrator.
+CHANGES = {
+    "undamped": lambda model: model.dof_damping.fill(0.0),
+    "in water": lambda model: setattr(model.opt, "density", 1000.0),
+    "in syrup": lambda model: setattr(model.opt, "viscosity", 1.0),
+    "no damping in Euler": lambda model: setattr(model.opt, "disableflags", model.opt.disableflags | UNDAMPED),
+    "servos": lambda model: (model.actuator_biastype.fill(AFFINE_BIAS), model.actuator_biasprm[:, 2].fill(-5.0)),
+    "motors that weaken": lambda model: (model.actuator_gaintype.fill(AFFINE), model.actuator_gainprm[:, 2].fill(-0.1)),
+}
 
 
-def in_water(model):
-    model.opt.density = 1000.0
-
-
-def in_syrup(model):
-    model.opt.viscosity = 1.0
-
-
-def without_damping_in_euler(model):
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
-
-
-def servos(model):
-    model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
-    model.actuator_biasprm[:, 2] = -5.0
-
-
-def motors_that_weaken(model):
-    model.actuator_gaintype[:] = mujoco.mjtGain.mjGAIN_AFFINE
-    model.actuator_gainprm[:, 2] = -0.1
-
-
-@pytest.mark.parametrize("change", [undamped, in_water, in_syrup, without_damping_in_euler, servos, motors_that_weaken])
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
 def test_where_euler_is_another_integrator_it_is_not_taken(change):
     model = written(ROBOTS["queen"])
     assert euler_suffices(model)

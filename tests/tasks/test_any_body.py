@@ -1,8 +1,6 @@
 """Any body walks: the task is fitted to it and a demonstrator needs no tuning."""
 
-import json
 import math
-import pickle
 
 import mujoco
 import numpy as np
@@ -151,17 +149,11 @@ def test_a_domain_is_a_name_a_body_or_a_file(tmp_path):
         assert environment.task.body == BODY
         size = sum(np.size(block) for block in step.observation.values())
         assert size == 13 + 2 * 18 + 6 * 25
-    for domain, error, message in (
-        (
-            "queeen",
-            ValueError,
-            f"unknown robot 'queeen'; did you mean 'queen'? (there are: {', '.join(registry.words())})",
-        ),
-        (str(tmp_path / "a.json"), OSError, f"cannot read {tmp_path / 'a.json'}: no such file or directory"),
-    ):
-        with refused(message, error):
-            arc_suite.load(domain, "walk")
-    with pytest.raises(ValueError, match="^unknown task 'wall'; did you mean 'walk'"):
+    with refused(f"unknown robot 'queeen'; did you mean 'queen'? (there are: {', '.join(registry.words())})"):
+        arc_suite.load("queeen", "walk")
+    with refused(f"cannot read {tmp_path / 'a.json'}: no such file or directory", OSError):
+        arc_suite.load(str(tmp_path / "a.json"), "walk")
+    with refused("unknown task 'wall'; did you mean 'walk'", begins=True):
         arc_suite.load(BODY, "wall")
 
 
@@ -186,8 +178,6 @@ def test_settings_are_fitted_by_the_documented_formulas():
     assert changed.parameters.target_velocity == 1.0
     assert changed.healthy_range == (0.1, 2.0)
     assert changed.weights["control"] == -1.0
-    with pytest.raises(ValueError, match="^unknown setting of walk 'target_velocty'; did you mean 'target_velocity'"):
-        Walk.settings_for(body, {"target_velocty": 1.0})
 
 
 def test_numbers_go_by_the_name_of_a_body_that_has_the_joints():
@@ -227,27 +217,12 @@ def test_64_legs_load():
     assert body.ranks == (*range(32), *range(32))
 
 
-def test_a_demonstrator_serves_batches():
-    environments = [arc_suite.load(BODY, "walk", {"random": seed}) for seed in range(3)]
-    singles = [Demonstrator(BODY) for _ in environments]
-    batch = pickle.loads(pickle.dumps(Demonstrator(BODY)))
-    steps = [environment.reset() for environment in environments]
-    for _ in range(30):
-        blocks = {name: np.stack([step.observation[name] for step in steps]) for name in steps[0].observation}
-        actions = [policy(step) for policy, step in zip(singles, steps, strict=True)]
-        np.testing.assert_array_equal(batch.act(blocks), actions)
-        assert np.abs(actions).max() <= 1.0
-        steps = [environment.step(action) for environment, action in zip(environments, actions, strict=True)]
-
-
 def test_what_a_demonstrator_cannot_do_is_one_line():
-    for arguments, message in (
-        ((BODY, 0.0), "froude: expected 0.001 or more, forwards or backwards, got 0.0"),
-        ((BODY, math.nan), "froude: expected a number from -1 to 1, got nan"),
-    ):
-        with refused(message):
-            Demonstrator(*arguments)
-    with pytest.raises(ValueError, match="^unknown preset 'quick'"):
+    with refused("froude: expected 0.001 or more, forwards or backwards, got 0.0"):
+        Demonstrator(BODY, 0.0)
+    with refused("froude: expected a number from -1 to 1, got nan"):
+        Demonstrator(BODY, math.nan)
+    with refused("unknown preset 'quick'", begins=True):
         Demonstrator(BODY, "quick")
     assert policies.policy("zero", BODY).act({}, np.zeros(1)).shape == (1, 18)
 
@@ -269,8 +244,3 @@ def test_one_link_legs_are_built_and_stand():
     body = generator.generate(6, 1)
     assert standing(body).margin > 0.08 * body.torso.standing_height
     track(body, 4.0)  # no promise that it walks
-
-
-def test_specs_in_examples_are_plain_json():
-    for path in EXAMPLES:
-        assert set(json.loads(path.read_text())) <= {"name", "torso", "legs", "density", "ballast"}

@@ -385,40 +385,33 @@ def test_named_environments_are_steer_with_modifiers_that_callers_can_change():
     assert load("tick", "shoved", kicks=0.5, delay=1).task.definition.changes[::6] == (0.5, (1, 1))
 
 
+NUMBER, OR_TWO = "expected a number from 0 to 100", "or two of them, the lower first"
+BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock")
+LISTED = ", ".join(BLOCKS)
+
+
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
         ({"kick": 1.0}, "unknown setting of walk 'kick'; did you mean 'kicks'? (there are: "),
-        ({"kicks": -1.0}, "kicks: expected a number from 0 to 100, got -1.0"),
-        ({"kicks": True}, "kicks: expected a number from 0 to 100, got True"),
+        ({"kicks": -1.0}, f"kicks: {NUMBER}, got -1.0"),
+        ({"kicks": True}, f"kicks: {NUMBER}, got True"),
         ({"actuator_failure": 6}, "actuator_failure: expected an integer from 0 to 5, got 6"),
         ({"actuator_failure": -1}, "actuator_failure: expected an integer from 0 to 5, got -1"),
         ({"actuator_failure": "left"}, "actuator_failure: expected an integer from 0 to 5, got 'left'"),
-        (
-            {"motor_strength": -0.1},
-            "motor_strength: expected a number from 0 to 1, or two of them, the lower first, got",
-        ),
-        ({"friction": (1.0, 0.5)}, "friction: expected a number from 0 to 100, or two of them, the lower first, got"),
-        (
-            {"friction": (1, 2, 3)},
-            "friction: expected a number from 0 to 100, or two of them, the lower first, got (1, ",
-        ),
-        ({"mass": 0}, "mass: expected a number from 0.01 to 100, or two of them, the lower first, got 0"),
-        ({"mass": math.nan}, "mass: expected a number from 0.01 to 100, or two of them, the lower first, got nan"),
+        ({"motor_strength": -0.1}, f"motor_strength: expected a number from 0 to 1, {OR_TWO}, got"),
+        ({"friction": (1.0, 0.5)}, f"friction: {NUMBER}, {OR_TWO}, got"),
+        ({"friction": (1, 2, 3)}, f"friction: {NUMBER}, {OR_TWO}, got (1, 2"),
+        ({"mass": 0}, f"mass: expected a number from 0.01 to 100, {OR_TWO}, got 0"),
+        ({"mass": math.nan}, f"mass: expected a number from 0.01 to 100, {OR_TWO}, got nan"),
         ({"observation_noise": -1}, "observation_noise: expected a number from 0 to 100, got -1"),
-        (
-            {"observation_noise": {"postur": 1}},
-            "unknown block with noise 'postur'; did you mean 'posture'? (there are: posture, velocities, ",
-        ),
+        ({"observation_noise": {"postur": 1}}, "unknown block with noise 'postur'; did you mean 'posture'?"),
         ({"delay": 1.5}, "delay: expected an integer from 0 to 100, got 1.5"),
         ({"delay": (3, 1)}, "delay: expected an integer from 3 to 100, got 1"),
         ({"actions": "velocity"}, "unknown actions 'velocity' (there are: torque, position)"),
         ({"exclude_blocks": ("scan",)}, "unknown block 'scan' (there are: posture, velocities, contact_forces,"),
         ({"exclude_blocks": 3}, "exclude_blocks: expected names of blocks, got 3"),
-        (
-            {"exclude_blocks": ["posture", "velocities", "contact_forces", "gait_clock"]},
-            "exclude_blocks: expected to leave a block, got all of them: posture, velocities, contact_forces,",
-        ),
+        ({"exclude_blocks": BLOCKS}, f"exclude_blocks: expected to leave a block, got all of them: {LISTED}"),
     ],
 )
 def test_a_wrong_modifier_is_one_line(settings, message):

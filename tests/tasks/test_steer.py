@@ -106,16 +106,6 @@ def test_a_schedule_begins_again_as_another_command_and_a_live_one_is_none():
     assert schedule.resampled(partly, np.int64(60))
 
 
-def test_the_command_is_observed_and_changes_on_schedule():
-    environment = arc_suite.load("tick", "steer", {"random": 2})
-    timestep, seen = environment.reset(), []
-    for _ in range(200):
-        assert_array_equal(timestep.observation["command"][:3], commands(environment))
-        seen.append(tuple(timestep.observation["command"][:3]))
-        timestep = environment.step(np.zeros(18))
-    assert len(set(seen)) >= 2
-
-
 def test_motion_is_measured_in_the_frame_of_the_heading():
     environment, task, memory = opened("tick", "steer", base_noise=0.0, joint_noise=0.0)
     heading = 2.0
@@ -204,13 +194,7 @@ def test_live_commands_of_environments_are_those_of_single_environments():
     blocks = envs.task.split(observations)
     assert_array_equal(blocks["command"][1, :3], desired.astype(np.float32))
     assert not np.array_equal(blocks["command"][0, :3], blocks["command"][1, :3])
-    envs.close()
-
-
-def test_live_commands_of_environments_add_up_between_two_steps():
-    envs = gymnasium.make_vec("arc_suite/tick-steer-v0", num_envs=3)
-    envs.reset(seed=5)
-    for value, mask in ((0.25, [True, True, False]), (0.5, [False, True, True])):
+    for value, mask in ((0.25, [True, True, False]), (0.5, [False, True, True])):  # which add up
         envs.command("command", (value, 0.0, 0.0), mask=np.array(mask))
     blocks = envs.task.split(envs.step(np.zeros(envs.action_space.shape))[0])
     assert_array_equal(blocks["command"][:, :3], [[0.25, 0, 0], [0.5, 0, 0], [0.5, 0, 0]])
