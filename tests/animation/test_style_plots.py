@@ -1,9 +1,8 @@
 """Pictures of tracks."""
 
 import math
-import subprocess
-import sys
 
+import interpreters
 import numpy as np
 import pytest
 from synthetic import DT, synthetic
@@ -75,5 +74,4 @@ def test_pictures_of_a_track_of_one_step():
 
 @pytest.mark.slow
 def test_metrics_come_without_matplotlib():
-    code = "import sys, arc_suite.style; print('matplotlib' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "False\n"
+    assert interpreters.printed("import sys, arc_suite.style; print('matplotlib' in sys.modules)") == ["False"]

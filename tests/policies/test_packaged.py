@@ -56,13 +56,9 @@ def test_any_body_walks_by_it(body, task):
     assert environment.task.progress["speed" if task == "walk" else "tracking"] > 0.1
 
 
-def test_of_another_robot_or_task():
-    with pytest.raises(
-        ValueError, match=r"^policy ppo: none for tick-gaps \(there are: .*tick-walk.*\); arc-suite train"
-    ):
+def test_of_another_robot_task_or_body():
+    line = r"^policy ppo: none for tick-gaps \(there are: .*tick-walk.*\); arc-suite train"
+    with pytest.raises(ValueError, match=line):
         policies.policy("ppo", "tick", task=Setup.of("tick", "gaps").definition)
-
-
-def test_of_a_body_made_to_order():
     with pytest.raises(ValueError, match=r"^policy ppo: none for walker_5x2-walk \(there are: "):
         policies.policy("ppo", generator.generate(5, 2))

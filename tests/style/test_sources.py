@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from refusals import refused
 from synthetic import assert_same
 
 import arc_suite
@@ -73,16 +74,14 @@ def test_what_is_no_source_is_refused_before_any_work(saved):
         (("cpg", "fats"), "unknown preset 'fats'; did you mean 'fast'? (there are: "),
         (("none.npz",), "cannot read none.npz: no such file or directory"),
     ):
-        with pytest.raises((ValueError, OSError)) as error:
+        with refused(message, (ValueError, OSError), begins=True):
             source(*arguments)
-        assert str(error.value).startswith(message)
     for body, other in ((ROBOTS["tick"], "leaper"), (ROBOTS["leaper"].replace(density=7.0), "another body")):
         with pytest.raises(ValueError, match=f"^{saved}: expected tracks of {body.name}, got those of {other}"):
             source(str(saved)).recorders(Setup.of(body), (0,))
     for arguments, text in ((("steer",), "steer"), (("walk", {"arena": "bumps"}), 'walk, {"arena": "bumps"}')):
-        with pytest.raises(ValueError) as error:
+        with refused(f"{saved}: expected tracks of leaper, {text}, got those of leaper, walk"):
             source(str(saved)).recorders(Setup.of("leaper", *arguments), (0,))
-        assert str(error.value) == f"{saved}: expected tracks of leaper, {text}, got those of leaper, walk"
 
 
 def test_stored_tracks_tell_their_setup(tmp_path, monkeypatch):
@@ -111,10 +110,9 @@ def test_datasets_are_replayed(dataset):
 
 def test_a_replay_that_differs_is_one_line(dataset, monkeypatch):
     monkeypatch.setitem(walk.Walk.weights, "healthy", 0.5)
-    with pytest.raises(ValueError) as error:
+    line = f"^dataset {dataset.id!r}: episode 0 earned .*; arc-suite collect --verify={dataset.id} shows more$"
+    with pytest.raises(ValueError, match=line):
         take(source(dataset.id), LEAPER, range(1))
-    assert str(error.value).startswith(f"dataset {dataset.id!r}: episode 0 earned ")
-    assert str(error.value).endswith(f"; arc-suite collect --verify={dataset.id} shows more")
 
 
 def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
@@ -125,9 +123,8 @@ def test_datasets_that_cannot_be_replayed_are_one_line(dataset):
         ("noisy-v0", "unknown dataset 'noisy-v0' (there are: arc_suite/leaper/noisy-v0)"),
         ("arc_suite/leaper/noisy", "cannot read arc_suite/leaper/noisy: no such file; the id "),
     ):
-        with pytest.raises((ValueError, OSError)) as error:
+        with refused(message, (ValueError, OSError), begins=True):
             source(name)
-        assert str(error.value).startswith(message)
     (dataset.path / "data" / "main_data.hdf5").write_bytes(b"HDF")
     with pytest.raises(ValueError, match="is damaged"):
         take(source(dataset.id), LEAPER, range(1))

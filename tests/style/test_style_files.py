@@ -1,11 +1,13 @@
 """Tracks on disk, bit-equal."""
 
+import functools
 import io
 import zipfile
 
 import gaitless
 import numpy as np
 import pytest
+from refusals import refused
 from synthetic import assert_same
 
 import arc_suite
@@ -105,16 +107,13 @@ def test_no_damage_goes_unnoticed(leaper, saved, tmp_path):
                 assert_same(track, before)
 
 
-def archive(**arrays):
-    file = io.BytesIO()
-    np.savez(file, **arrays)
+def written(write, *arguments, **arrays):
+    """Return the bytes of what a function of NumPy writes into a file."""
+    write(file := io.BytesIO(), *arguments, **arrays)
     return file.getvalue()
 
 
-def one_array():
-    file = io.BytesIO()
-    np.save(file, np.zeros(3))
-    return file.getvalue()
+archive = functools.partial(written, np.savez)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +121,7 @@ def one_array():
     [
         (b"", "not a file of tracks, or a damaged one: File is not a zip file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
-        (one_array(), "not a file of tracks, or a damaged one: "),
+        (written(np.save, np.zeros(3)), "not a file of tracks, or a damaged one: "),
         (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 3', got 'no tracks'; record them anew"),
         (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 3', got 'arc_suite tracks 1'"),
         (archive(format="arc_suite tracks 3"), "not a file of tracks, or a damaged one: 'setup'"),
@@ -133,10 +132,8 @@ def one_array():
 def test_foreign_files_are_one_line(tmp_path, data, message):
     path = tmp_path / "foreign.npz"
     path.write_bytes(data)
-    with pytest.raises(ValueError) as error:
+    with refused(f"{path}: {message}", begins=True):
         load(path)
-    assert str(error.value).startswith(f"{path}: {message}")
-    assert "\n" not in str(error.value)
 
 
 def test_a_file_that_lacks_an_array_is_one_line(saved, tmp_path):
@@ -153,14 +150,6 @@ def test_files_that_cannot_be_read_are_one_line(tmp_path):
     for path, reason in ((tmp_path / "none.npz", "no such file or directory"), (tmp_path, "is a directory")):
         with pytest.raises(OSError, match=f"^cannot read {path}: {reason}$"):
             load(path)
-
-
-def rewritten(saved, path, change):
-    """Save the arrays of a file of tracks again, as a function changes them."""
-    with np.load(saved) as archive:
-        arrays = dict(archive)
-    change(arrays)
-    np.savez(path, **arrays)
 
 
 BAD_ARRAYS = {
@@ -199,17 +188,15 @@ BAD_ARRAYS = {
 def test_arrays_that_no_track_has_are_one_line(saved, tmp_path, name):
     path = tmp_path / "bad.npz"
     key, array = BAD_ARRAYS[name]
-    rewritten(saved, path, lambda arrays: arrays.update({key: array}))
-    with pytest.raises(ValueError) as error:
+    with np.load(saved) as stored:
+        np.savez(path, **dict(stored) | {key: array})
+    with refused(f"{path}: not a file of tracks, or a damaged one: ", begins=True):
         load(path)
-    assert str(error.value).startswith(f"{path}: not a file of tracks, or a damaged one: ")
-    assert "\n" not in str(error.value) and len(str(error.value)) < 600
 
 
 def header(shape):
-    file = io.BytesIO()
-    np.lib.format.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
-    return file.getvalue()
+    about = {"descr": "<f8", "fortran_order": False, "shape": shape}
+    return written(np.lib.format.write_array_header_1_0, about)
 
 
 @pytest.mark.parametrize("shape", [(1 << 40,), (1 << 20, 1 << 20, 1 << 20), (-1,), (13, 3), ()])
