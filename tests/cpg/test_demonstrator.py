@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,37 +17,30 @@ from arc_suite.cpg.prescribed import Bend, Prescribed, Preset, pattern
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.cpg.selection import presets_of, suited_preset
 from arc_suite.models.sizing import control_timestep
-from arc_suite.policies import alone
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.style import record
 
-# preset medium: centre, stance and swing bends in degrees by rank from the front.
+
+class Medium(NamedTuple):
+    """Preset medium: of knees and ankles the centre, stance and swing bends in degrees by rank from the front."""
+
+    kd: float
+    settle: int
+    frequency: float
+    hip: int
+    ankle: tuple
+    knee: tuple = ()
+
+
 MEDIUM = {
-    "queen": {
-        "kd": 0.18,
-        "settle": 15,
-        "frequency": 1.5,
-        "hip": 26,
-        "knee": ((-25, 15, -45), (-25, 15, -45), (25, -15, 45)),
-        "ankle": ((15, 35, 35), (30, 0, 55), (-15, -35, -35)),
-    },
-    "bastion": {"kd": 0.15, "settle": 15, "frequency": 1.5, "hip": 26, "ankle": ((30, -20, 45),) * 3},
-    "tick": {
-        "kd": 0.18,
-        "settle": 15,
-        "frequency": 1.5,
-        "hip": 40,
-        "knee": ((0, 12, -40),) * 3,
-        "ankle": ((0, 0, 45),) * 3,
-    },
-    "leaper": {
-        "kd": 0.15,
-        "settle": 0,
-        "frequency": 1.2,
-        "hip": 30,
-        "knee": ((0, 0, -55),) * 2,
-        "ankle": ((0, 25, 75), (0, 0, -75)),
-    },
+    "queen": Medium(
+        *(0.18, 15, 1.5, 26),
+        ankle=((15, 35, 35), (30, 0, 55), (-15, -35, -35)),
+        knee=((-25, 15, -45), (-25, 15, -45), (25, -15, 45)),
+    ),
+    "bastion": Medium(0.15, 15, 1.5, 26, ankle=((30, -20, 45),) * 3),
+    "tick": Medium(0.18, 15, 1.5, 40, ankle=((0, 0, 45),) * 3, knee=((0, 12, -40),) * 3),
+    "leaper": Medium(0.15, 0, 1.2, 30, ankle=((0, 25, 75), (0, 0, -75)), knee=((0, 0, -55),) * 2),
 }
 OFFSETS = {"l1": 0.5, "r1": 0, "l2": 0, "r2": 0.5, "l3": 0.5, "r3": 0, "fl": 0, "fr": 0.5, "rl": 0.5, "rr": 0}
 UPRIGHT = np.array((1.0, 0.0, 0.0, 0.0))
@@ -78,17 +72,17 @@ def expected_target(robot, joint, step):
     figures = MEDIUM[robot]
     leg, part = joint.rsplit("_", 1)
     hip = part == "hip"
-    centre, stance, swing = (0, 0, 0) if hip else figures[part][RANKS[leg]]
-    if step < figures["settle"]:
+    centre, stance, swing = (0, 0, 0) if hip else getattr(figures, part)[RANKS[leg]]
+    if step < figures.settle:
         return math.radians(centre)
-    cycle = (figures["frequency"] * 0.05 * step + OFFSETS[leg]) % 1.0
+    cycle = (figures.frequency * 0.05 * step + OFFSETS[leg]) % 1.0
     if cycle < 0.6:
         s = cycle / 0.6
         sweep, bend = 1 - 2 * s, stance * math.sin(math.pi * s)
     else:
         w = (cycle - 0.6) / 0.4
         sweep, bend = 2 * w - 1, swing * math.sin(math.pi * w)
-    angle = figures["hip"] * sweep * (-1 if leg in LEFT else 1) if hip else centre + bend
+    angle = figures.hip * sweep * (-1 if leg in LEFT else 1) if hip else centre + bend
     return math.radians(angle)
 
 
@@ -105,25 +99,12 @@ def test_action_is_the_published_law(robot):
         angles, velocities = observation[5 : 5 + n], observation[11 + n : 11 + 2 * n]
         targets = [expected_target(robot, joint, step) for joint in joints]
         kp = 0.8 * (start + (1 - start) * min(1.0, step / ramp))
-        expected = np.clip(kp * (targets - angles) - MEDIUM[robot]["kd"] * velocities, -1, 1)
-        cycle_edges = [(MEDIUM[robot]["frequency"] * 0.05 * step + OFFSETS[j.rsplit("_", 1)[0]]) % 1 for j in joints]
+        expected = np.clip(kp * (targets - angles) - MEDIUM[robot].kd * velocities, -1, 1)
+        cycle_edges = [(MEDIUM[robot].frequency * 0.05 * step + OFFSETS[j.rsplit("_", 1)[0]]) % 1 for j in joints]
         sure = [min(abs(c - edge) for edge in (0.0, 0.6, 1.0)) > 1e-9 for c in cycle_edges]
         action = demonstrator.act(task.split(observation))
         assert action.shape == (n,)
         assert_allclose(action[sure], expected[sure], atol=1e-12, err_msg=f"step {step}")
-
-
-def test_time_steps_blocks_and_environments_give_the_same_action():
-    environment = arc_suite.load("bastion", "walk", {"random": 0})
-    timestep = environment.reset()
-    single, act, batch = Demonstrator("bastion"), alone(Demonstrator("bastion")), Demonstrator("bastion")
-    for _ in range(30):
-        blocks = timestep.observation
-        action = single(timestep)
-        assert_array_equal(action, act(timestep))
-        for found in batch.act({name: np.stack([block, block]) for name, block in blocks.items()}):
-            assert_array_equal(action, found)
-        timestep = environment.step(action)
 
 
 @pytest.mark.filterwarnings("ignore:.*another robot")  # what is felt here is drawn at random

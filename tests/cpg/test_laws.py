@@ -60,7 +60,6 @@ def test_feet_do_not_jump_at_a_stop(robot, preset):
         assert_array_equal(state.phase[resting], held[resting])
         before = targets
     assert resting.all() and changes[:15].max() < 1e-9 < walking
-    environments.close()
 
 
 @pytest.mark.parametrize(("robot", "task", "preset"), PRESETS)
@@ -78,7 +77,6 @@ def test_jit_computes_what_numpy_computes(robot, task, preset):
         theirs, found = compiled(theirs, blocks)
         assert_allclose(np.asarray(found), actions, atol=1e-9)
         observation = environments.step(actions)[0]
-    environments.close()
 
 
 def test_tasks_and_environments_are_accepted():

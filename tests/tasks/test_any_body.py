@@ -130,6 +130,23 @@ def measures_of(body):
     return found
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("task", "preset", "apart"), [("steer", "steered", 0.02), ("navigate", "planned", 0.05)])
+def test_bodies_of_one_shape_earn_alike(task, preset, apart):
+    """Costs, commands and contact forces have no scale."""
+    returns, goals = [], []
+    for scale in (0.1, 1.0, 10.0):
+        body = generator.scaled(BODY, scale)
+        environment = arc_suite.load(body, task, {"random": 2, "base_noise": 0.0})
+        policy, step, total = Demonstrator(body, preset), environment.reset(), 0.0
+        for _ in range(250):
+            step = environment.step(policy(step))
+            total += step.reward
+        returns.append(total), goals.append(environment.task.progress.get("goals"))
+    assert returns == pytest.approx([returns[1]] * 3, rel=apart)
+    assert goals == [goals[0]] * 3 and goals[0] != 0.0
+
+
 def test_an_episode_has_a_thousand_steps_whatever_the_size():
     for scale in (0.15, 1.0, 7.3):
         environment = arc_suite.load(generator.scaled(BODY, scale), "walk")

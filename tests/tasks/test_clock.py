@@ -25,21 +25,6 @@ def test_phases_are_summed_step_by_step(robot):
         phase = (phase + turn) % TWO_PI
 
 
-def test_edges_fall_where_summed_phases_put_them():
-    """The tables of any other way to compute a phase differ: that is why it is added up once."""
-    task, _ = prepared("queen", "walk")
-    ticks = np.arange(1001)
-    multiplied = desired_contacts(ticks * (TWO_PI * 1.5 * 0.05) % TWO_PI, 0.6, task.parameters.phase_offsets)
-    assert (multiplied != task.clock.stance).any(axis=-1).sum() == 44
-
-
-def test_ticks_of_a_batch_are_those_of_its_environments():
-    clock = Clock.made(1.3, 0.6, np.array([0.0, 1.0, 2.0]), 0.05, 1000)
-    ticks = np.array([[0, 7], [1000, 500]])
-    for index in np.ndindex(2, 2):
-        assert_array_equal(clock.at(clock.stance, ticks)[index], clock.at(clock.stance, int(ticks[index])))
-
-
 @pytest.mark.parametrize("frequency", [1.5, 1.2345])
 def test_an_endless_episode_goes_round_without_a_jump(frequency):
     clock = Clock.made(frequency, 0.6, np.zeros(1), 0.05, math.inf)

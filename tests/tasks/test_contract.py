@@ -169,7 +169,6 @@ def test_an_environment_is_bit_equal_to_a_single_environment(task_name, body, se
         ended = twins.step(envs, single, action, ended)
         episodes += ended
     assert episodes >= 3
-    envs.close()
 
 
 SINGLE = "arc_suite/queen-walk-v0"  # whose domain and task other arguments take the place of

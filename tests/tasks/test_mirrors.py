@@ -9,6 +9,7 @@ from tiers import tiers, turn
 import arc_suite
 from arc_suite.robots import ROBOTS, generator, mirror
 from arc_suite.tasks import TASKS, mirrors
+from arc_suite.tasks.sensors import RAYS, SCAN
 
 STEPS = 20
 BODIES = [*ROBOTS, *(generator.random_body(seed) for seed in (1, 4, 5, 6, 7, 8)), generator.generate(8, 2)]
@@ -134,6 +135,12 @@ def test_every_task_has_a_mirror(robot, task):
     observation, _ = arc_suite.symmetry(robot, task)
     size = arc_suite.load(robot, task).task.definition.size
     assert_array_equal(np.sort(observation.sources), np.arange(size))
+
+
+@pytest.mark.parametrize(("task", "block", "points"), [("rough", "scan", SCAN), ("navigate", "ranges", RAYS)])
+def test_what_is_seen_at_points_is_seen_on_the_other_side(task, block, points):
+    mirrored = arc_suite.load("queen", task).task.definition.blocks[block].mirror
+    np.testing.assert_allclose(mirrored(points), points * [[1.0], [-1.0]], atol=1e-15)
 
 
 def test_modifiers_leave_a_task_its_mirror_image():

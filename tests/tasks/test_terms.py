@@ -10,34 +10,7 @@ from arc_suite.envs.prepare import prepared
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import terms
-from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.suite import Steer
-
-
-def test_costs_of_a_batch_are_the_costs_of_its_environments():
-    rng = np.random.default_rng(0)
-    default = rng.uniform(-0.5, 0.5, 12)
-    shapes = Readings((17,), (3,), (4,), (12,), (18,), (126,), (3,), (4,))
-    for axes in ((5,), (2, 3)):
-        readings = Readings(*(rng.normal(0, 0.3, axes + shape) for shape in shapes))
-        step = *rng.uniform(-1, 1, (2, *axes, 12)), rng.integers(0, 5, axes).astype(float)
-        batch = terms.costs(readings, *step, default)
-        for index in np.ndindex(*axes):
-            one = Readings(*(array[index] for array in readings))
-            row = terms.costs(one, *(array[index] for array in step), default)
-            for name, value in row.items():
-                assert batch[name].shape == axes
-                assert batch[name][index] == value, name
-
-
-def test_the_triangular_kernel_has_compact_support():
-    def forward(velocity):
-        return terms.triangle(np.float64(velocity) - 0.5, 0.3)
-
-    assert forward(0.5) == 1.0
-    assert_allclose(forward(0.65), 0.5)
-    assert_allclose(forward(0.35), 0.5)
-    assert forward(0.81) == forward(0.19) == forward(-0.5) == 0.0
 
 
 @pytest.mark.filterwarnings("error")
