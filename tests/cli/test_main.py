@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 
+import interpreters
 import programs
 import pytest
 
@@ -59,9 +60,8 @@ def test_only_the_program_that_runs_is_imported():
         "try: main.main()\n"
         "finally: print(sorted(name for name in sys.modules if name.startswith('arc_suite.cli.')))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     names = [f"arc_suite.cli.{name}" for name in ("doctor", "main", "program", "programs")]
-    assert done.stdout == f"{VERSION}{names}\n"
+    assert interpreters.printed(code) == [VERSION.strip(), f"{names}"]
 
 
 @pytest.mark.parametrize("arguments", [[], ["-h"], ["--help"]])

@@ -1,13 +1,7 @@
 """The suite on other platforms: what Windows does not have, and texts whose encoding depends on the machine."""
 
-import os
-import pathlib
-import subprocess
-import sys
-
+import interpreters
 import pytest
-
-ROOT = pathlib.Path(__file__).parents[2]
 
 # Takes from Python what Windows does not have, and gives it a lock on a range of bytes as msvcrt has.
 WINDOWS = """
@@ -67,17 +61,10 @@ except ValueError as error:
 """
 
 
-def run(code, folder, *options):
-    environ = os.environ | {"PYTHONPATH": str(ROOT), "MINARI_DATASETS_PATH": str(folder / "datasets")}
-    command = [sys.executable, *options, "-c", code]
-    return subprocess.run(command, cwd=folder, env=environ, capture_output=True, text=True)
-
-
 @pytest.mark.slow
 def test_what_windows_does_not_have_is_not_needed(tmp_path):
     (tmp_path / "other.py").write_text(WINDOWS + OTHER)
-    done = run(WINDOWS + USE, tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    interpreters.printed(WINDOWS + USE, folder=tmp_path, MINARI_DATASETS_PATH=str(tmp_path / "datasets"))
     assert (tmp_path / "a.json").read_bytes().decode() == '{\n  "leg": "F\\u00fc\\u00dfe"\n}\n'
 
 
@@ -85,5 +72,6 @@ def test_what_windows_does_not_have_is_not_needed(tmp_path):
 def test_files_do_not_depend_on_the_encoding_of_the_machine(tmp_path):
     strict = "import os, sys, warnings\nwarnings.filterwarnings('error', '', EncodingWarning, 'arc_suite')\n"
     (tmp_path / "other.py").write_text(OTHER)
-    done = run(strict + USE, tmp_path, "-X", "warn_default_encoding")
-    assert done.returncode == 0, done.stderr
+    options = ("-X", "warn_default_encoding", "-W", "ignore::EncodingWarning")  # those of other packages
+    settings = {"options": options, "MINARI_DATASETS_PATH": str(tmp_path / "datasets")}
+    interpreters.printed(strict + USE, folder=tmp_path, **settings)

@@ -1,13 +1,9 @@
 """The suite keeps to itself: no files, no network, no side effects."""
 
 import os
-import pathlib
-import subprocess
-import sys
 
+import interpreters
 import pytest
-
-ROOT = pathlib.Path(__file__).parents[2]
 
 # Uses everything, with an accident that MuJoCo warns of, while the network is cut off.
 SCRIPT = """
@@ -40,11 +36,9 @@ for robot, task, settings in jobs:
 def test_no_file_appears_and_nothing_is_downloaded(tmp_path):
     home, work = tmp_path / "home", tmp_path / "work"
     home.mkdir(), work.mkdir()
-    environ = os.environ | {"PYTHONPATH": str(ROOT), "HOME": str(home), "PYTHONDONTWRITEBYTECODE": "1"}
-    for name in [name for name in environ if name.startswith("XDG_")]:
-        del environ[name]
-    done = subprocess.run([sys.executable, "-c", SCRIPT], cwd=work, env=environ, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    surroundings = {name: None for name in os.environ if name.startswith("XDG_")}
+    surroundings |= {"HOME": str(home), "PYTHONDONTWRITEBYTECODE": "1"}
+    interpreters.printed(SCRIPT, folder=work, **surroundings)
     assert sorted(tmp_path.rglob("*")) == [home, work]
 
 
@@ -69,6 +63,4 @@ print([name for name, value in state().items() if value != before[name]])
 
 
 def test_import_has_no_side_effect_but_registration():
-    environ = os.environ | {"PYTHONPATH": str(ROOT), "MUJOCO_GL": "egl"}
-    done = subprocess.run([sys.executable, "-c", IMPORT], env=environ, capture_output=True, text=True)
-    assert (done.returncode, done.stdout, done.stderr) == (0, "[]\n", "")
+    assert interpreters.printed(IMPORT, MUJOCO_GL="egl") == ["[]"]

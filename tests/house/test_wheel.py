@@ -11,10 +11,10 @@ import sysconfig
 import zipfile
 
 import mujoco
+import programs
 import pytest
 
 import arc_suite
-from arc_suite.robots import spec_files
 
 ROOT = pathlib.Path(__file__).parents[2]
 NOT_SOURCES = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "out")
@@ -54,9 +54,7 @@ def run(wheel, tmp_path_factory):
 
     def run(program, *arguments):
         command = [folder / "bin" / program, *arguments]
-        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-        assert (done.returncode, done.stderr) == (0, "")
-        return done.stdout
+        return programs.passed(subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True))
 
     return run
 
@@ -71,14 +69,12 @@ def metadata(wheel):
 def test_the_wheel_holds_the_package_and_nothing_else(wheel):
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
-    package = {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite").rglob("*.py")} | {"arc_suite/py.typed"}
-    package |= {
-        f"arc_suite/animation/{name}" for name in ("page.html", "play.html", *(f"web/{name}" for name in BUILT))
-    }
-    package |= {"arc_suite_command.py", "arc_suite/animation/design/gallery.html", "arc_suite/evaluation/anchors.csv"}
-    package |= {"arc_suite/cpg/searched.json"}
-    package |= {str(path.relative_to(ROOT)) for path in (ROOT / "arc_suite" / "policies" / "packaged").iterdir()}
-    package |= {f"arc_suite/robots/examples/{name}.json" for name in spec_files.EXAMPLES}
+    folder = ROOT / "arc_suite"
+    paths = [*folder.rglob("*.py"), *folder.glob("policies/packaged/*"), *folder.glob("robots/examples/*.json")]
+    paths += [folder / name for name in ("py.typed", "cpg/searched.json", "evaluation/anchors.csv")]
+    paths += [folder / "animation" / name for name in ("page.html", "play.html", "design/gallery.html")]
+    paths += [folder / "animation" / "web" / name for name in BUILT]
+    package = {str(path.relative_to(ROOT)) for path in paths} | {"arc_suite_command.py"}
     prefix = f"arc_suite-{arc_suite.__version__}.dist-info/"
     assert {name for name in names if not name.startswith(prefix)} == package
     assert [name for name in names if name.endswith("/LICENSE")]

@@ -5,6 +5,7 @@ import shlex
 
 import programs
 import pytest
+from refusals import refused
 
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import opened
@@ -88,8 +89,7 @@ def test_the_command_line_is_understood(sketch, tmp_path):
     program, view, *flags = shlex.split(sketches.command_line(sketch))
     assert (program, view) == ("arc-suite", "view")
     done = programs.arc_suite("evaluate", *flags, "--episodes=1", "--set=time_limit=0.5", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert body.name in done.stdout
+    assert body.name in programs.passed(done)
 
 
 def test_command_lines():
@@ -127,14 +127,11 @@ def test_what_check_says_can_be_applied():
     ("sketch", "message"),
     [
         (Sketch(legs=5, layout="pairs"), "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
-        (
-            Sketch(gait="trot"),
-            "gait 'trot' does not fit walker_8x3 with its 8 legs (fit: tripod, tetrapod, ripple, wave)",
-        ),
+        (Sketch(gait="trot"), "gait 'trot' does not fit walker_8x3 with its 8 legs (fit: tripod, tetrapod, ripple, "),
         (Sketch(settings="friction=1"), 'settings: expected a JSON object, such as {"friction": 0.5}: Expecting value'),
         (Sketch(settings="[1]"), "settings: expected a mapping of names to values, got [1]"),
         (Sketch(settings='{"random": 1}'), "setting 'random': expected none, as every episode has a seed, got 1"),
-        (Sketch(settings='{"arena": "os:path"}'), None),
+        (Sketch(settings='{"arena": "os:path"}'), ""),
         (Sketch(settings='{"arena": "antigravity:x"}'), "arena 'antigravity:x': files import nothing"),
         (Sketch(palette="mos"), "Body(walker_8x3).palette: expected one of moss, "),
         (Sketch(source="spidre"), "unknown source 'spidre'; did you mean 'spider'?"),
@@ -145,7 +142,5 @@ def test_what_check_says_can_be_applied():
     ],
 )
 def test_a_bad_combination_is_one_line(sketch, message):
-    with pytest.raises(ValueError) as error:
+    with refused(message, begins=True):
         opened(sketch)
-    assert "\n" not in str(error.value)
-    assert message is None or str(error.value).startswith(message)
