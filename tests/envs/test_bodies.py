@@ -68,6 +68,7 @@ def assert_each_alone(env, singles, actions):
             expected = single.step(joints[None])
             result = own[index][None], reward[[index]], terminated[[index]], truncated[[index]]
             assert same(result, expected[:4]), index
+            assert env.resampled()[index] == single.resampled()[0]
             assert_infos_equal(info, expected[4], index, env)
             observed = of_each[index].observed(of_each[index].gathered(expected[0]))
             assert same({name: array[[index]] for name, array in observation.items()}, observed), index
@@ -131,18 +132,7 @@ def test_each_on_other_grounds(task):
 def test_other_commands_of_each(monkeypatch):
     monkeypatch.setattr(command, "SHORTEST", 3)
     monkeypatch.setattr(command, "LONGEST", 6)
-    env = make(FEW, "steer")
-    singles, _ = alone(env, "steer"), env.reset(seed=3)
-    for index, single in enumerate(singles):
-        single.reset(seed=3 + index)
-    found = []
-    for action in actions_of(env, 12):
-        env.step(action)
-        for single, own, mask in zip(singles, action, env.description.mask, strict=True):
-            single.step(own[mask][None])
-        found.append(env.resampled())
-        assert_array_equal(found[-1], [single.resampled()[0] for single in singles])
-    assert np.any(found, axis=0).all() and not np.all(found, axis=0).any()
+    assert_environments(FEW, "steer", "NextStep", 1, steps=12)
 
 
 def test_bodies_of_one_layout_share_a_batch():

@@ -51,22 +51,6 @@ def test_visuals_keep_every_array_of_the_dynamics(body):
 
 
 @every_body
-def test_visuals_keep_a_rollout_bit_for_bit(body):
-    states = []
-    for decorated in (False, True):
-        model = compiled(body, decorated)
-        data = mujoco.MjData(model)
-        random = np.random.default_rng(0)
-        states.append([])
-        for _ in range(50):
-            data.ctrl = random.uniform(-1.0, 1.0, model.nu)
-            mujoco.mj_step(model, data, 25)
-            states[-1].append(np.concatenate([data.qpos, data.qvel, data.cfrc_ext.ravel(), data.sensordata]))
-    assert len(np.unique(states[0], axis=0)) == 50
-    np.testing.assert_array_equal(*states)
-
-
-@every_body
 def test_everything_that_visuals_add_is_named(body):
     model = compiled(body, True)
     for kind, count in (("geom", "ngeom"), ("light", "nlight"), ("camera", "ncam"), ("mat", "nmat"), ("tex", "ntex")):

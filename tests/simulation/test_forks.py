@@ -89,46 +89,24 @@ def test_what_was_made_before_a_fork(what, then):
     assert interpreters.printed(SCRIPT, what, then) == expected
 
 
-def rollout(seed, picture, sender=None):
-    """Return of a short episode of an environment made here, and a picture's mean."""
-    environment = arc_suite.load("tick", "walk", {"random": seed})
-    environment.reset()
-    total = sum(environment.step(np.zeros(18)).reward for _ in range(10))
-    result = total, float(environment.physics.render(32, 32).mean()) if picture else 0.0
-    if sender is not None:
-        sender.send(result)
-    return result
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
-def test_environments_made_in_the_child_work(method):
-    context = multiprocessing.get_context(method)
-    picture = method != "fork"  # this process may have opened OpenGL
-    receiver, sender = context.Pipe(duplex=False)
-    child = context.Process(target=rollout, args=(3, picture, sender))
-    child.start()
-    sender.close()
-    assert receiver.poll(WATCHDOG)
-    assert receiver.recv() == rollout(3, picture)
-    child.join(WATCHDOG)
-    assert child.exitcode == 0
-
-
 @pytest.mark.parametrize(
     "method",
     [pytest.param(m, marks=SLOW if m == "spawn" else LONG) for m in multiprocessing.get_all_start_methods()],
 )
 def test_async_vector_environments_work(method):
+    """With pictures, unless this process has opened OpenGL and is forked."""
+    size = {} if method == "fork" else {"render_mode": "rgb_array", "width": 32, "height": 32}
     kwargs = {"vectorization_mode": "async", "vector_kwargs": {"context": method}}
-    envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2, **kwargs)
+    envs = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=2, **kwargs, **size)
     observations, _ = envs.reset(seed=5)
     rewards = [envs.step(np.zeros((2, 18), np.float32))[1] for _ in range(3)]
+    pictures = envs.call("render")
     envs.close()
     for index in range(2):
-        env = gymnasium.make("arc_suite/tick-walk-v0")
+        env = gymnasium.make("arc_suite/tick-walk-v0", **size)
         np.testing.assert_array_equal(observations[index], env.reset(seed=5 + index)[0])
         assert [float(reward[index]) for reward in rewards] == [env.step(np.zeros(18, np.float32))[1] for _ in range(3)]
+        np.testing.assert_array_equal(pictures[index], env.render())
 
 
 @pytest.mark.slow

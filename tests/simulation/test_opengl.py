@@ -44,70 +44,47 @@ ctypes.CDLL.__init__ = refuse
 
 REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
 NO_DRIVER = {"__EGL_VENDOR_LIBRARY_DIRS": "/nonexistent"}  # libEGL loads, and finds nobody to draw
-
-
 UNSET = dict.fromkeys(("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM", "EGL_LOG_LEVEL"))
 EGL = {"MUJOCO_GL": "egl"}
 PICTURE = "picture (48, 64, 3)"
-
-
-def outcome(folder, sitecustomize="", **variables):
-    """Return what importing changes, and what comes of pictures, by the script without a display."""
-    (folder / "sitecustomize.py").write_text(sitecustomize)
-    variables = UNSET | variables
-    changed, *lines = interpreters.printed(SCRIPT, folder=folder, options=("-W", "default::UserWarning"), **variables)
-    assert lines == ["reward True", lines[1], lines[1], "reward True"]
-    return changed, lines[1]
-
-
-def told(changed):
-    return f"changed {changed} removed []"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("variables", "changed"), [({}, EGL), (EGL, {}), ({"DISPLAY": ":9876"}, {})], ids=["no display", "chosen", "dead"]
+NO_LIBRARY, NO_EGL = "the OpenGL library is missing", "Cannot initialize a headless EGL display"
+NO_DISPLAY = "(65550) b'X11: The DISPLAY environment variable is missing'"
+UNKNOWN = (
+    "Environment variable MUJOCO_GL must be one of ['', '0', '1', 'disable', 'disabled', 'egl', 'enable', 'enabled', "
+    "'false', 'glfw', 'off', 'on', 'osmesa', 'true']: got 'vulkan'"
 )
-def test_egl_where_no_display_answers_and_the_users_choice_stays(tmp_path, variables, changed):
-    assert outcome(tmp_path, **variables) == (told(changed), PICTURE)
+
+
+def cannot(cause, chosen=""):
+    """The error of a picture for a cause, with a value of MUJOCO_GL."""
+    return f"RenderingUnavailable: cannot render{chosen and f' with MUJOCO_GL={chosen}'}: {cause}; {REMEDY}"
+
+
+DISABLED = "RenderingUnavailable: cannot render: MUJOCO_GL=disable turns it off; unset it, or set MUJOCO_GL=egl"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("sitecustomize", "variables", "changed", "message"),
+    ("sitecustomize", "variables", "changed", "outcome"),
     [
-        (WITHOUT_LIBRARIES, {}, {}, f"cannot render: the OpenGL library is missing; {REMEDY}"),
-        (
-            *(WITHOUT_LIBRARIES, EGL, {}),
-            f"cannot render with MUJOCO_GL=egl: the OpenGL library is missing; {REMEDY}",
-        ),
-        (
-            *("", NO_DRIVER, EGL),
-            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
-        ),
-        (
-            *("", NO_DRIVER | EGL, {}),
-            f"cannot render with MUJOCO_GL=egl: Cannot initialize a headless EGL display; {REMEDY}",
-        ),
-        (
-            *("", {"MUJOCO_GL": "disable"}, {}),
-            "cannot render: MUJOCO_GL=disable turns it off; unset it, or set MUJOCO_GL=egl",
-        ),
-        (
-            *("", {"MUJOCO_GL": "glfw"}, {}),
-            "cannot render with MUJOCO_GL=glfw: (65550) b'X11: The DISPLAY environment variable is missing'; " + REMEDY,
-        ),
-        (
-            *("", {"MUJOCO_GL": "vulkan"}, {}),
-            "cannot render with MUJOCO_GL=vulkan: Environment variable MUJOCO_GL must be one of ['', '0', '1', "
-            "'disable', 'disabled', 'egl', 'enable', 'enabled', 'false', 'glfw', 'off', 'on', 'osmesa', 'true']: "
-            f"got 'vulkan'; {REMEDY}",
-        ),
+        ("", {}, EGL, PICTURE),
+        ("", EGL, {}, PICTURE),
+        ("", {"DISPLAY": ":9876"}, {}, PICTURE),
+        (WITHOUT_LIBRARIES, {}, {}, cannot(NO_LIBRARY)),
+        (WITHOUT_LIBRARIES, EGL, {}, cannot(NO_LIBRARY, "egl")),
+        ("", NO_DRIVER, EGL, cannot(NO_EGL, "egl")),
+        ("", NO_DRIVER | EGL, {}, cannot(NO_EGL, "egl")),
+        ("", {"MUJOCO_GL": "disable"}, {}, DISABLED),
+        ("", {"MUJOCO_GL": "glfw"}, {}, cannot(NO_DISPLAY, "glfw")),
+        ("", {"MUJOCO_GL": "vulkan"}, {}, cannot(UNKNOWN, "vulkan")),
     ],
-    ids=["no library", "egl, no library", "no driver", "egl, no driver", "disable", "glfw, no display", "unknown"],
 )
-def test_simulates_without_opengl_and_says_what_is_missing(tmp_path, sitecustomize, variables, changed, message):
-    assert outcome(tmp_path, sitecustomize, **variables) == (told(changed), f"RenderingUnavailable: {message}")
+def test_egl_where_no_display_answers_and_what_is_missing(tmp_path, sitecustomize, variables, changed, outcome):
+    """The user's choice stays, and without OpenGL everything is simulated."""
+    (tmp_path / "sitecustomize.py").write_text(sitecustomize)
+    options, variables = ("-W", "default::UserWarning"), UNSET | variables
+    lines = interpreters.printed(SCRIPT, folder=tmp_path, options=options, **variables)
+    assert lines == [f"changed {changed} removed []", "reward True", outcome, outcome, "reward True"]
 
 
 @pytest.mark.slow

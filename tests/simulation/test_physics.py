@@ -51,14 +51,6 @@ def test_flat_ground_is_the_default():
     assert Physics.from_body(BODY, fitted(BODY)).model.nhfield == 1
 
 
-def test_an_interrupted_step_leaves_sensors_on():
-    physics = Physics.from_body(BODY)
-    flags = physics.model.opt.disableflags
-    with pytest.raises(TypeError):
-        physics.step(2.5)
-    assert physics.model.opt.disableflags == flags
-
-
 def test_a_copy_that_shares_the_model_changes_nothing_in_it():
     physics = Physics.from_body(BODY)
     heavy = 2.0 * physics.model.body_mass

@@ -49,11 +49,12 @@ def test_our_steps_read_no_clock_and_others_do(clock):
     assert seconds_of_steps() > 0.0
 
 
-def test_an_exception_puts_the_clock_back(clock):
+def test_an_exception_puts_the_clock_and_sensors_back(clock):
     physics = Physics.from_body(BODY)
+    flags = physics.model.opt.disableflags
     with pytest.raises(TypeError):
         physics.step(2.5)
-    assert seconds_of_steps() > 0.0
+    assert seconds_of_steps() > 0.0 and physics.model.opt.disableflags == flags
     with pytest.raises(ValueError):
         Batch(compiled(BODY), 2, 2).step(25, np.ones(3, bool))
     assert seconds_of_steps() > 0.0

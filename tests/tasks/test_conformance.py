@@ -1,6 +1,5 @@
 """Conformance of every task of the registry: what users of dm_control's suite rely on."""
 
-import copy
 import io
 import unittest
 
@@ -165,10 +164,3 @@ def test_episode_is_1000_steps_of_50_ms(domain, task):
         length += 1
     assert length == 1000
     assert environment.control_timestep() == 0.05
-
-
-@every_task
-def test_a_copy_is_independent_and_equal(domain, task):
-    environment = begun(domain, task)
-    environment.step(np.zeros(JOINTS[domain]))
-    assert_same_steps(environment, copy.deepcopy(environment), random_actions(environment, 10))

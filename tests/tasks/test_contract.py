@@ -19,7 +19,6 @@ from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.contract import Inputs
 from arc_suite.tasks.walk import Walk
 
 BODIES = {**ROBOTS, "random": generator.random_body(3)}
@@ -217,47 +216,3 @@ def test_blocks_other_than_declared_are_impossible(monkeypatch, change, observed
     environment = arc_suite.load("leaper", "careless")
     with refused(f"observation of careless: expected blocks {declared}, got {observed}"):
         environment.reset()
-
-
-class Kicked(Walk):
-    """Kicks the torso upwards in the first steps; an episode's length is where the next one starts."""
-
-    name = "kicked"
-
-    def first(self):
-        return 100
-
-    def start(self, random, stream):
-        start = super().start(random, stream)
-        start.qpos[0] = stream
-        return start
-
-    def before(self, memory, action):
-        memory, inputs = super().before(memory, action)
-        kick = np.zeros((*action.shape[:-1], 6 + action.shape[-1]))
-        kick[..., 2] = 0.5 * (memory.tick < 3)
-        return memory, Inputs(inputs.ctrl, kick)
-
-    def stream_state(self, memory):
-        return int(memory.tick)
-
-
-def test_kicks_and_carries_are_the_same_in_a_batch(monkeypatch):
-    monkeypatch.setitem(TASKS, "kicked", Kicked)
-    settings = {"time_limit": 0.5}
-    envs = VectorEnv("leaper", "kicked", 2, 1, task_kwargs=settings)
-    plain, single = (arc_suite.load("leaper", name, {"random": 4, **settings}) for name in ("walk", "kicked"))
-    envs.reset(seed=3)
-    plain.reset()
-    assert single.reset() is not None and single.physics.position()[0] == 100.0
-    for step in range(1, 12):
-        plain.step(np.zeros(12))
-        timestep = single.step(np.zeros(12))
-        observations, *_ = envs.step(np.zeros((2, 12)))
-        assert_array_equal(observations[1], np.concatenate(list(timestep.observation.values())).astype(np.float32))
-        if step == 5:
-            assert single.physics.position()[2] > plain.physics.position()[2] + 0.02
-    assert timestep.first() and single.physics.position()[0] == 10.0, "the carry of ten steps"
-    assert single.reset(seed=4) is not None and single.physics.position()[0] == 100.0, "a seed begins a new stream"
-    envs.reset(seed=3)
-    assert_array_equal(envs.batch.data.qpos[:, 0], 100.0)

@@ -13,7 +13,6 @@ from refusals import refused
 from tiers import never, tiers
 
 import arc_suite
-from arc_suite import rotations
 from arc_suite.arenas import terrain
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.prepare import prepared
@@ -21,7 +20,6 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import TASKS
-from arc_suite.tasks.command import draw_schedule
 from arc_suite.tasks.ground import LEVELS, Lanes, Stream, next_level
 from arc_suite.tasks.sensors import FORWARD, LEFT, SCAN
 
@@ -190,27 +188,6 @@ def test_an_episode_starts_in_a_lane_clear_of_the_ground(name):
     assert lanes <= {arena.start(lane) for lane in range(len(arena.lanes))}
 
 
-@pytest.mark.slow
-def test_what_is_drawn_and_in_which_order():
-    """Kind, two for the level, lane, place; then the noise of the state, yaw, ends and commands of the schedule."""
-    task = prepared("tick", "course", {"curriculum": True, "level": 3})[0]
-    start = task.start(np.random.RandomState(7), task.first())
-    random = np.random.RandomState(7)
-    kind, _, _, lane = random.randint(4), random.uniform(), random.randint(LEVELS), random.randint(1)
-    place = random.uniform(-6.0, 6.0)
-    joints = len(task.scene.body.joint_names)
-    random.uniform(size=7 + joints), random.standard_normal(6 + joints)
-    yaw = random.uniform(-0.3, 0.3)
-    drawn, memory = draw_schedule(random), start.memory.ground
-    assert memory.lane == task.scene.arena.start(kind * LEVELS + 3 + lane) and memory.level == 3
-    noise = task.settings.noise
-    assert abs(start.qpos[1] - memory.lane - place * task.scene.arena.unit) <= noise.position_noise
-    assert rotations.yaw(start.qpos[3:7]) == pytest.approx(yaw, abs=3.0 * noise.orientation_noise)
-    again = np.random.RandomState(7)
-    task.start(again, task.first())
-    assert drawn.schedule.shape == (17, 3) and again.uniform() == random.uniform(), "the schedule is drawn, and no more"
-
-
 def test_the_scan_is_the_ground_about_the_torso():
     environment, task, _ = opened("queen", "gaps", difficulty=1.0)
     demonstrator, timestep = Demonstrator("queen", "steered"), environment.reset(seed=3)
@@ -334,6 +311,8 @@ def test_environments_of_a_curriculum_are_single_environments(name, threads):
         ended = twins.step(envs, single, random.uniform(-1.0, 1.0, 12).astype(np.float32), ended)
         levels.append(single.unwrapped.task.progress["level"])
     assert levels[0] == 4.0 and len(set(levels)) >= 3
+    assert_array_equal(envs.reset(seed=10)[0][1], single.reset(seed=11)[0])
+    assert_array_equal(envs._memory.ground.level, 4)  # a seed begins a new stream
 
 
 @pytest.mark.long

@@ -76,18 +76,8 @@ def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_the_gaits_of_the_robots_take_turns(task):
     for robot in ROBOTS:
-        task_of_robot = arc_suite.load(robot, task).task.definition
-        clock, image = task_of_robot.clock, mirror.image(ROBOTS[robot])
-        assert task_of_robot.blocks["gait_clock"].map(image).signs.tolist() == [-1, -1]
-        later = task_of_robot.clock.made(
-            task_of_robot.parameters.gait_frequency,
-            task_of_robot.parameters.duty_factor,
-            task_of_robot.parameters.phase_offsets + np.pi,
-            task_of_robot.scene.control_timestep,
-            100,
-        )
-        # But where an edge falls on a tick to rounding.
-        assert (later.stance != clock.stance[:101, image.legs]).mean() < 0.1
+        clock = arc_suite.load(robot, task).task.definition.blocks["gait_clock"]
+        assert clock.map(mirror.image(ROBOTS[robot])).signs.tolist() == [-1, -1]
 
 
 def test_twice_is_once_for_environments_of_any_precision():

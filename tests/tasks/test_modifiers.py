@@ -6,6 +6,7 @@ import math
 import pathlib
 import pickle
 import re
+import types
 
 import gaitless
 import gymnasium
@@ -44,7 +45,6 @@ CASES = EACH | {"all": ALL}
 
 
 _TASKS = [*itertools.product(EACH, ["walk", "steer"]), *itertools.product(["all"], TASKS)]
-every_body = pytest.mark.parametrize("body", BODIES)
 
 
 def test_every_modifier_is_tried():
@@ -173,8 +173,7 @@ def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_agai
     assert_array_equal(list(seen.values())[25:], memory.changes.kicks[: len(seen) - 25])
     sizes = np.hypot(*memory.changes.kicks.T) / math.sqrt(GRAVITY * ROBOTS["tick"].torso.standing_height)
     assert sizes.min() > 0.0 and sizes.max() < 1.5
-    stronger = load("tick", "walk", kicks=3.0)
-    stronger.reset()
+    stronger = begun("tick", "walk", kicks=3.0)
     assert_allclose(stronger.task.memory.changes.kicks, 2.0 * memory.changes.kicks, rtol=1e-15)
 
 
@@ -204,9 +203,8 @@ def test_a_limp_leg_has_no_motors_from_step_40_on(leg):
     for step in range(60):
         environment.step(action)
         ctrl = environment.physics.data.ctrl
-        assert_array_equal(
-            ctrl, action if step < 40 else np.where(environment.task.memory.changes.failing, 0.0, action)
-        )
+        failing = environment.task.memory.changes.failing
+        assert_array_equal(ctrl, np.where(failing & (step >= 40), 0.0, action))
     limp = np.flatnonzero(environment.task.memory.changes.failing)
     assert len({names[index].rpartition("_")[0] for index in limp}) == 1 and len(limp) == 3
     if leg is not True:
@@ -262,8 +260,7 @@ def test_what_slides_slides_further_with_less_friction(arena):
     """Whether contacts are listed or not."""
     gone = {}
     for friction in (0.01, 1.0):
-        environment = load("queen", "walk", friction=friction, arena=arena)
-        environment.reset()
+        environment = begun("queen", "walk", friction=friction, arena=arena)
         environment.physics.data.qvel[0] = 1.0
         for _ in range(10):
             environment.step(np.zeros(18))
@@ -296,15 +293,10 @@ def test_positions_are_held():
 def test_torques_have_positions_that_give_them():
     task, random = load("leaper", "walk", actions="position").task.definition, np.random.RandomState(0)
     angles, speeds, torques = (scale * random.uniform(-1, 1, (50, 12)) for scale in (0.5, 1.0, 1.0))
-
-    class Memory:
-        pass
-
-    Memory.angles, Memory.speeds = angles, speeds
-    action = task.positions(torques, angles, speeds)
+    memory, action = types.SimpleNamespace(angles=angles, speeds=speeds), task.positions(torques, angles, speeds)
     reached = abs(action) < 1.0
     assert reached.mean() > 0.5
-    assert_allclose(task.torques(Memory, action)[reached], torques[reached], atol=1e-9)
+    assert_allclose(task.torques(memory, action)[reached], torques[reached], atol=1e-9)
 
 
 def test_noise_is_uniform_and_depends_on_all_that_it_counts():
@@ -318,9 +310,8 @@ def test_noise_is_uniform_and_depends_on_all_that_it_counts():
         for lag in (1, 2, 7):
             assert abs((lines[lag:] * lines[:-lag]).mean() * 3.0) < 0.012
     # As MurmurHash3's own finaliser computes.
-    assert_array_equal(
-        noise.scrambled(np.array([0, 1, 0xDEADBEEF], np.uint32)), np.array([0, 0x514E28B7, 0x0DE5C6A9], np.uint32)
-    )
+    scrambled = noise.scrambled(np.array([0, 1, 0xDEADBEEF], np.uint32))
+    assert_array_equal(scrambled, [0, 0x514E28B7, 0x0DE5C6A9])
 
 
 def test_noise_is_on_what_is_measured_and_on_nothing_else():

@@ -51,17 +51,6 @@ def test_pillars_leave_room_and_goals_are_apart(robot):
     assert 0.3 < across < 0.6, "some ways lead between pillars, some straight at one"
 
 
-def test_what_is_drawn_and_in_which_order():
-    """Steer's draws, then pillars, then goals."""
-    (start,) = drawn(seeds=[7])[1]
-    random = np.random.RandomState(7)
-    arc_suite.load("tick", "steer").task.definition.start(random, None)
-    shifts, numbers = random.uniform(-1.0, 1.0, (COUNT, 2)), random.uniform(size=command.GOALS)
-    task = arc_suite.load("tick", "navigate").task.definition
-    assert_array_equal(start.memory.ground.pillars, task.scene.arena.places(shifts)[:, :2])
-    assert_array_equal(start.memory.command.goals, task.scene.arena.unit * PITCH * command.chain(numbers))
-
-
 @pytest.mark.parametrize("robot", ["queen", "tick"])
 def test_ranges_are_those_of_mujocos_rays(robot):
     environment = arc_suite.load(robot, "navigate", {"random": 1})
