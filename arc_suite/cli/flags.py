@@ -156,19 +156,65 @@ def only_body(robot: flags.FlagHolder) -> Body:
     return body
 
 
-def setups(robot: flags.FlagHolder) -> dict[str, Setup]:
+def setups(robot: flags.FlagHolder, stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
+    A trained policy, or a file of tracks, brings what the flags leave open, and a line says what: its body; without
+    --task its task and settings, which --set changes. A curriculum is for training, and is left out.
+
+    Args:
+        robot: the flag.
+        stored: the setup of tracks; None for that of --policy.
+        near: see `bodies`.
+
     Raises:
-        ValueError: as `bodies` and `task`.
-        OSError: as `bodies`.
+        ValueError: as `bodies`, `task` and `policies.setup_of`.
+        OSError: as `bodies` and `policies.setup_of`.
     """
-    return {name: Setup.of(body, *task()) for name, body in bodies(robot).items()}
+    named, (name, settings) = bodies(robot, near), task()  # first: this imports the modules that flags name
+    own = stored or trained()
+    name, settings = completed(own, name, settings)
+    found = {body.name: Setup.of(body, name, settings) for body in own_bodies(own, robot, named).values()}
+    if own and not stored:
+        others = "".join(f"; plays in {each}" for each in found.values() if each != own)
+        print(f"{FLAGS.policy}: of {own}{others}")
+    return found
+
+
+def trained() -> Setup | None:
+    """Return the setup that judges --policy, see `Setup.judging`; None for one that is no file.
+
+    Raises:
+        ValueError: as `policies.setup_of`.
+        OSError: as `policies.setup_of`.
+    """
+    own = policies.setup_of(policy_name(FLAGS.policy))
+    return own and own.judging()
+
+
+def own_bodies(own: Setup | None, robot: flags.FlagHolder, named: dict[str, Body]) -> dict[str, Body]:
+    """Return the body of a policy or of tracks by name where no flag names one, else those of the flags."""
+    if own is None or own.several or robot.present or made_body():
+        return named
+    return {own.body.name: own.body}
+
+
+def completed(own: Setup | None, name: str, settings: dict[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Return task and settings of the flags; without --task those of a policy or of tracks, which --set changes."""
+    return (name, settings) if own is None or FLAGS["task"].present else (own.task, own.task_kwargs | settings)
 
 
 def only_setup(robot: flags.FlagHolder) -> Setup:
-    """Return the setup of a program that takes one body; errors as `only_body` and `task`."""
-    return Setup.of(only_body(robot), *task())
+    """Return the setup of a program that takes one body; see `setups`.
+
+    Raises:
+        ValueError: as `setups`, or several bodies.
+        OSError: as `setups`.
+    """
+    found, *others = setups(robot, near=()).values()
+    if others:
+        raise ValueError(f"--robot={robot.value}: expected one robot")
+    return found
 
 
 def task() -> tuple[str, dict[str, Any]]:

@@ -167,6 +167,15 @@ class Setup:
             settings = {name: value for name, value in settings.items() if name not in CURRICULUM}
         return dataclasses.replace(self, domain=domain, settings_json=checks.json_text("task_kwargs", settings))
 
+    def judging(self) -> "Setup":
+        """Return the setup that judges a policy trained in this one: without curriculum, with all blocks.
+
+        A policy leaves out what it does not read.
+        """
+        made = self.validation(1)
+        settings = {name: value for name, value in made.task_kwargs.items() if name != "exclude_blocks"}
+        return dataclasses.replace(made, domain=self.domain, settings_json=checks.json_text("task_kwargs", settings))
+
     def load(self, seed: int | None = None, **options) -> dm.Environment:
         """Open a dm_env.
 

@@ -1,6 +1,16 @@
 """Policies: one protocol of acting, and policies by name."""
 
-from arc_suite.policies.named import HELP, POLICIES, PRESET_HELP, digest, is_file, policy, preset_names, trained
+from arc_suite.policies.named import (
+    HELP,
+    POLICIES,
+    PRESET_HELP,
+    digest,
+    is_file,
+    policy,
+    preset_names,
+    setup_of,
+    trained,
+)
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
 
 __all__ = [
@@ -18,5 +28,6 @@ __all__ = [
     "is_file",
     "policy",
     "preset_names",
+    "setup_of",
     "trained",
 ]

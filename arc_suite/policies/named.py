@@ -160,6 +160,24 @@ def digest(name: str) -> str:
     return hashlib.sha256(b"".join(file.read_bytes() for file in held)).hexdigest()
 
 
+def setup_of(name: str | os.PathLike) -> Setup | None:
+    """Return the setup that a policy in a file was trained in; None for other policies.
+
+    Args:
+        name: of a policy. A zip of stable-baselines3 may not hold its setup; nothing else that it holds is read.
+
+    Raises:
+        ValueError: a damaged file, or a robot, task or arena whose module has not been imported.
+        OSError: a file cannot be read.
+    """
+    if not (isinstance(name, os.PathLike) or _is_path(name)):
+        return None
+    if zipped := zips.parts(name):
+        return zips.setup(zipped[0])
+    path = Path(name)
+    return network.load(next(iter(network.checkpoint_files(path)), path)).setup
+
+
 def trained(name: str | os.PathLike) -> Network:
     """Return a policy file, the policy of a run's folder, or a zip of stable-baselines3, as a network.
 

@@ -72,9 +72,9 @@ class Network(NamedTuple):
         excluded = self.setup.task_kwargs.get("exclude_blocks", ())
         sizes = {name: block.shape[-1] for name, block in observation.items() if name not in excluded}
         if sizes != dict(self.blocks):
-            raise ValueError(
-                f"policy of {self.setup.kind.name}: expected observation blocks {dict(self.blocks)}, got {sizes}"
-            )
+            names = sorted(name for name in {*sizes, *self.blocks} if sizes.get(name, 0) != self.blocks.get(name, 0))
+            wrong = ", ".join(f"{name} has {sizes.get(name, 0)} for {self.blocks.get(name, 0)}" for name in names)
+            raise ValueError(f"policy of {self.setup.kind.name}: the observation does not fit: {wrong}")
         flat = np.concatenate([observation[name] for name in self.blocks], axis=-1, dtype=np.float32)
         return self.actions(flat).astype(float)
 

@@ -1,7 +1,7 @@
 """Train PPO of stable-baselines3 in 64 environments, judge its checkpoints with arc-suite evaluate, and plot them.
 
     python examples/training/sb3_ppo.py --robot tick --steps 2000000
-    arc-suite render --robot tick --policy runs/sb3-ppo-tick/2007040.zip -o tick.mp4
+    arc-suite render --policy runs/sb3-ppo-tick/2007040.zip -o tick.mp4
 
 The folder holds a zip, its statistics of VecNormalize and the evaluation (.json) of every checkpoint, and curve.png.
 """

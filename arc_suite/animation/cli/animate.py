@@ -3,7 +3,7 @@
   arc-suite animate --robot queen --output queen.glb
   arc-suite animate --robot leaper --clips walk,stop,idle --root_motion moving --output leaper.glb
   arc-suite animate --legs 8 --links 3 --rig nodes --clips all --output spider.glb
-  arc-suite animate --robot queen --policy runs/queen-steer-dagger-0 --output queen.glb
+  arc-suite animate --policy runs/queen-steer-dagger-0 --output queen.glb
 
 One policy makes all clips, each under a command of its own. Loops begin at the same phase of the gait and hold the same
 number of cycles. start and stop connect idle and walk. tuned and refined are presets of the four robots' demonstrators,

@@ -3,7 +3,7 @@
   arc-suite play --robot queen -o queen.html
   arc-suite play --robot all -o robots.html
   arc-suite play --spec spider -o spider.html
-  arc-suite play --robot queen --policy runs/queen-steer-ppo-0 -o trained.html
+  arc-suite play --policy runs/queen-steer-ppo-0 -o trained.html
   arc-suite play --spec spider --policy universal -o universal.html
 
 The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
@@ -16,7 +16,16 @@ from absl import flags
 
 from arc_suite import checks, files
 from arc_suite.animation import play
-from arc_suite.cli.flags import ROBOT_HELP, bodies, define_body, define_policy, define_preset, policy_name
+from arc_suite.cli.flags import (
+    ROBOT_HELP,
+    bodies,
+    define_body,
+    define_policy,
+    define_preset,
+    own_bodies,
+    policy_name,
+    trained,
+)
 from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
@@ -32,7 +41,8 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     checks.extension(FLAGS.output, [".html"])
-    walkers = progress(bodies(_ROBOT).values(), "fitting", leave=False)
+    named = bodies(_ROBOT)  # first: this imports the modules that flags name
+    walkers = progress(own_bodies(trained(), _ROBOT, named).values(), "fitting", leave=False)
     with files.writing(FLAGS.output) as temporary:
         page = play.page([play.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
         temporary.write_text(page, encoding="utf-8")

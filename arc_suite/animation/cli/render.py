@@ -19,18 +19,16 @@ from pathlib import Path
 import numpy as np
 from absl import flags
 
-import arc_suite
 from arc_suite import checks, files, style
 from arc_suite.animation import pages
 from arc_suite.cli.flags import (
     ROBOT_HELP,
-    bodies,
     define_body,
     define_policy,
     define_preset,
     define_task,
     policy_name,
-    task,
+    setups,
 )
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
@@ -66,16 +64,13 @@ flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .
 
 def main() -> None:
     """Play the episodes, write the file and print the returns."""
-    walkers = bodies(_ROBOT)
-    task_name, task_kwargs = task()
+    walkers = setups(_ROBOT)
     usual = "profile" if len(walkers) == 1 else "portrait"
     camera = checks.name(usual if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
-    environments = {
-        name: arc_suite.load(body, task_name, task_kwargs | {"random": FLAGS.seed}) for name, body in walkers.items()
-    }
+    environments = {name: setup.load(FLAGS.seed) for name, setup in walkers.items()}
     policies = {
-        name: policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=environments[name].task.definition)
-        for name, body in walkers.items()
+        name: policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=environments[name].task.definition)
+        for name, setup in walkers.items()
     }
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html")

@@ -26,9 +26,8 @@ from arc_suite.cli.flags import (
     define_preset,
     define_task,
     named_values,
-    only_body,
+    only_setup,
     policy_name,
-    task,
 )
 
 FLAGS = flags.FLAGS
@@ -52,10 +51,11 @@ def main() -> None:
 
 def _sketch() -> Sketch:
     """Return what the flags say."""
-    body, (name, settings) = only_body(_ROBOT), task()
+    setup = only_setup(_ROBOT)
+    settings = setup.task_kwargs
     ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
     doing = Sketch(
-        task=name,
+        task=setup.task,
         ground=ground,
         kicks=kicks,
         settings=json.dumps(settings),
@@ -65,6 +65,6 @@ def _sketch() -> Sketch:
     shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
     if FLAGS.legs is not None:
         return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
-    if (source := FLAGS.spec or _ROBOT.value) in sources():
+    if (source := FLAGS.spec or (_ROBOT.value if _ROBOT.present else setup.robot)) in sources():
         return dataclasses.replace(doing, source=source, **shape)
-    return cured(doing, body)
+    return cured(doing, setup.body)

@@ -12,7 +12,6 @@ browser. What every metric means is written in arc_suite/style/metrics.py.
 """
 
 import contextlib
-import dataclasses
 import math
 import pathlib
 
@@ -23,16 +22,16 @@ from arc_suite.animation import pages
 from arc_suite.cli.flags import (
     MOST,
     ROBOT_HELP,
+    bodies,
     define_body,
     define_policy,
     define_preset,
     define_task,
-    made_body,
     policy_name,
     setups,
+    task,
 )
 from arc_suite.cli.program import progress
-from arc_suite.envs.setup import Setup
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
@@ -67,15 +66,6 @@ def chosen_sources() -> dict[str, style.Source]:
     if FLAGS.policy == FLAGS.compare:
         raise ValueError(f"--compare: expected another one than {first.label!r}")
     return {FLAGS.policy: first, FLAGS.compare: second}  # files of one name in two folders
-
-
-def chosen_setups(asked: dict[str, Setup], stored: Setup | None) -> dict[str, Setup]:
-    """Return setups by name of the body: those of the flags, completed by the setup of stored tracks."""
-    if stored is None:
-        return asked
-    bodies = [setup.body for setup in asked.values()] if _ROBOT.present or made_body() else [stored.body]
-    task = next(iter(asked.values())) if FLAGS["task"].present or FLAGS["set"].present else stored
-    return {body.name: dataclasses.replace(task, domain=body) for body in bodies}
 
 
 def number(value: float, decimals: int = 3) -> str:
@@ -182,9 +172,9 @@ def saving(robots: list[str]):
 
 def main() -> None:
     """Record, measure, print and write."""
-    asked = setups(_ROBOT)  # first: this imports the modules that flags name, which files cannot import
+    bodies(_ROBOT), task()  # first: this imports the modules that flags name, which files cannot import
     chosen = chosen_sources()
-    chosen_for = chosen_setups(asked, next((source.setup for source in chosen.values() if source.setup), None))
+    chosen_for = setups(_ROBOT, next((source.setup for source in chosen.values() if source.setup), None))
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     recorders = {
         robot: {label: source.recorders(setup, seeds) for label, source in chosen.items()}

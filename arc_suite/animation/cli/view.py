@@ -24,9 +24,8 @@ from arc_suite.cli.flags import (
     define_policy,
     define_preset,
     define_task,
-    only_body,
+    only_setup,
     policy_name,
-    task,
 )
 from arc_suite.envs.window import Window
 
@@ -42,11 +41,10 @@ define_preset()
 
 def main() -> None:
     """Open the window and play until it is closed."""
-    body = only_body(_ROBOT)
-    name, settings = task()
-    environment = arc_suite.load(body, name, {"time_limit": math.inf} | settings)
+    setup = only_setup(_ROBOT)
+    environment = arc_suite.load(setup.body, setup.task, {"time_limit": math.inf} | setup.task_kwargs)
     definition = environment.task.definition
-    policy = policies.policy(policy_name(FLAGS.policy), body, FLAGS.preset, task=definition)
+    policy = policies.policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=definition)
     live = Live(environment, policies.alone(policy))
     keys = queue.SimpleQueue()
     window = Window(live.shown, pressed=keys.put, instead=_INSTEAD)

@@ -50,6 +50,8 @@ def main(run: str | None = None) -> None:
         policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
+    elif FLAGS["task"].present or FLAGS["set"].present:
+        raise ValueError(f"policy {run}: --task and --set go with the body of a policy of many bodies")
     else:
         policy = policies.trained(name)
     onnx_file.save(output, policy)

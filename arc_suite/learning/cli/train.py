@@ -11,7 +11,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --spec spider --algorithm speq --hp phase_updates=7500
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite train --robot varied:0-127 --algorithm dagger_bodies
-  arc-suite evaluate --robot tick --policy runs/tick-walk-ppo-0
+  arc-suite evaluate --policy runs/tick-walk-ppo-0
 """
 
 import contextlib

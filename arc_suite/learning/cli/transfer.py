@@ -16,8 +16,8 @@ from pathlib import Path
 
 from absl import flags
 
-from arc_suite import checks
-from arc_suite.cli.flags import define_task, task
+from arc_suite import checks, policies
+from arc_suite.cli.flags import completed, define_task, task
 from arc_suite.cli.program import marked_page
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
@@ -40,7 +40,7 @@ def main() -> None:
     if FLAGS.page:
         marked_page("page", FLAGS.page)(bodies.text(Path(FLAGS.results)))
         return
-    name, settings = task()
+    name, settings = completed(policies.setup_of(FLAGS.policy), *task())
     for family in FLAGS.families:
         checks.name(family, transfer.FAMILIES, "family")
     if FLAGS.output:

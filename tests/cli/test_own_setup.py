@@ -1,0 +1,68 @@
+"""Programs take body, task and settings from a trained policy where flags leave them open."""
+
+import json
+
+import pytest
+from networks import made
+from programs import arc_suite as run
+
+from arc_suite.envs.setup import Setup
+from arc_suite.policies import network
+
+SETTINGS = {"friction": [0.5, 1.2], "observation_noise": 0.5}
+FLAGS = ["--robot=tick", "--task=rough", "--set=friction=[0.5,1.2]", "--set=observation_noise=0.5"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A run on rough ground with settings, and what a curriculum and the training of its network alone need."""
+    folder = tmp_path_factory.mktemp("runs") / "rough"
+    folder.mkdir()
+    own = Setup.of("tick", "rough", SETTINGS | {"curriculum": True, "level": 2})
+    network.save(folder / network.FILE, made("tick", "rough")._replace(setup=own))
+    return folder
+
+
+def test_a_run_is_evaluated_by_its_folder_alone(folder, tmp_path):
+    paths = tmp_path / "alone.json", tmp_path / "flags.json"
+    for path, flags in zip(paths, ([], FLAGS), strict=True):
+        done = run("evaluate", f"--policy={folder}", "--episodes=2", f"--json={path}", *flags)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.splitlines()[0] == f"{folder}: of tick, rough, {json.dumps(SETTINGS, sort_keys=True)}"
+    alone, flags = (json.loads(path.read_text()) for path in paths)
+    assert alone == flags and alone["task_kwargs"] == SETTINGS
+
+
+def test_settings_change_those_of_the_run_and_a_task_replaces_them(folder):
+    done = run("render", f"--policy={folder}", "--set=friction=1.0", "--output=/nonexistent/tick.png")
+    kept = {"friction": 1.0, "observation_noise": 0.5}
+    assert done.stdout.splitlines()[0].endswith(f"; plays in tick, rough, {json.dumps(kept)}")
+    done = run("render", f"--policy={folder}", "--task=rough", "--output=/nonexistent/tick.png")
+    assert done.stdout.splitlines()[0].endswith("; plays in tick, rough")
+
+
+def one_line(done, line):
+    assert (done.returncode, done.stderr) == (1, f"{line}\n")
+
+
+@pytest.mark.parametrize(
+    ("program", "flags", "message"),
+    [
+        ("evaluate", ["--robot=queen"], "policy {0}: made for tick, and not for queen"),
+        ("play", ["--robot=queen", "-o=a.html"], "policy {0}: made for tick, and not for queen"),
+        (
+            "evaluate",
+            ["--task=walk", "--episodes=1"],
+            "policy of rough: the observation does not fit: command has 0 for 6, scan has 0 for 175",
+        ),
+        ("animate", ["--spec=spider", "-o=a.glb"], "policy {0}: made for tick, and not for spider"),
+    ],
+)
+def test_what_contradicts_the_run_is_one_line(folder, tmp_path, program, flags, message):
+    flags = [flag.replace("-o=", f"--output={tmp_path}/") for flag in flags]
+    one_line(run(program, f"--policy={folder}", *flags), f"arc-suite {program}: {message.format(folder)}")
+
+
+def test_an_exported_run_takes_no_other_task(folder):
+    message = f"policy {folder}: --task and --set go with the body of a policy of many bodies"
+    one_line(run("export", str(folder), "--task=walk"), f"arc-suite export: {message}")
