@@ -175,9 +175,10 @@ def setups(robot: flags.FlagHolder, stored: Setup | None = None, near: Iterable[
     own = stored or trained()
     name, settings = completed(own, name, settings)
     found = {body.name: Setup.of(body, name, settings) for body in own_bodies(own, robot, named).values()}
-    if own and not stored:
-        others = "".join(f"; plays in {each}" for each in found.values() if each != own)
-        print(f"{FLAGS.policy}: of {own}{others}")
+    fitting = [each for each in found.values() if own and (own.several or each.body == own.body)]
+    if fitting and not stored:
+        others = [each for each in fitting if (each.task, each.task_kwargs) != (own.task, own.task_kwargs)]
+        print(f"{FLAGS.policy}: of {own}" + "".join(f"; plays in {each}" for each in others))
     return found
 
 

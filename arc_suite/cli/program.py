@@ -1,7 +1,6 @@
 """What all programs share: flags parsed, errors of one line, help, progress bars."""
 
 import contextlib
-import functools
 import inspect
 import io
 import os
@@ -24,10 +23,34 @@ _MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 VERSION = f"arc_suite {arc_suite.__version__}"
 
-progress = functools.partial(tqdm, disable=None)  # silent where standard error is no terminal: logs stay readable
+_PAUSE = 30.0  # s between two lines of progress in a log
+_CONTROL = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
 _VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
+
+
+def progress(*args, **kwargs) -> tqdm:
+    """Return a progress bar of tqdm; where standard error is no terminal, a line in half a minute, for logs."""
+    if sys.stderr.isatty():
+        return tqdm(*args, **kwargs)
+    pauses = dict.fromkeys(("delay", "mininterval", "maxinterval"), _PAUSE)
+    return tqdm(*args, file=_Log(sys.stderr), ncols=0, **pauses, **kwargs)
+
+
+def say(line: str) -> None:
+    """Print a line at once, above a progress bar if there is one."""
+    tqdm.write(line, file=sys.stdout)
+    sys.stdout.flush()
+
+
+@contextlib.contextmanager
+def resumable(place) -> Iterator[None]:
+    """Say of an interruption that the same command resumes the work in a folder."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"interrupted; the same command resumes {place}") from None
 
 
 # One thread a run: two runs on two cores learn twice as much, two threads in a run hardly more than one.
@@ -154,6 +177,20 @@ def _help(module: ModuleType) -> str:
     for flag in _flags(module):
         shown[flag.name] = flag
     return f"{module.__doc__.strip()}\n\nFlags:\n{shown.get_help(include_special_flags=False)}"
+
+
+class _Log:
+    """A stream that bars are written to as lines."""
+
+    def __init__(self, stream):
+        self._stream = stream
+
+    def write(self, text: str) -> None:
+        if line := _CONTROL.sub("", text).strip():
+            self._stream.write(f"{line}\n")
+
+    def flush(self) -> None:
+        self._stream.flush()
 
 
 class _Output:

@@ -161,7 +161,7 @@ def digest(name: str) -> str:
 
 
 def setup_of(name: str | os.PathLike) -> Setup | None:
-    """Return the setup that a policy in a file was trained in; None for other policies.
+    """Return the setup that a policy in a file was trained in; None for other policies, and where no file is.
 
     Args:
         name: of a policy. A zip of stable-baselines3 may not hold its setup; nothing else that it holds is read.
@@ -175,6 +175,8 @@ def setup_of(name: str | os.PathLike) -> Setup | None:
     if zipped := zips.parts(name):
         return zips.setup(zipped[0])
     path = Path(name)
+    if not path.exists():
+        return None
     return network.load(next(iter(network.checkpoint_files(path)), path)).setup
 
 

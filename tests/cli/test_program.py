@@ -15,6 +15,7 @@ import programs
 import pytest
 
 import arc_suite
+from arc_suite.cli import program
 from arc_suite.files import writing, writing_json
 
 TOOL = '''"""Count.
@@ -213,3 +214,21 @@ def test_what_a_kill_left_is_deleted_by_the_next_that_writes_the_file(tmp_path):
     with writing(tmp_path / "report[1].json"):
         assert not left.exists()
     assert sorted(tmp_path.glob(".*")) == sorted(others)
+
+
+def test_long_work_writes_a_line_in_half_a_minute_into_a_log(monkeypatch, capsys):
+    monkeypatch.setattr(program, "_PAUSE", 0.0)  # in place of 30 s
+    with program.progress(total=4, desc="training", unit="step") as bar:
+        for returned in (1.5, 2.5):
+            bar.set_postfix_str(f"return {returned}", refresh=False)
+            bar.update(2)
+    output = capsys.readouterr()
+    assert output.out == "" and "\r" not in output.err and "\x1b" not in output.err
+    lines = output.err.splitlines()
+    assert lines[0].startswith("training:   0% 0/4 [") and lines[-1].startswith("training: 100% 4/4 [")
+    assert all("return" in line for line in lines[1:])
+
+
+def test_short_work_writes_none(capsys):
+    assert list(program.progress(range(3), desc="training")) == [0, 1, 2]
+    assert capsys.readouterr().err == ""

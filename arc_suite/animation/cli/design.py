@@ -31,7 +31,7 @@ from arc_suite.animation.design.genes import Around, Budget, Made, extent
 from arc_suite.animation.design.search import BATCH, Candidates, Search
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, walk
 from arc_suite.cli.flags import MOST, ROBOT_HELP, named_values
-from arc_suite.cli.program import progress, use_one_thread
+from arc_suite.cli.program import progress, resumable, say, use_one_thread
 from arc_suite.journal import Journal
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import MAX_LENGTH, MAX_NAME, Body
@@ -129,13 +129,14 @@ def search(folder: pathlib.Path, course: Search, known: Mapping[str, Any]) -> No
         done, batches = len(journal.generations), -(-FLAGS.bodies // BATCH)
         if done >= batches:
             return
+        say(f"{folder}: {BATCH * batches} bodies")
         with (
             evaluators(FLAGS.processes) as evaluated,
             progress(total=BATCH * batches, initial=BATCH * done, desc=FLAGS.goal, unit="body") as bar,
         ):
             for _ in range(done, batches):
                 journal.append(course.batch(evaluated))
-                bar.set_postfix_str(f"{len(course.elites)} cells")
+                bar.set_postfix_str(f"{len(course.elites)} cells", refresh=False)
                 bar.update(BATCH)
 
 
@@ -157,7 +158,8 @@ def main() -> None:
         pages.viewer()  # finds out at once whether there is one
     folder = files.folder(FLAGS.output)
     known = settled(trial, cells, around)
-    search(folder, course, known)
+    with resumable(folder):
+        search(folder, course, known)
     best = gallery.elites(course, cells)
     gallery.write_table(folder / "bodies.csv", course, cells)
     gallery.write_specs(folder / "bodies", best)

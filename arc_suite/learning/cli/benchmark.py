@@ -18,7 +18,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks
-from arc_suite.cli.program import marked_page, progress
+from arc_suite.cli.program import marked_page, progress, resumable
 from arc_suite.envs.vector import usable_cores
 from arc_suite.learning.studies import benchmark, leaderboard, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
@@ -58,7 +58,8 @@ def learned(division: str, places: list[str]) -> int:
     name = f"{division}-{learner}"
     runs = [each for each in study.runs if _is_asked(each, places)]
     folder, published = Path(FLAGS.runs, name), Path(FLAGS.results, name)
-    status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
+    with resumable(folder):
+        status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
     publication.publish(study.runs, folder, published)
     if found := results.results(study.runs, published):
         print(report.write(name, study, published))

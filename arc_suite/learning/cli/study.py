@@ -16,7 +16,7 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import versions
-from arc_suite.cli.program import progress
+from arc_suite.cli.program import progress, resumable
 from arc_suite.envs.vector import usable_cores
 from arc_suite.learning.studies import publication, report, runner, tables
 
@@ -54,7 +54,8 @@ def main(name: str | None = None) -> int:
         if parts > 1:
             raise ValueError(f"--shard={FLAGS.shard}: --submit makes shares of its own; leave one of them out")
         return submit(name, min(FLAGS.submit, len(runs)), folder, results)
-    status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
+    with resumable(folder):
+        status = runner.make(runs, folder, FLAGS.jobs or usable_cores(), progress)
     publication.publish(study.runs, folder, results)
     return status
 

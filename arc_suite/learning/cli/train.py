@@ -23,7 +23,7 @@ from absl import flags
 
 from arc_suite import evaluation, files, registry, versions
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_values, only_body, task
-from arc_suite.cli.program import progress, use_one_thread
+from arc_suite.cli.program import progress, resumable, say, use_one_thread
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning import onnx_file
@@ -67,14 +67,18 @@ def main() -> None:
         listeners = [picture(run, folder), *([stack.enter_context(events(folder))] if FLAGS.tensorboard else [])]
 
         def on_metrics(step, metrics):
+            if "return" in metrics:
+                say(f"{folder}: return {metrics['return']:.1f} after {step} steps")
             for listener in listeners:
                 listener(step, metrics)
 
+        def begun(*args, **kwargs):
+            say(f"{folder}: {run.setup}, {run.algorithm}, {run.steps} steps")
+            return progress(*args, **kwargs)
+
         limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
-        try:
-            finished = train(run, folder, **limits, progress=progress, on_metrics=on_metrics)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(f"interrupted; the same command resumes {folder}") from None
+        with resumable(folder):
+            finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics)
     if finished and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")

@@ -15,7 +15,7 @@ from absl import flags
 
 from arc_suite import checks, evaluation, files, versions
 from arc_suite.cli.flags import MOST, define_task, task
-from arc_suite.cli.program import progress
+from arc_suite.cli.program import progress, resumable, say
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
@@ -67,10 +67,11 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
             course.step(generation.fitness)
         done = len(journal.generations)
         wanted = given("generations")
+        say(f"{folder}: {wanted} generations")
         with progress(total=max(wanted, done), initial=done, desc=setup.name, unit="generation") as bar:
             for _ in range(done, wanted):
                 journal.append(course.step())
-                bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}")
+                bar.set_postfix_str(f"return {STEPS * journal.generations[-1].reward:.0f}", refresh=False)
                 bar.update()
     return course, journal
 
@@ -107,7 +108,8 @@ def main() -> None:
         raise versions.MissingExtra("the plot needs matplotlib", "learn", error) from None
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
-        course, journal = search(setup, folder)
+        with resumable(folder):
+            course, journal = search(setup, folder)
         preset = course.result()
         plots.course(setup.name, course.reward, journal.generations, STEPS).savefig(picture)
         metrics = evaluate(setup, preset)

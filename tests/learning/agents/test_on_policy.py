@@ -8,7 +8,7 @@ import pytest
 from conftest import learning
 from numpy.testing import assert_allclose, assert_array_equal
 
-pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 import jax
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-jax = pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+jax = pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 from conftest import small
 

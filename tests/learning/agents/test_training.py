@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from tiers import tiers
 
-pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
 from conftest import SHORT, small
 

@@ -108,11 +108,16 @@ def folder(tmp_path_factory):
     """That of a run, which one command has trained."""
     path = tmp_path_factory.mktemp("trained")
     done = run("train", *TINY, "--tensorboard", cwd=path)
-    assert done.returncode == 0 and FINISHED.fullmatch(done.stdout), done.stderr
+    assert done.returncode == 0, done.stderr
+    first, *evaluations, last = done.stdout.splitlines(keepends=True)
+    assert first == 'runs/tick-walk-sope_eo-0: tick, walk, {"time_limit": 2}, sope_eo, 200 steps\n'
+    line = re.compile(r"runs/tick-walk-sope_eo-0: return \d+\.\d after (\d+) steps\n")
+    returns = list(map(line.fullmatch, evaluations))
+    assert [found and found[1] for found in returns] == ["100", "200"] and FINISHED.fullmatch(last)
     return path / "runs" / "tick-walk-sope_eo-0"
 
 
-@pytest.mark.skipif(not HAS_JAX, reason="of the extra agents: make check-agents")
+@pytest.mark.skipif(not HAS_JAX, reason="of the extra learn: make check-agents")
 class TestRun:
     """One command from nothing to a policy that every program takes."""
 
@@ -125,13 +130,13 @@ class TestRun:
     def test_the_same_command_has_nothing_left_to_do(self, folder):
         before = (folder / "evaluations.csv").read_bytes()
         done = run("train", *TINY, cwd=folder.parents[1])
-        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout)
+        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout.splitlines(keepends=True)[-1])
         assert (folder / "evaluations.csv").read_bytes() == before
 
     @pytest.mark.long
     def test_its_configuration_trains_the_same_run(self, folder, tmp_path):
         done = run("train", f"--config={folder / 'config.json'}", cwd=tmp_path)
-        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout), done.stderr
+        assert done.returncode == 0 and FINISHED.fullmatch(done.stdout.splitlines(keepends=True)[-1]), done.stderr
         again = tmp_path / "runs" / folder.name
         for name in ("config.json", "evaluations.csv", "training.csv"):
             assert (again / name).read_text() == (folder / name).read_text()

@@ -89,7 +89,7 @@ def contents(folder):
 def test_killed_twice(name, tmp_path, begun):
     """Two jobs make what one makes."""
     if name == "WITH_JAX":
-        pytest.importorskip("jax", reason="of the extra agents: make check-agents")
+        pytest.importorskip("jax", reason="of the extra learn: make check-agents")
     assert begun(name, tmp_path / "whole", 1).wait() == 0
 
     for count in (1, 3):
