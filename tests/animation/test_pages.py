@@ -1,9 +1,7 @@
 """Pages that play walks: what is in them, and in a browser that they show the track."""
 
-import base64
 import io
 import itertools
-import json
 import re
 import zlib
 
@@ -13,6 +11,7 @@ import numpy as np
 import programs
 import pytest
 import tabs
+from page_data import data_of
 from PIL import Image
 
 import arc_suite
@@ -40,11 +39,6 @@ def bundle(monkeypatch):
     monkeypatch.setattr(pages, "viewer", lambda: "window.viewer = null;")
 
 
-def walks_of(page):
-    (data,) = re.findall(r'<script id="data" type="text/plain">([^<]*)</script>', page)
-    return json.loads(zlib.decompress(base64.b64decode(data)))
-
-
 def qpos_of(track):
     return np.concatenate([track.positions, track.quaternions, track.joint_angles], axis=-1)
 
@@ -52,7 +46,7 @@ def qpos_of(track):
 def test_a_page_holds_the_tracks(bundle, tracks):
     page = pages.page(tracks)
     assert "<title>tick, tuned, tick, &lt;slow&gt; &amp; low</title>" in page
-    first, second = walks_of(page)
+    first, second = data_of(page)
     assert (first["label"], second["label"]) == tuple(tracks)
     track = tracks["tick, tuned"]
     np.testing.assert_allclose(first["positions"], track.positions, atol=1e-6)
@@ -62,15 +56,8 @@ def test_a_page_holds_the_tracks(bundle, tracks):
     np.testing.assert_allclose(np.sum(list(first["terms"].values()), axis=0), track.rewards, atol=1e-5)
     assert first["totals"][-1] == pytest.approx(track.rewards.sum(), abs=1e-5)
     assert first["terms"].keys() == first["colours"].keys() and len(set(first["colours"].values())) == 10
-    assert first["scenery"] == {
-        "level": True,
-        "planes": [0.0],
-        "fields": [],
-        "solids": [],
-        "styles": [],
-        "marks": [],
-        "failed": [],
-    }
+    nothing = dict.fromkeys(("fields", "solids", "styles", "marks", "failed"), [])
+    assert first["scenery"] == {"level": True, "planes": [0.0], **nothing}
     assert pages.page(tracks) == page
 
 
@@ -155,23 +142,22 @@ def test_programs_without_a_viewer_write_nothing(tmp_path):
     commands = ("render", "-o", "walk.html"), ("style", "--page=walk.html", "--episodes=1"), ("play", "-o", "a.html")
     for command in commands:
         done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
-        assert done.returncode == 1 and "make web" in done.stderr and done.stderr.count("\n") == 1
+        programs.refused(done, f"arc-suite {command[0]}: ")
+        assert "make web" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
 @nodes.needs_viewer
 def test_programs_write_pages(tmp_path):
     done = programs.run("-m", "arc_suite", "render", "--robot=tick", "--steps=400", "-o", "walk.html", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert re.fullmatch(r"tick: return [0-9.]+ in 400 steps\nwrote walk.html\n", done.stdout)
+    assert re.fullmatch(r"tick: return [0-9.]+ in 400 steps\nwrote walk.html\n", programs.passed(done))
     page = (tmp_path / "walk.html").read_text()
     assert len(page) < 1_300_000
     assert "Permission is hereby granted, free of charge" in page  # three.js's licence
     assert len(zlib.compress(pages.viewer().encode())) < 200_000
     compare = ("--robot=tick", "--compare=zero", "--episodes=1", "--page=both.html")
-    done = programs.run("-m", "arc_suite", "style", *compare, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    labels = [walk["label"] for walk in walks_of((tmp_path / "both.html").read_text())]
+    programs.passed(programs.run("-m", "arc_suite", "style", *compare, cwd=tmp_path))
+    labels = [walk["label"] for walk in data_of((tmp_path / "both.html").read_text())]
     assert labels == ["tick, cpg", "tick, zero"]
 
 
@@ -183,8 +169,7 @@ def test_programs_write_pages(tmp_path):
     ],
 )
 def test_errors_are_one_line(tmp_path, command, message):
-    done = programs.run("-m", "arc_suite", *command, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (1, f"arc-suite {command[0]}: {message}\n")
+    programs.refused(programs.run("-m", "arc_suite", *command, cwd=tmp_path), f"arc-suite {command[0]}: {message}\n")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -245,31 +230,29 @@ def test_keys_and_controls(shown, tracks):
     assert shown.locator("h2").first.text_content().startswith("tick, tuned: return")
 
 
+def paged(path, task, steps):
+    """Write the page of an episode, and return its track."""
+    track = record(arc_suite.load("tick", task, {"random": 0}), policy("cpg", "tick", "steered"), 0, steps)
+    path.write_text(pages.page({"tick": track}), encoding="utf-8")
+    return track
+
+
 @pytest.mark.slow
 @nodes.needs_viewer
 def test_goals_are_drawn(browser, tmp_path):
-    environment = arc_suite.load("tick", "navigate", {"random": 0})
-    track = record(environment, policy("cpg", "tick", "steered"), 0, 3)
-    (tmp_path / "goal.html").write_text(pages.page({"tick": track}), encoding="utf-8")
-    tab, said = browser.new_page(viewport={"width": 800, "height": 600}), []
-    tab.on("console", lambda message: said.append(message.text))
-    tab.on("pageerror", lambda error: said.append(str(error)))
-    tab.goto((tmp_path / "goal.html").as_uri())
-    tab.wait_for_function("window.viewer", timeout=60_000)
-    tab.evaluate("viewer.pause(false)")
-    for row in (0, 2):
-        (marks,) = tab.evaluate(f"viewer.seek({track.times[row]}), viewer.marks()")
-        wanted = [ends[:3] for _, *ends in scenery.scenery(track)["marks"][row]]
-        np.testing.assert_allclose(sorted(marks), sorted(wanted), atol=1e-5)
-    assert said == []
+    track = paged(tmp_path / "goal.html", "navigate", 3)
+    with tabs.opened(browser, tmp_path / "goal.html", "window.viewer", 800, 600) as (tab, _):
+        tab.evaluate("viewer.pause(false)")
+        for row in (0, 2):
+            (marks,) = tab.evaluate(f"viewer.seek({track.times[row]}), viewer.marks()")
+            wanted = [ends[:3] for _, *ends in scenery.scenery(track)["marks"][row]]
+            np.testing.assert_allclose(sorted(marks), sorted(wanted), atol=1e-5)
 
 
 @pytest.mark.slow
 @nodes.needs_viewer
 def test_a_limp_leg_is_dark(browser, tmp_path):
-    environment = arc_suite.load("tick", "limp", {"random": 0})
-    track = record(environment, policy("cpg", "tick", "steered"), 0, FAILS_FROM + 5)
-    (tmp_path / "limp.html").write_text(pages.page({"tick": track}), encoding="utf-8")
+    track = paged(tmp_path / "limp.html", "limp", FAILS_FROM + 5)
     with tabs.opened(browser, tmp_path / "limp.html", "window.viewer", 800, 600) as (tab, _):
         tab.evaluate("viewer.pause(false)")
         wanted = scenery.scenery(track)["failed"]

@@ -1,17 +1,15 @@
 """Pages to play in: the ports of law, task and networks against Python, and what is in a page."""
 
-import base64
-import json
 import math
 import pathlib
 import re
-import zlib
 
 import networks
 import nodes
 import numpy as np
 import programs
 import pytest
+from page_data import data_of
 
 from arc_suite.animation import pages, play
 from arc_suite.envs.setup import Setup
@@ -132,17 +130,9 @@ def test_heights_on_bumps_are_those_of_python(script):
     arena = Setup.of("tick", "steer", {"arena": "bumps"}).definition.scene.arena
     creature = play.creature(ROBOTS["tick"])
     places = np.random.default_rng(0).uniform((-20.0, -5.0), (20.0, 5.0), (40, 2))  # beyond the edges, too
-    episodes = [
-        {
-            "creature": creature,
-            "ground": "bumps",
-            "qpos": [*place, 1.0, *creature["grounds"]["bumps"]["start"][3:]],
-            "qvel": [],
-            "desired": [0.0, 0.0, 0.0],
-            "commands": [[0.0, 0.0, 0.0]],
-        }
-        for place in places
-    ]
+    still = {"creature": creature, "ground": "bumps", "qvel": [], "desired": [0.0] * 3, "commands": [[0.0] * 3]}
+    pose = creature["grounds"]["bumps"]["start"][3:]
+    episodes = [still | {"qpos": [*place, 1.0, *pose]} for place in places]
     heights = [path["observations"][0]["posture"][0] for path in nodes.run(script, episodes)]
     np.testing.assert_allclose(heights, 1.0 - arena.height(*places.T), rtol=0.0, atol=1e-12)
     assert np.ptp(heights) > 0.02
@@ -170,8 +160,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     creature = play.creature(ROBOTS["leaper"]) | {"name": "<leaper>"}
     page = play.page([creature])
     assert "<title>&lt;leaper&gt;</title>" in page
-    (data,) = re.findall(r'<script id="data" type="text/plain">([^<]*)</script>', page)
-    assert json.loads(zlib.decompress(base64.b64decode(data))) == [creature]
+    assert data_of(page) == [creature]
     assert page == play.page([creature])
     assert all('integrator="Euler"' in ground["xml"] for ground in creature["grounds"].values())
 
@@ -188,9 +177,8 @@ def test_a_page_begins_with_the_licences(monkeypatch):
 @pytest.mark.slow
 @nodes.needs_viewer
 def test_the_program_writes_a_page(tmp_path):
-    done = programs.arc_suite("play", "--robot=queen", "-o", "queen.html", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert re.fullmatch(r"wrote queen.html, 4\.\d MB\n", done.stdout)
+    out = programs.passed(programs.arc_suite("play", "--robot=queen", "-o", "queen.html", cwd=tmp_path))
+    assert re.fullmatch(r"wrote queen.html, 4\.\d MB\n", out)
     page = (tmp_path / "queen.html").read_text()
     head = page[: page.index("<style>")]
     assert "Apache License" in head and "Third-party licenses" in head
@@ -212,7 +200,7 @@ def test_the_program_writes_a_page(tmp_path):
 )
 def test_errors_are_one_line(tmp_path, flags, message):
     done = programs.arc_suite("play", "--robot=tick", *flags, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (1, f"arc-suite play: {message}\n")
+    programs.refused(done, f"arc-suite play: {message}\n")
     assert list(tmp_path.iterdir()) == []
 
 

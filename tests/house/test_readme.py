@@ -24,16 +24,8 @@ README = (ROOT / "README.md").read_text()
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "examples").glob("*.md"))]
 
 # Pages whose code needs files or packages of its own; tests of their own run it.
-ELSEWHERE = [
-    "adding_a_robot",
-    "adding_a_task",
-    "adding_an_algorithm",
-    "clients",
-    "first_steps",
-    "gpu",
-    "modifiers",
-    "study",
-]
+ELSEWHERE = {"adding_a_robot", "adding_a_task", "adding_an_algorithm", "modifiers"}
+ELSEWHERE |= {"clients", "first_steps", "gpu", "study"}
 BLOCKS = [
     pytest.param(block, id=f"{page.stem}{place}", marks=() if page.stem == "README" else pytest.mark.slow)
     for page in PAGES

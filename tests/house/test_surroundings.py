@@ -11,9 +11,10 @@ import socket
 def refuse(*args, **kwargs):
     raise AssertionError("the network was used")
 socket.socket.connect = socket.create_connection = socket.getaddrinfo = refuse
-import gymnasium
+import absl.logging, gymnasium
 import numpy as np
 import arc_suite
+absl.logging.set_verbosity("error")  # of MuJoCo's warnings
 jobs = [(robot, "walk", {}) for robot in arc_suite.TASKS_BY_DOMAIN] + [("tick", "steer", {"arena": "bumps"})]
 for robot, task, settings in jobs:
     environment = arc_suite.load(robot, task, settings | {"on_divergence": "terminate"})

@@ -2,15 +2,14 @@
 
 import functools
 
-import mujoco
 import numpy as np
 import pytest
+from poses import placed
 
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips import planting
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import ROBOTS
-from arc_suite.simulation.model import compiled
 
 BODY = ROBOTS["queen"]  # whose walk strides further than her hips turn: feet meet in the middle of what they reach
 HEIGHT = BODY.torso.standing_height
@@ -18,26 +17,14 @@ HEIGHT = BODY.torso.standing_height
 
 @functools.cache
 def made(plant):
-    return {
-        clip.name: clip
-        for clip in export.clips(Setup.of(BODY, "steer"), ["walk", "stop", "idle"], fps=500, plant=plant)
-    }
+    clips = export.clips(Setup.of(BODY, "steer"), ["walk", "stop", "idle"], fps=500, plant=plant)
+    return {clip.name: clip for clip in clips}
 
 
 def soles(motion):
     """Places (samples, feet, 3) of the lowest points of the feet in the world."""
-    model = compiled(BODY)
-    data, places = mujoco.MjData(model), []
-    for pose in motion.qpos():
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        places.append(
-            [
-                data.body(name).xpos - (0.0, 0.0, leg.foot.radius)
-                for name, leg in zip(BODY.foot_names, BODY.legs, strict=True)
-            ]
-        )
-    return np.array(places)
+    radii = np.array([leg.foot.radius for leg in BODY.legs])
+    return placed(BODY, motion.qpos(), BODY.foot_names)[0] - radii[:, None] * (0.0, 0.0, 1.0)
 
 
 def slip(motion):

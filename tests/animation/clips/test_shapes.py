@@ -8,13 +8,9 @@ import pytest
 from arc_suite.animation.clips import shapes
 
 SIZE = (0.3, 0.2, 0.5)
-VOLUMES = {
-    "sphere": 4.0 / 3.0 * math.pi * 0.3**3,
-    "capsule": 4.0 / 3.0 * math.pi * 0.3**3 + math.pi * 0.3**2 * 0.4,
-    "cylinder": math.pi * 0.3**2 * 0.4,
-    "ellipsoid": 4.0 / 3.0 * math.pi * 0.3 * 0.2 * 0.5,
-    "box": 8.0 * 0.3 * 0.2 * 0.5,
-}
+BALL, TUBE, BRICK = 4.0 / 3.0 * math.pi * 0.3**3, math.pi * 0.3**2 * 0.4, 0.3 * 0.2 * 0.5
+VOLUMES = {"sphere": BALL, "capsule": BALL + TUBE, "cylinder": TUBE, "box": 8.0 * BRICK}
+VOLUMES["ellipsoid"] = 4.0 / 3.0 * math.pi * BRICK
 
 
 def volume(mesh):

@@ -100,12 +100,9 @@ def test_unknown_algorithms(name, line):
         algorithm(name)
 
 
-def test_without_jax_is_one_line():
+def test_what_a_learner_needs_is_named():
     with pytest.raises(ValueError, match=r"^training needs JAX: pip install -e '.*\[learn\]' \(No module named"):
         _ = Algorithm("arc_suite.learning.agents.nowhere", SoftActorCritic(), "").module
-
-
-def test_what_a_learner_of_others_needs_is_named():
     with pytest.raises(ValueError, match=r"^learner others: No module named 'others'$"):
         _ = Algorithm("others", SoftActorCritic(), "").module
 
