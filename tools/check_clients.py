@@ -107,8 +107,7 @@ def main() -> int:
     for page in PAGES:
         with tempfile.TemporaryDirectory() as name:
             folder = pathlib.Path(name)
-            for script in (_ROOT / "examples" / "training").glob("*.py"):
-                shutil.copy(script, folder)
+            shutil.copytree(_ROOT / "examples", folder / "examples")
             # Some leave caches and tokens in the user's home.
             own = {"HOME": name, "MINARI_DATASETS_PATH": str(folder / "datasets"), "MPLBACKEND": "Agg"}
             for client in clients(page.read_text(encoding="utf-8")):
