@@ -18,7 +18,7 @@ import pathlib
 import numpy as np
 from absl import flags
 
-from arc_suite import checks, policies
+from arc_suite import checks, policies, seed_ranges
 from arc_suite.cli.flags import (
     MOST,
     ROBOT_HELP,
@@ -57,7 +57,13 @@ flags.DEFINE_integer("episodes", 1000, "How many episodes the dataset is to have
 flags.DEFINE_integer(
     "steps", STEPS, "Control steps after which an episode is truncated.", lower_bound=1, upper_bound=STEPS
 )
-flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
+flags.DEFINE_integer(
+    "seed",
+    seed_ranges.COLLECTING.start,
+    "Seed of the first episode; the others count on from it. Evaluation has those below.",
+    seed_ranges.COLLECTING.start,
+    seed_ranges.COLLECTING[-1],
+)
 flags.DEFINE_string("id", None, "Id of the dataset. [default: arc_suite/ROBOT/TASK/POLICY-PRESET-v0, or like it]")
 flags.DEFINE_boolean("overwrite", False, "Replace a dataset of that id, once the new one is complete.")
 flags.DEFINE_string("author", None, "Who has made the dataset, for its metadata.")

@@ -4,8 +4,8 @@ Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet a
 the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
 still in the same episodes, at most ten. The score is 0 for standing still and 1 for the best demonstrator of the
 suite; only places of the benchmark have one. With --preset medium, which is the paper's demonstrator, the table
-ends with the paper's return. The JSON is an entry for `arc-suite enter`: it holds every
-episode, and hashes of policy, body, model and task.
+ends with the paper's return. A policy that learned from the episodes is refused. The JSON is an entry for
+`arc-suite enter`: it holds every episode, and hashes of policy, body, model and task.
 
   arc-suite evaluate --robot all --policy cpg --episodes 10
   arc-suite evaluate --spec spider
@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 from absl import flags
 
-from arc_suite import checks, evaluation, files, policies, versions
+from arc_suite import checks, evaluation, files, policies, seed_ranges, versions
 from arc_suite.cli.flags import (
     MOST,
     ROBOT_HELP,
@@ -61,6 +61,7 @@ def main() -> None:
     asked = setups(_ROBOT)
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     chosen, players, presets = policy_name(FLAGS.policy), {}, {}
+    training_seeds = provenance.training_seeds(chosen, range(FLAGS.seed, FLAGS.seed + FLAGS.episodes))
     for name, setup in asked.items():
         environment, body = setup.load(), setup.body
         task = environment.task.definition
@@ -90,11 +91,14 @@ def main() -> None:
                 **report(episodes, stood, experts[robot], None if known is None else anchors.of_returns(known)),
             }
             print(row(labels[robot].ljust(width), reports[robot], robot in papers), flush=True)
+        if training_seeds is None:
+            print(f"policy {chosen}: {provenance.UNKNOWN}")
         file.update(
             task=setup.task,
             task_kwargs=setup.task_kwargs,
             policy=chosen,
             policy_sha256=provenance.policy_sha256(chosen),
+            training_seeds=seed_ranges.to_json(training_seeds),
             seed=FLAGS.seed,
             robots=reports,
             versions=versions.recorded(),

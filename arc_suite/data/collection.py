@@ -11,7 +11,7 @@ from minari import __version__ as minari_version
 from minari.serialization import serialize_space
 from tqdm import tqdm
 
-from arc_suite import checks, evaluation, policies
+from arc_suite import checks, evaluation, policies, seed_ranges
 from arc_suite.data import rollouts
 from arc_suite.data.settings import DatasetSettings
 from arc_suite.data.storage import Storage
@@ -42,7 +42,7 @@ def collect(
 
     Args:
         dataset_id: Minari's.
-        settings: what the episodes depend on.
+        settings: what the episodes depend on; all their seeds are of `seed_ranges.COLLECTING`.
         episodes: how many the dataset is to have.
         num_envs: number of episodes that are played at a time; the data do not depend on it.
         threads: on which to simulate; None for all cores. The data do not depend on it.
@@ -93,8 +93,8 @@ def collect(
 
 def _check(settings: DatasetSettings, episodes: int) -> None:
     checks.integer("steps", settings.steps, 1)
-    checks.seed(settings.seed)
-    checks.seed(settings.seed + episodes - 1)
+    last = seed_ranges.COLLECTING[-1] - (episodes - 1)
+    checks.integer(f"seed of the first of {episodes} episodes", settings.seed, seed_ranges.COLLECTING.start, last)
     _policy(settings, num_envs=1)  # finds out whether there is such a policy
 
 

@@ -80,6 +80,11 @@ class Dataset:
             checks.integer("total_steps", self.metadata["total_steps"], 0, 1 << 53)
             _check_spec(self.metadata.get("env_spec"), self.settings, known)
 
+    @property
+    def seeds(self) -> range:
+        """Seeds of all episodes."""
+        return range(self.settings.seed, self.settings.seed + len(self))
+
     def __len__(self) -> int:
         return self._length
 

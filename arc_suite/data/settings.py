@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from arc_suite import policies
+from arc_suite import policies, seed_ranges
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
@@ -22,7 +22,7 @@ class DatasetSettings(NamedTuple):
         presets: of the demonstrator; the episode with seed s has number s modulo their count. Empty for other
             policies.
         noise: standard deviation of the normal noise on actions, which are clipped after it.
-        seed: seed of the first episode.
+        seed: seed of the first episode, of `seed_ranges.COLLECTING`.
         steps: control steps after which an episode is truncated.
     """
 
@@ -30,7 +30,7 @@ class DatasetSettings(NamedTuple):
     policy: str = "cpg"
     presets: tuple[str, ...] = ("medium",)
     noise: float = 0.0
-    seed: int = 0
+    seed: int = seed_ranges.COLLECTING.start
     steps: int = STEPS
 
     def preset(self, seed: int) -> str | None:

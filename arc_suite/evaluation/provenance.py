@@ -1,12 +1,13 @@
-"""What the results of an evaluation depend on: hashes of body, model, task and policy."""
+"""What the results of an evaluation depend on: hashes of body, model, task and policy, and what it learned from."""
 
 import hashlib
 from typing import Any
 
-from arc_suite import policies
+from arc_suite import policies, seed_ranges
 from arc_suite.envs.setup import Setup
 
 FIELDS = ("robot", "task", "task_kwargs", "task_version", "task_sha256", "body_sha256", "model_sha256")
+UNKNOWN = "training data unknown"
 
 
 def of_setup(setup: Setup) -> dict[str, Any]:
@@ -19,3 +20,20 @@ def of_setup(setup: Setup) -> dict[str, Any]:
 def policy_sha256(policy: str) -> str | None:
     """Return the hash of a policy's files; None for one without files, such as a demonstrator."""
     return policies.digest(policy) if policies.is_file(policy) or policy.endswith(".npz") else None
+
+
+def training_seeds(policy: str, played: range) -> seed_ranges.Ranges | None:
+    """Return the seeds of the episodes that a policy learned from; None where they are unknown.
+
+    Args:
+        policy: its name, as on the command line.
+        played: seeds of the episodes that judge it.
+
+    Raises:
+        ValueError: it learned from some of them.
+    """
+    found = policies.training_seeds(policy)
+    if shared := seed_ranges.common(found or (), played):
+        free = f"those below {seed_ranges.COLLECTING.start} are evaluation's"
+        raise ValueError(f"policy {policy}: learned from episodes of seeds {shared.start} to {shared[-1]}; {free}")
+    return found

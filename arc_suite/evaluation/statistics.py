@@ -78,6 +78,24 @@ def iqm_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[
     return float(interquartile_mean(np.concatenate(strata))), _interval(interquartile_mean(resamples))
 
 
+def mean_and_interval(strata: Sequence[Sequence[float]], seed: int = 0) -> tuple[float, tuple[float, float]]:
+    """Return the mean of the means of strata, with its stratified bootstrap interval.
+
+    Strata count equally, whatever their number of values, and a weak one lowers the mean.
+
+    Args:
+        strata: values by stratum, such as the scores of runs in each place; at least one value in each.
+        seed: of the resampling.
+
+    Returns:
+        The mean, and the ends of the interval.
+    """
+    random = np.random.default_rng(seed)
+    strata = [np.asarray(values, dtype=float) for values in strata]
+    resamples = np.mean([random.choice(v, (RESAMPLES, v.size)).mean(axis=-1) for v in strata], axis=0)
+    return float(np.mean([values.mean() for values in strata])), _interval(resamples)
+
+
 class Curve(NamedTuple):
     """Interquartile means along training, with pointwise bootstrap intervals.
 

@@ -10,6 +10,7 @@ from arc_suite.policies.named import (
     preset_names,
     setup_of,
     trained,
+    training_seeds,
 )
 from arc_suite.policies.protocol import Individuals, Mixture, Policy, Positioned, Script, Sum, alone
 
@@ -30,4 +31,5 @@ __all__ = [
     "preset_names",
     "setup_of",
     "trained",
+    "training_seeds",
 ]

@@ -2,6 +2,7 @@
 
 import hashlib
 import importlib.util
+import itertools
 import os
 import pkgutil
 import sys
@@ -12,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from arc_suite import checks, files, registry, versions
+from arc_suite import checks, files, registry, seed_ranges, versions
 from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.cpg.selection import preset_names
 from arc_suite.envs.prepare import prepared
@@ -70,6 +71,7 @@ def _universal(body: Body, presets: Sequence[str], num_envs: int, task: Task | N
 
 # By name: a function that makes the policy of a body, presets, a number of environments and a task, if there is one.
 POLICIES = {"cpg": _cpg, "zero": _zero, "random": _random, "ppo": _ppo, universal.NAME: _universal}
+_UNTRAINED = ("zero", "random")
 
 HELP = (
     f"One of {', '.join(POLICIES)}; or the folder of a run of arc-suite train; or a zip that stable-baselines3 has "
@@ -155,8 +157,7 @@ def digest(name: str) -> str:
     if zipped := zips.parts(name):
         held = filter(None, (zipped[0], zips.statistics(*zipped)))
     else:
-        path = Path(name)
-        held = network.checkpoint_files(path) or [path / network.FILE if path.is_dir() else path]
+        held = _policy_files(Path(name))
     return hashlib.sha256(b"".join(file.read_bytes() for file in held)).hexdigest()
 
 
@@ -178,6 +179,29 @@ def setup_of(name: str | os.PathLike) -> Setup | None:
     if not path.exists():
         return None
     return network.load(next(iter(network.checkpoint_files(path)), path)).setup
+
+
+def training_seeds(name: str) -> seed_ranges.Ranges | None:
+    """Return the seeds of the episodes that a policy learned from; None where they are unknown.
+
+    Demonstrators and the trained policies of the package learned from `seed_ranges.LEARNING`. Files of policies hold
+    their seeds; zips of stable-baselines3 and functions do not.
+
+    Raises:
+        ValueError: a damaged file.
+        OSError: a file cannot be read.
+    """
+    if name in POLICIES:
+        return () if name in _UNTRAINED else (seed_ranges.LEARNING,)
+    if zips.parts(name) or not _is_path(name):
+        return None
+    found = [network.load(path).training_seeds for path in _policy_files(Path(name))]
+    return None if None in found else tuple(dict.fromkeys(itertools.chain.from_iterable(found)))
+
+
+def _policy_files(path: Path) -> list[Path]:
+    """Files of a run, of all checkpoints in a folder, or the file itself."""
+    return network.checkpoint_files(path) or [path / network.FILE if path.is_dir() else path]
 
 
 def trained(name: str | os.PathLike) -> Network:

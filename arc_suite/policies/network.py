@@ -5,6 +5,7 @@ A policy file is an archive of the graph's arrays with one JSON text:
     robot, task, task_kwargs    the setup that the policy was trained in
     blocks                      size of every block of the observation, in the order of the input
     nodes                       [operator, input, ...] for each node of the graph; see `graph`
+    training_seeds              first and last seed of each range of episodes that the policy learned from, or null
 
 It holds no pickle and no code, so reading a file of others runs nothing.
 """
@@ -17,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import archives, checks, files, registry
+from arc_suite import archives, checks, files, registry, seed_ranges
 from arc_suite.envs.setup import Setup
 from arc_suite.policies.graph import Graph, Node, checked
 
@@ -36,11 +37,13 @@ class Network(NamedTuple):
         graph: from the flat observation (num_envs, size) to actions (num_envs, joints).
         setup: body, or bodies, task and settings.
         blocks: size of every block of the observation by name, in the order of the flat one.
+        training_seeds: of the episodes that it learned from; None if they are unknown.
     """
 
     graph: Graph
     setup: Setup
     blocks: Mapping[str, int]
+    training_seeds: seed_ranges.Ranges | None = None
 
     @property
     def size(self) -> int:
@@ -87,6 +90,7 @@ def save(path: str | os.PathLike, network: Network) -> None:
     """
     nodes = [[node.operator, *node.inputs] for node in network.graph.nodes]
     known = network.setup.to_dict() | {"blocks": dict(network.blocks), "nodes": nodes}
+    known["training_seeds"] = seed_ranges.to_json(network.training_seeds)
     with files.writing(path) as temporary:
         np.savez(temporary, policy=np.array(json.dumps(known)), **network.graph.arrays)  # type: ignore[arg-type]
 
@@ -113,7 +117,7 @@ def load(path: str | os.PathLike) -> Network:
         # Packaged policies are stored as float16.
         arrays = {name: a.astype(np.float32) if a.dtype == np.float16 else a for name, a in arrays.items()}
         graph = checked(Graph(nodes, arrays), sum(blocks.values()))
-        return Network(graph, Setup.from_dict(known), blocks)
+        return Network(graph, Setup.from_dict(known), blocks, seed_ranges.from_json(known.get("training_seeds")))
     except FileNotFoundError:
         raise OSError(f"cannot read {path}: no such file") from None
     except registry.NotImported as error:

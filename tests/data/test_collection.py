@@ -61,7 +61,7 @@ MODIFIERS = {"kicks": 1.0, "motor_strength": [0.5, 1.0], "actuator_failure": Tru
 MODIFIERS |= {"friction": [0.3, 1.0], "mass": [0.8, 1.5]}
 MODIFIERS |= {"observation_noise": 1.0, "delay": [0, 2], "actions": "position", "exclude_blocks": "contact_forces"}
 BUMPS, WAVE = (Setup.of("queen", "walk", settings) for settings in ({"arena": "bumps"}, {"gait": "wave"}))
-RANDOM = data.DatasetSettings(QUEEN, "random", (), seed=3, steps=30)
+RANDOM = data.DatasetSettings(QUEEN, "random", (), seed=10_003, steps=30)
 
 
 REPLAYED = {
@@ -72,7 +72,9 @@ REPLAYED = {
     "bumps": RANDOM._replace(setup=BUMPS),
     "shoved": RANDOM._replace(setup=Setup.of("queen", "shoved"), steps=60),
     "modifiers": RANDOM._replace(setup=Setup.of("queen", "steer", MODIFIERS), steps=60),
-    "spider by positions": data.DatasetSettings(Setup.of(SPIDER.body, "walk", MODIFIERS), noise=0.05, seed=3, steps=60),
+    "spider by positions": RANDOM._replace(
+        setup=Setup.of(SPIDER.body, "walk", MODIFIERS), policy="cpg", presets=("medium",), noise=0.05, steps=60
+    ),
     "spider steers on bumps": RANDOM._replace(setup=Setup.of(SPIDER.body, "steer", {"arena": "bumps"})),
     "no gait": None,  # of a task that the test registers
 }
@@ -89,7 +91,7 @@ def test_minari_opens_a_dataset_whose_environment_replays_it(name, stay):
     assert dataset.total_steps == sum(map(len, dataset))
     environment = dataset.recover_environment()
     seeds = [metadata["seed"] for metadata in dataset.storage.get_episode_metadata(range(4))]
-    assert seeds == [3, 4, 5, 6]
+    assert seeds == [10_003, 10_004, 10_005, 10_006]
     for seed, episode in zip(seeds, dataset, strict=True):
         observations, rewards, terms, terminations, truncations = replay(environment, seed, episode.actions)
         assert episode.observations.dtype == episode.actions.dtype == np.float32
@@ -109,7 +111,7 @@ def test_minari_opens_a_dataset_whose_environment_replays_it(name, stay):
 @pytest.mark.slow
 def test_a_body_of_a_file_is_recovered_without_the_file_in_another_process():
     collect(ID, data.DatasetSettings(SPIDER, **SHORT), 1)
-    code = f"import minari; e = minari.load_dataset({ID!r}).recover_environment(); print(e.reset(seed=5)[0].sum())"
+    code = f"import minari; e = minari.load_dataset({ID!r}).recover_environment(); print(e.reset(seed=10_005)[0].sum())"
     (total,) = interpreters.printed(code, options=("-W", "error"))
     assert float(total) == data.open(ID)[0].observations[0].sum()
 
@@ -118,7 +120,8 @@ def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
     collect(ID, data.DatasetSettings(QUEEN, "zero", (), steps=30), 10)
     dataset = minari.load_dataset(ID)
     totals = [episode.rewards.sum() for episode in dataset]
-    assert minari.get_normalized_score(dataset, np.mean(totals)) == pytest.approx(0.0, abs=1e-12)
+    # Other episodes than those of evaluation, whose mean is the zero of scores.
+    assert minari.get_normalized_score(dataset, np.mean(totals)) == pytest.approx(0.0, abs=0.02)
     assert minari.get_normalized_score(dataset, 4.0 * 30) == 1.0
 
 
@@ -206,7 +209,7 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
     before = digests()
     for changed, difference in (
         (settings._replace(noise=0.5), "its noise is 0.0, and not 0.5"),
-        (settings._replace(seed=1), "its seed is 5, and not 1"),
+        (settings._replace(seed=10_001), "its seed is 10005, and not 10001"),
         (settings._replace(presets=("fast", "medium")), "its presets is ['medium'], and not ['fast', 'medium']"),
         (settings._replace(setup=TICK), "its robot is 'queen', and not 'tick'"),
         (settings._replace(setup=Setup.of("queen", "steer")), "its task is 'walk', and not 'steer'"),
@@ -220,7 +223,7 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
         assert digests() == before
         return quiet(*args, **kwargs)
 
-    data.collect(ID, settings._replace(seed=6), 3, overwrite=True, progress=watched)
+    data.collect(ID, settings._replace(seed=10_006), 3, overwrite=True, progress=watched)
     assert digests()[0] == before[1]
     assert len(data.open(ID)) == 3
     assert [path.name for path in (root / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
@@ -253,7 +256,8 @@ def test_numbers_of_a_preset_that_changed_under_its_name_are_noticed(monkeypatch
         ({"noise": float("nan")}, "noise: expected a finite number of at least 0, got nan"),
         ({"steps": 0}, "steps: expected an integer from 1, got 0"),
         ({"setup": Setup.of("queen", task_kwargs={"gaits": "wave"})}, "unknown setting of walk 'gaits'; did you mean "),
-        ({"seed": 2**32 - 1}, "seed: expected an integer from 0 to 4294967295, got 4294967296"),
+        ({"seed": 9999}, "seed of the first of 2 episodes: expected an integer from 10000 to 99998, got 9999"),
+        ({"seed": 99_999}, "seed of the first of 2 episodes: expected an integer from 10000 to 99998, got 99999"),
     ],
 )
 def test_wrong_settings_leave_nothing_behind(root, changes, message):

@@ -15,20 +15,20 @@ from arc_suite.cpg.presets import PRESETS
 
 
 def test_metadata():
-    settings = data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=7, steps=20)
+    settings = data.DatasetSettings(QUEEN, "cpg", ("slow", "fast"), 0.1, seed=10_007, steps=20)
     collect(ID, settings, 3)
     dataset = data.open(ID)
     assert dataset.settings == settings and len(dataset) == 3
     about = dataset.metadata["arc_suite"]
     assert about["versions"] == versions.recorded()
     assert len(about["model_sha256"]) == 64
-    told = {"policy": "cpg", "presets": ["slow", "fast"], "noise": 0.1, "seed": 7, "steps": 20}
+    told = {"policy": "cpg", "presets": ["slow", "fast"], "noise": 0.1, "seed": 10_007, "steps": 20}
     told |= {"robot": "queen", "task": "walk", "task_kwargs": {}, "task_version": 0}
     assert {name: about[name] for name in about if not name.endswith(("versions", "_sha256"))} == told
     numbers = [repr(PRESETS["queen"][name]) for name in ("slow", "fast")]
     assert about["presets_sha256"] == [hashlib.sha256(text.encode()).hexdigest() for text in numbers]
     summaries = dataset.summaries()
-    assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 7, 8, 9
+    assert [summary["preset"] for summary in summaries] == ["fast", "slow", "fast"]  # of seeds 10,007 to 10,009
     for summary, episode in zip(summaries, dataset, strict=True):
         assert (summary["seed"], summary["preset"]) == (episode.seed, episode.preset)
         assert summary["length"] == summary["total_steps"] == episode.length == 20

@@ -49,7 +49,7 @@ def test_episode_metadata_that_changed_is_found(root, key):
     [
         ("rewards", "episode 1 differs from its replay: rewards[3]"),
         ("actions", "episode 1 differs from its replay: observations[4]"),
-        ("seed", "episode 1 has seed 5, and not 6"),
+        ("seed", "episode 1 has seed 10005, and not 10006"),
     ],
 )
 def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key, message):
@@ -57,7 +57,7 @@ def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key
     with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
         episode = episodes.read(file, 1)
         if key == "seed":
-            episode = episode._replace(seed=5)
+            episode = episode._replace(seed=10_005)
         else:
             getattr(episode, key)[3] += 0.25
         del file["episode_1"]

@@ -16,8 +16,9 @@ from arc_suite.learning.agents.learner import MOST_SEEDS
 _OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior")
 CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
 # Names in the record of a run that follow from its configuration, the data and the installed packages.
-PRIOR_SHA256 = "prior_sha256"
-PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", PRIOR_SHA256, "versions")
+PRIOR_SHA256, TRAINING_SEEDS = "prior_sha256", "training_seeds"
+OF_DATA = (PRIOR_SHA256, TRAINING_SEEDS)
+PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", *OF_DATA, "versions")
 
 
 @dataclasses.dataclass(frozen=True)

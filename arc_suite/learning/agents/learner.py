@@ -9,14 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from arc_suite import checks
+from arc_suite import checks, seed_ranges
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning import teachers
 from arc_suite.policies.graph import Graph
 
-_SEEDS = 100_000  # of the environments of a run; those below are left for evaluation
 MOST_SEEDS = 40_000
 ENVIRONMENT = "environment/"  # prefix of the names in a checkpoint
 # Prefixes of what is not learned: commands of tasks may be NaN, and ground that nobody has seen is at -inf.
@@ -61,7 +60,7 @@ class RunContext(NamedTuple):
     @property
     def first_seed(self) -> int:
         """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
-        return _SEEDS * (1 + self.seed)
+        return seed_ranges.of_run(self.seed).start
 
     def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv | BodiesEnv:
         """Return environments to learn in, seeded apart from evaluation and from other runs.

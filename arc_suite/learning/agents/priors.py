@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from arc_suite import checks, files
+from arc_suite import checks, files, seed_ranges
 from arc_suite.learning.agents.learner import Damaged, RunContext
 from arc_suite.learning.agents.replay import Replay
 from arc_suite.tasks import Task
@@ -22,6 +22,19 @@ def digest(prior: str) -> str:
         ValueError: no such dataset, or one that is damaged.
     """
     return _digest(_opened(prior).summaries())
+
+
+def seeds(prior: str) -> range:
+    """Return the seeds of the episodes of a dataset.
+
+    Raises:
+        ValueError: no such dataset, or one with episodes of evaluation.
+    """
+    found = _opened(prior).seeds
+    if seed_ranges.common([found], seed_ranges.EVALUATION):
+        least = seed_ranges.COLLECTING.start
+        raise ValueError(f"prior {prior!r}: expected seeds from {least} on, got {found.start}; collect it anew")
+    return found
 
 
 def mapped(context: RunContext, task: Task) -> Replay:

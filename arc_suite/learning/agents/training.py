@@ -10,10 +10,10 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import checks, evaluation, files
+from arc_suite import checks, evaluation, files, seed_ranges
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import priors, run_folder
-from arc_suite.learning.agents.configuration import PRIOR_SHA256, Configuration
+from arc_suite.learning.agents.configuration import PRIOR_SHA256, TRAINING_SEEDS, Configuration
 from arc_suite.learning.agents.learner import NOT_LEARNED, Damaged, Diverged, RunContext, Slice
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.policies import checkpoints, network
@@ -54,6 +54,8 @@ def train(
     record, definition, setup = configuration.record(), configuration.definition, configuration.setup
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.digest(configuration.prior)
+    training_seeds = _training_seeds(configuration)
+    record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(setup.definition.step_limit)
     module = definition.module
     growing = ("steps",) if definition.extends else ()
@@ -93,7 +95,8 @@ def train(
                 on_metrics(found.step, found.metrics)
                 bar.set_postfix_str(_postfix(found.metrics, state), refresh=False)
             if is_evaluated:
-                state["return"] = _evaluate(configuration, environment, run_files, found)
+                policy = Network(found.policy, setup, dict(environment.task.sizes), training_seeds)
+                state["return"] = _evaluate(configuration, environment, run_files, found.step, policy)
                 state["evaluated"] = found.step
                 on_metrics(found.step, {"return": state["return"]})
             is_written = found.metrics is not None or is_evaluated
@@ -131,16 +134,28 @@ def _write_times(run_files: RunFolder, state: dict[str, Any], latest: tuple, ste
     return now
 
 
-def _evaluate(configuration: Configuration, environment: VectorEnv, run_files: RunFolder, found: Slice) -> float:
+def _training_seeds(configuration: Configuration) -> seed_ranges.Ranges | None:
+    """Seeds of the episodes of a run, of its prior data, and of the policy that it starts from; None if unknown."""
+    found = [seed_ranges.of_run(configuration.seed)]
+    if configuration.prior is not None:
+        found.append(priors.seeds(configuration.prior))
+    if start := getattr(configuration.hyperparameters, "start", ""):
+        before = network.load(start).training_seeds
+        return None if before is None else tuple(dict.fromkeys((*before, *found)))
+    return tuple(found)
+
+
+def _evaluate(
+    configuration: Configuration, environment: VectorEnv, run_files: RunFolder, step: int, policy: Network
+) -> float:
     """Evaluate a policy by the protocol, write it and its returns into the folder, and return their mean."""
-    policy = Network(found.policy, configuration.setup, dict(environment.task.sizes))
     network.save(run_files.path / network.FILE, policy)
-    kept = files.folder(run_files.path / checkpoints.FOLDER / str(found.step))
+    kept = files.folder(run_files.path / checkpoints.FOLDER / str(step))
     network.save(kept / network.FILE, policy)
     episodes = evaluation.episodes_in_batch(environment, policy)
     for seed, episode in enumerate(episodes):
         numbers = {"seed": seed, "return": episode.total, "length": episode.length, **episode.progress}
-        run_files.append("evaluations", {"step": found.step, **numbers})
+        run_files.append("evaluations", {"step": step, **numbers})
     mean = float(np.mean([episode.total for episode in episodes]))
-    checkpoints.save(kept, Agent(configuration.algorithm, found.step, configuration.seed, mean))
+    checkpoints.save(kept, Agent(configuration.algorithm, step, configuration.seed, mean))
     return mean

@@ -6,7 +6,7 @@ studies/scores.csv holds a row for each run, by `write`. The table of all learne
 import difflib
 import itertools
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from arc_suite import checks, evaluation, files, policies, style
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import anchors
+from arc_suite.evaluation import anchors, provenance
 from arc_suite.learning.studies import csv_files, results
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS, TURNING
 from arc_suite.learning.studies.leaderboard import table
@@ -45,6 +45,7 @@ class RunScore(NamedTuple):
         minutes: of the processor until an evaluation had the score `HALF`; infinite if none had, NaN if unknown.
         gait_compliance: mean over the episodes.
         heading_error: mean size over the episodes, rad; NaN for tasks of `TURNING`.
+        notes: what the score must not be compared with others for; empty for nothing.
     """
 
     robot: str
@@ -55,9 +56,11 @@ class RunScore(NamedTuple):
     minutes: float
     gait_compliance: float
     heading_error: float
+    notes: str = ""
 
 
 COLUMNS = ("division", "learner", *RunScore._fields)  # of `SCORES`
+Groups = Mapping[tuple[str, str], Sequence[RunScore]]  # scores by robot and task
 
 
 def of_results(found: Iterable[RunResult]) -> list[RunScore]:
@@ -70,15 +73,17 @@ def _of_result(found: RunResult) -> RunScore:
     scale = anchors.anchors(setup)
     enough = np.flatnonzero(scale.score(found.returns.mean(axis=1)) >= HALF)
     minutes = found.cpu[enough[0]] / 60.0 if enough.size else np.inf
-    return _score(setup, found.run.configuration.seed, found.final, minutes, found.style, scale)
+    notes = "; ".join(found.notes)
+    return _score(setup, found.run.configuration.seed, found.final, minutes, found.style, scale, notes)
 
 
-def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale) -> RunScore:
+def _score(setup: Setup, seed: int, result: float, minutes: float, measured, scale, notes: str) -> RunScore:
     clipped = float(np.clip(scale.score(result), *CLIP))
     compliance, error = (results.size(measured[each]) for each in STYLE)
     if setup.kind.name in TURNING:
         error = np.nan
-    return RunScore(setup.body.name, setup.kind.name, seed, float(result), clipped, float(minutes), compliance, error)
+    where = setup.body.name, setup.kind.name, seed
+    return RunScore(*where, float(result), clipped, float(minutes), compliance, error, notes)
 
 
 def of_policies(folder: Path, progress: Callable) -> list[RunScore]:
@@ -130,12 +135,14 @@ def _is_policy(path: Path) -> bool:
 def _of_policy(path: Path, setup: Setup, seed: int) -> RunScore:
     environment = setup.load()
     name = f"{path}:{MAKE}" if path.suffix == named.MODULE else path
+    known = provenance.training_seeds(str(name), range(evaluation.EPISODES)) is not None
     policy = policies.policy(name, setup.body, task=environment.task.definition)
     tracks = [style.record(environment, policy, seed) for seed in range(evaluation.EPISODES)]
     every = [style.measure(track) for track in tracks]
     measured = {each: np.array([metrics[each].value for metrics in every]) for each in STYLE}
     result = np.mean([track.rewards.sum() for track in tracks])
-    return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup))
+    notes = "" if known else provenance.UNKNOWN
+    return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup), notes)
 
 
 def write(studies: Path, division: str, learner: str, scores: Iterable[RunScore]) -> None:
@@ -159,9 +166,9 @@ def read(studies: Path) -> dict[tuple[str, str], list[RunScore]]:
     """
     found: dict[tuple[str, str], list[RunScore]] = {}
     for row in csv_files.read(studies / SCORES, COLUMNS):
-        division, learner, robot, task, seed, *others = row.values()
+        division, learner, robot, task, seed, *numbers, notes = row.values()
         checks.name(division, DIVISIONS, "division")
-        found.setdefault((division, learner), []).append(RunScore(robot, task, int(seed), *map(float, others)))
+        found.setdefault((division, learner), []).append(RunScore(robot, task, int(seed), *map(float, numbers), notes))
     return found
 
 
@@ -174,42 +181,58 @@ def text(studies: Path) -> str:
     """
     lines = []
     for (division, learner), scores in read(studies).items():
-        groups = _by_place(scores)
-        middle = evaluation.interquartile_mean([each.score for each in _even(groups)])
-        order = tuple(DIVISIONS).index(division), not all(groups), -middle
+        groups = by_place(scores)
+        order = tuple(DIVISIONS).index(division), not all(groups.values()), -total(groups)[0]
         lines.append((*order, division, learner, *_cells(groups)))
     if not lines:
         raise ValueError(f"{studies}: no scores of the benchmark; run a division, or name another folder by --results")
-    places = [" ".join(each) for each in PLACES]
-    heads = ["division", "learner", "seeds", "score, IQM [95 %]", "CPU min to .5", *STYLE_HEADS, *places]
-    return table(heads, [line[3:] for line in sorted(lines)])
+    heads = ["division", "learner", "seeds", "total [95 %]", "lowest place", "CPU min to .5", *STYLE_HEADS]
+    return table([*heads, *map(" ".join, PLACES), "notes"], [line[3:] for line in sorted(lines)])
 
 
-def _by_place(scores: Sequence[RunScore]) -> list[list[RunScore]]:
-    """Scores of each of `PLACES`, by seed; empty where there are none."""
-    groups = [[each for each in scores if (each.robot, each.task) == where] for where in PLACES]
-    return [sorted(group, key=lambda each: each.seed) for group in groups]
+def total(groups: Groups) -> tuple[float, tuple[float, float]]:
+    """Return the mean over places of the mean score within a place, of those that have any, and its interval."""
+    return evaluation.mean_and_interval([[each.score for each in group] for group in groups.values() if group])
 
 
-def _even(groups: Sequence[Sequence[RunScore]]) -> list[RunScore]:
-    """Scores of each place that has any, of the same number of seeds, so that all places weigh the same."""
-    few = min(len(group) for group in groups if group)
-    return [each for group in groups for each in group[:few]]
+def by_place(scores: Sequence[RunScore]) -> Groups:
+    """Scores by place, of all `PLACES`; empty where there are none."""
+    return {where: [each for each in scores if (each.robot, each.task) == where] for where in PLACES}
 
 
-def _cells(groups: Sequence[Sequence[RunScore]]) -> list[str]:
-    """Cells of a learner; the total is that of all places alone, its interval that over two seeds or more."""
-    even, seeds = _even(groups), [len(group) for group in groups if group]
+def _cells(groups: Groups) -> list[str]:
+    """Cells of a learner. Every place weighs the same, however many seeds it has."""
+    run = {where: group for where, group in groups.items() if group}
+    seeds = [len(group) for group in run.values()]
     few, many = min(seeds), max(seeds)
-    total = f"{len(seeds)} of {len(PLACES)} places"
-    if all(groups):
-        middle, (low, high) = evaluation.iqm_and_interval([[each.score for each in group[:few]] for group in groups])
-        total = f"{middle:.3f}" + (f" [{low:.3f}, {high:.3f}]" if few > 1 else "")
-    minutes = float(np.median([each.minutes for each in even]))
-    shown = [
+    means = {where: float(np.mean([each.score for each in group])) for where, group in run.items()}
+    lowest = min(means, key=means.__getitem__)
+    minutes = float(np.median([np.median([each.minutes for each in group]) for group in run.values()]))
+    return [
         f"{few}" if few == many else f"{few} to {many}",
-        total,
+        _total(groups, few) if len(run) == len(groups) else f"{len(run)} of {len(groups)} places",
+        f"{' '.join(lowest)} {means[lowest]:z.2f}",
         f"{minutes:.1f}" if np.isfinite(minutes) else "-",
-        *(f"{results.size(np.array([getattr(each, name) for each in even])):.3f}" for name in STYLE),
+        *(f"{_mean_size(name, run):.3f}" for name in STYLE),
+        *(f"{means[where]:z.2f}" if where in means else NOT_RUN for where in groups),
+        _notes(groups),
     ]
-    return shown + [f"{np.mean([each.score for each in group]):z.2f}" if group else NOT_RUN for group in groups]
+
+
+def _total(groups: Groups, seeds: int) -> str:
+    """The total, and its interval over two seeds or more."""
+    mean, (low, high) = total(groups)
+    return f"{mean:.3f}" + (f" [{low:.3f}, {high:.3f}]" if seeds > 1 else "")
+
+
+def _mean_size(name: str, run: Groups) -> float:
+    """Mean over places of the mean size of a metric of style."""
+    return results.size(np.array([results.size(np.array([getattr(e, name) for e in group])) for group in run.values()]))
+
+
+def _notes(groups: Groups) -> str:
+    """What the total must not be compared with others for; a dash for nothing."""
+    short = sum(len(group) < SEEDS for group in groups.values())
+    found = [f"{short} of {len(groups)} places have fewer than {SEEDS} seeds"] * bool(short)
+    found += [note for group in groups.values() for each in group for note in each.notes.split("; ") if note]
+    return "; ".join(dict.fromkeys(found)) or "-"

@@ -9,6 +9,7 @@ from arc_suite import checks, files, policies, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol, provenance
 from arc_suite.evaluation.protocol import EPISODES
+from arc_suite.seed_ranges import Ranges
 
 _MAX_BYTES = 1 << 20
 
@@ -21,6 +22,7 @@ class Entry(NamedTuple):
         policy: its name, as on the command line.
         preset: of the demonstrator; None for other policies.
         policy_sha256: hash of its files; None for a policy without files.
+        training_seeds: of the episodes that it learned from; None if they are unknown.
         episodes: results of the protocol's episodes.
     """
 
@@ -28,6 +30,7 @@ class Entry(NamedTuple):
     policy: str
     preset: str | None
     policy_sha256: str | None
+    training_seeds: Ranges | None
     episodes: list[protocol.EpisodeResult]
 
 
@@ -76,6 +79,7 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
         _same(path, "policy", found["policy"], name)
     if found["seed"] != 0:
         raise ValueError(f"{path}: expected episodes from seed 0, got {checks.quoted(found['seed'])}")
+    training_seeds = provenance.training_seeds(name, range(EPISODES))
     entries = []
     if not found["robots"]:
         raise ValueError(f"{path}: expected robots, got none")
@@ -97,7 +101,7 @@ def checked(path: Path, policy: str | None, progress=lambda seeds: seeds) -> lis
         player = policies.policy(name, setup.body, preset, task=environment.task.definition)
         episodes = protocol.episodes(environment, player, progress(range(EPISODES)))
         _same(path, f"returns of {setup.body.name}", totals, [each.total for each in episodes])
-        entries.append(Entry(setup, name, preset, found["policy_sha256"], episodes))
+        entries.append(Entry(setup, name, preset, found["policy_sha256"], training_seeds, episodes))
     return entries
 
 

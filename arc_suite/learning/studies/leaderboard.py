@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import files
-from arc_suite.evaluation import anchors
+from arc_suite.evaluation import anchors, provenance
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.entries import Entry
 
@@ -21,7 +21,7 @@ PAGE, TABLE, ENTRIES = "README.md", "leaderboard.csv", "entries"
 STYLE = ("gait compliance", "heading error, rad", "torso pitch, rad")
 HEADS = (
     *("robot, task", "algorithm", "phases, updates", "prior data, episodes", "seeds", "return", "score", "IQM [95 %]"),
-    *("metric", *STYLE, "steps", "CPU min", "study", "command of seed 0", "configuration"),
+    *("metric", *STYLE, "steps", "CPU min", "notes", "study", "command of seed 0", "configuration"),
 )
 _NAME = re.compile(r"[\w.-]+")
 _TEXT = (
@@ -115,6 +115,7 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
             "score": f"{score:z.2f}" if np.isfinite(score) else "-",
             "metric": f"{figure} {figures[figure]:.3f}",
             STYLE[0]: compliance,
+            "notes": "-" if entry.training_seeds is not None else provenance.UNKNOWN,
             "study": f"{ENTRIES}/{copied.name}",
             "command of seed 0": _command(entry),
             "configuration": copied.name,

@@ -160,13 +160,14 @@ def _finals(groups: Groups, demonstrators) -> str:
             run, values = seeds[0].run, results.scores(seeds)
             own = PAPER[run.configuration.setup.body.name][_algorithm(run)] if claims.is_papers(seeds[0]) else "-"
             reached, score = f"{min(each.steps[-1] for each in seeds):,}", _score(values, place, demonstrators)
-            lines.append((place, kind, reached, str(len(seeds)), _mean(values), score, _iqm(values), str(own)))
+            cells = (place, kind, reached, str(len(seeds)), _mean(values), score, _iqm(values), str(own))
+            lines.append((*cells, results.notes(seeds)))
         expert = _expert(run)
         for name, totals in demonstrators.get(place, {}).items():
             own = f"{expert:.0f}" if name == "medium" and expert else "-"
             score = _score(totals, place, demonstrators)
-            lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own))
-    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]", "paper, 1M steps")
+            lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own, "-"))
+    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]", "paper, 1M steps", "notes")
     return table(heads, lines)
 
 
@@ -247,6 +248,7 @@ def _rows(name: str, groups: Groups, demonstrators) -> list[dict[str, str]]:
             **dict(zip(leaderboard.STYLE, style, strict=True)),
             "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
             "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
+            "notes": results.notes(seeds),
             "study": name,
             "command of seed 0": f"`{run.configuration.command}`",
             "configuration": _identity(run),

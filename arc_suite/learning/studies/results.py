@@ -1,23 +1,25 @@
 """Results of studies: the published tables of their runs, and statistics over them."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import checks, evaluation
-from arc_suite.evaluation import anchors
-from arc_suite.learning.agents.configuration import CONFIGURATION, PROVENANCE
+from arc_suite.evaluation import anchors, provenance
+from arc_suite.learning.agents.configuration import CONFIGURATION, PROVENANCE, TRAINING_SEEDS
 from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.tables import Run
+from arc_suite.seed_ranges import EVALUATION, Ranges, common, from_json
 
 RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators.csv"
 
 # Columns of the table of runs: the configuration, then the updates of stabilisation phases by environment step.
 RUN_COLUMNS = ("run", "kind", *CONFIGURATION, *PROVENANCE, "phases")
 TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
+SHARED = "data share seeds with evaluation"
 STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
 _OTHERS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode that are not the task's metrics
 
@@ -33,6 +35,7 @@ class RunResult(NamedTuple):
         cpu: (evaluations,) s of the processor until then.
         style: metrics of style of the latest policy by name, each (episodes,).
         phases: (phases,) updates of each stabilisation phase; empty if they are not published.
+        training_seeds: of the episodes that it learned from; None if they are unknown.
     """
 
     run: Run
@@ -42,11 +45,19 @@ class RunResult(NamedTuple):
     cpu: np.ndarray
     style: dict[str, np.ndarray]
     phases: np.ndarray
+    training_seeds: Ranges | None = ()
 
     @property
     def final(self) -> float:
         """Mean return of the latest evaluation."""
         return float(self.returns[-1].mean())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What its final return must not be compared with others for."""
+        if self.training_seeds is None:
+            return (provenance.UNKNOWN,)
+        return (SHARED,) * bool(common(self.training_seeds, EVALUATION))
 
 
 Groups = Mapping[str, Mapping[str, Sequence[RunResult]]]  # results by place and kind
@@ -60,9 +71,9 @@ def results(runs: Sequence[Run], published: Path) -> list[RunResult]:
         OSError: a table cannot be read.
     """
     episodes = episodes_of(published)
-    phases = {row["run"]: row["phases"] for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
+    rows = {row["run"]: row for row in csv_files.read(published / RUNS, RUN_COLUMNS)}
     try:
-        return [_result(run, episodes[run.name], phases[run.name]) for run in runs if run.name in episodes]
+        return [_result(run, episodes[run.name], rows[run.name]) for run in runs if run.name in episodes]
     except (KeyError, ValueError) as error:
         raise ValueError(f"{published / EVALUATIONS}: damaged: {checks.quoted(error)}") from None
 
@@ -75,7 +86,7 @@ def episodes_of(published: Path) -> dict[str, list[dict[str, str]]]:
     return found
 
 
-def _result(run: Run, rows: Sequence[Mapping[str, str]], phases: str) -> RunResult:
+def _result(run: Run, rows: Sequence[Mapping[str, str]], known: Mapping[str, str]) -> RunResult:
     def column(name):
         return np.array([row[name] for row in rows], float).reshape(-1, evaluation.EPISODES)
 
@@ -88,7 +99,8 @@ def _result(run: Run, rows: Sequence[Mapping[str, str]], phases: str) -> RunResu
         progress={name: values for name, values in metrics.items() if not name.startswith(STYLE)},
         cpu=column("cpu_seconds")[:, 0],
         style={name.removeprefix(STYLE): values for name, values in metrics.items() if name.startswith(STYLE)},
-        phases=np.array(list(json.loads(phases or "{}").values())),
+        phases=np.array(list(json.loads(known["phases"] or "{}").values())),
+        training_seeds=from_json(json.loads(known[TRAINING_SEEDS] or "null")),
     )
 
 
@@ -104,6 +116,11 @@ def grouped(found: Sequence[RunResult]) -> Groups:
     for each in found:
         groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
     return groups
+
+
+def notes(seeds: Iterable[RunResult]) -> str:
+    """Return the notes of all results, each once; a dash without any."""
+    return "; ".join(dict.fromkeys(note for each in seeds for note in each.notes)) or "-"
 
 
 def scores(seeds: Sequence[RunResult]) -> np.ndarray:

@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from arc_suite import data, files
 from arc_suite.learning.agents import run_folder
-from arc_suite.learning.agents.configuration import PRIOR_SHA256
+from arc_suite.learning.agents.configuration import OF_DATA
 from arc_suite.learning.studies.tables import Run
 
 _PAUSE = 0.2  # s between two looks at the processes
@@ -81,7 +81,7 @@ def is_finished(run: Run, folder: Path) -> bool:
         ValueError: it is another run, or damaged.
     """
     if run_folder.is_begun(folder):
-        run_folder.check(folder, run.configuration.record(), left_out=("versions", PRIOR_SHA256))
+        run_folder.check(folder, run.configuration.record(), left_out=("versions", *OF_DATA))
     return run_folder.progress_of(folder).get("evaluated", 0) >= run.configuration.steps
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite import seed_ranges
 from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
@@ -25,7 +26,6 @@ _MARGIN = 0.03  # by which style is to be better, as few episodes estimate it
 _TIPPING = 1.0  # reward that falling in all hard starts takes
 
 _START_STEPS = 40  # control steps of these, after which a robot stands or lies
-_SEEDS = 100_000  # of a search; those below are left to evaluate its result
 
 
 class Generation(NamedTuple):
@@ -83,7 +83,7 @@ class Search:
         tuning, kind = PRESETS[setup.body.name], SPACES[space]
         self._medium = tuning["medium"]
         self._space, self._episodes = kind.space(setup.body, tuning[kind.preset]), episodes
-        self._first = _SEEDS * (1 + seed)
+        self._first = seed_ranges.of_run(seed).start
         self._starts = range(self._first, self._first + starts)
         origins = self._space.origins()
         presets = [self._medium, *map(self._space.preset, origins)]

@@ -125,13 +125,43 @@ def test_the_table_says_what_was_not_run(tmp_path):
         ["| samples", "two"],
         ["| samples", "part"],
     ]
-    levels = [0.1 * index for index in range(10)]
-    one = ["top", "one", "1", f"{evaluation.interquartile_mean(levels):.3f}", "2.0", "0.800", "0.100"]
-    assert row(page, "one") == one + [f"{level:.2f}" for level in levels]
+    few = "10 of 10 places have fewer than 3 seeds"
+    one = ["top", "one", "1", "0.450", "queen walk 0.00", "2.0", "0.800", "0.100"]
+    assert row(page, "one") == [*one, *(f"{0.1 * index:.2f}" for index in range(10)), few]
     two = row(page, "two")
-    assert two[2] == "2" and two[4] == "-" and re.fullmatch(r"0\.460 \[0\.\d{3}, 0\.\d{3}\]", two[3])
-    assert row(page, "part")[2:4] == ["1", "1 of 10 places"]
-    assert row(page, "part")[7:] == ["not run", "not run", "0.20", *["not run"] * 7]
+    assert two[2] == "2" and two[5] == "-" and re.fullmatch(r"0\.460 \[0\.\d{3}, 0\.\d{3}\]", two[3])
+    assert row(page, "part")[2:5] == ["1", "1 of 10 places", "tick walk 0.20"]
+    assert row(page, "part")[8:] == ["not run", "not run", "0.20", *["not run"] * 7, few]
+
+
+def complete(levels):
+    """Three seeds in every place, at these levels by place and 0.9 elsewhere."""
+    return [score(place, seed, levels.get(place, 0.9) + 0.01 * seed) for place in PLACES for seed in range(SEEDS)]
+
+
+def test_weak_places_lower_the_total(tmp_path):
+    """However few they are: the interquartile mean of all runs left them out."""
+    weak = dict.fromkeys([("queen", "steer"), ("tick", "steer")], -0.5)
+    benchmark.write(tmp_path, "top", "even", complete({}))
+    benchmark.write(tmp_path, "top", "weak", complete(weak))
+    even, poor = (row(benchmark.text(tmp_path), name) for name in ("even", "weak"))
+    assert (even[3].split()[0], even[4], even[-1]) == ("0.910", "queen walk 0.91", "-")
+    assert (poor[3].split()[0], poor[4], poor[-1]) == ("0.630", "queen steer -0.49", "-")
+    groups = [[each.score for each in complete(levels)] for levels in ({}, weak)]
+    assert evaluation.interquartile_mean(groups[0]) - evaluation.interquartile_mean(groups[1]) < 0.01
+
+
+def test_the_committed_total_sees_its_weakest_places():
+    scores = benchmark.read(COMMITTED)["top", "ppo"]
+    weak = [each._replace(score=-0.5) if each.task == "steer" and each.robot != "leaper" else each for each in scores]
+    (before, _), (after, _) = (benchmark.total(benchmark.by_place(each)) for each in (scores, weak))
+    assert after < before - 0.15
+
+
+def test_notes_of_scores_stand_in_the_table_once(tmp_path):
+    noted = [each._replace(notes="training data unknown") for each in complete({})[:2]]
+    benchmark.write(tmp_path, "top", "theirs", [*noted, *complete({})[2:]])
+    assert row(benchmark.text(tmp_path), "theirs")[-1] == "training data unknown"
 
 
 def test_places_with_more_seeds_weigh_no_more(tmp_path):
@@ -140,9 +170,11 @@ def test_places_with_more_seeds_weigh_no_more(tmp_path):
     for name, scores in (("once", whole), ("more", [*more, *whole])):
         benchmark.write(tmp_path, "top", name, scores)
     once, uneven = (row(benchmark.text(tmp_path), name) for name in ("once", "more"))
-    assert uneven[3:-1] == once[3:-1]
     assert (once[2], uneven[2]) == ("1", "1 to 3")
-    assert (once[-1], uneven[-1]) == ("0.90", "0.30"), "a place holds the mean over all its seeds"
+    assert (once[3], uneven[3]) == ("0.450", "0.390")
+    assert (once[-2], uneven[-2]) == ("0.90", "0.30"), "a place holds the mean over all its seeds"
+    assert uneven[5:-2] == once[5:-2]
+    assert uneven[-1] == "9 of 10 places have fewer than 3 seeds"
 
 
 def test_damaged_scores_are_one_line(tmp_path):

@@ -31,7 +31,11 @@ def publish(folder, each, returns, style=0.1, phases=""):
             row = dict(zip(columns, (each.name, step, seed, total, 1000, 0.3, 0.9, *times), strict=False))
             episodes.append(row | (measured if step == STEPS[len(returns) - 1] else {}))
     csv_files.write(folder / results.EVALUATIONS, columns, episodes)
-    csv_files.write(folder / results.RUNS, results.RUN_COLUMNS, [*runs, {"run": each.name, "phases": phases}])
+    csv_files.write(
+        folder / results.RUNS,
+        results.RUN_COLUMNS,
+        [*runs, {"run": each.name, "training_seeds": "[]", "phases": phases}],
+    )
 
 
 def constant(*levels):
@@ -68,11 +72,11 @@ def test_report(made):
     command = "`arc-suite train --robot=tick --task=walk --algorithm=sope --steps=2000 --seed=0 --evaluate_every=10000`"
     assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0", command]
     # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
-    final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610"]
+    final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610", "-"]
     assert cells(page, "tick, walk", "sope", "2,000")[3:] == final
     assert cells(page, "leaper, walk", "sope", "2,000")[5] == "-", "without anchors"
-    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048"]
-    assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "0.00", "-", "-"]
+    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048", "-"]
+    assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "0.00", "-", "-", "-"]
     area = f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}"
     assert cells(page, "tick, walk", "sac", "-", "-") == ["tick, walk", "sac", "-", "-", "-", "-", area]
     assert cells(page, "tick, walk", "sope", "2,000", "3.0")[4:6] == ["2,000", "3.0"]
@@ -171,7 +175,7 @@ def test_one_seed_has_no_interval(tmp_path):
     for each in runs:
         publish(tmp_path / "mine", each, constant(100.0, 200.0))
     page = report.write("mine", Study("one seed each", runs), tmp_path / "mine").read_text()
-    assert cells(page, "tick, walk", "sac", "2,000", "1")[4:] == ["204.5", "-", "-", "2590"]
+    assert cells(page, "tick, walk", "sac", "2,000", "1")[4:] == ["204.5", "-", "-", "2590", "-"]
     assert "Probability" not in page
     assert cells((tmp_path / "README.md").read_text(), "tick, walk", "sac")[4:8] == ["1", "204.5", "-", "-"]
 
@@ -188,7 +192,7 @@ def test_the_leaderboard_holds_each_configuration_once(tmp_path):
         report.write(name, Study(name, runs), tmp_path / name)
     page = (tmp_path / "README.md").read_text()
     rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| tick")]
-    assert sorted((row[1], row[2], row[4], row[14]) for row in rows) == [
+    assert sorted((row[1], row[2], row[4], row[15]) for row in rows) == [
         ("sac", "-", "2", "[b](b/README.md)"),
         ("speq", "75,000", "1", "[b](b/README.md)"),
         ("speq-short", "7,500", "1", "[b](b/README.md)"),
