@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from crossings import walked
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.arenas.pillars import RADIUS
-from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.planner import along, path, seen, toward
 from arc_suite.cpg.presets import DEFAULTS
 from arc_suite.envs.vector import VectorEnv
@@ -92,12 +92,8 @@ def test_commands_turn_to_where_they_lead():
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_robots_reach_goals_and_hit_nothing(robot):
     """At least four goals in 1000 steps, fewer than one collision in twenty."""
-    envs, demonstrator = VectorEnv(robot, "navigate", 8), Demonstrator(robot, "planned")
-    observations, _ = envs.reset(seed=100)
-    for _ in range(999):
-        observations, _, terminated, _, infos = envs.step(demonstrator.act(envs.task.split(observations)))
-        assert not terminated.any()
-    goals, collisions = infos["progress_goals"], infos["progress_collisions"]
-    envs.close()
+    _, fell, infos = zip(*walked(VectorEnv(robot, "navigate", 8), "planned", 999, seed=100), strict=True)
+    assert not np.any(fell)
+    goals, collisions = (infos[-1][f"progress_{name}"] for name in ("goals", "collisions"))
     assert goals.mean() >= 4.0
     assert collisions.sum() < 0.05 * goals.sum()

@@ -101,6 +101,9 @@ def test_names_of_families():
     assert Setup.from_dict(setup.to_dict()) == setup and setup.robot.startswith("{")
 
 
+FAMILIES = "random, varied, few_legs, few_links"
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -112,10 +115,7 @@ def test_names_of_families():
         ("varied:0-99999999", "robot 'varied:0-99999999': expected seeds in ascending order, at most 65536"),
         ("varied:4294967296", "seed: expected an integer from 0 to 4294967295, got 4294967296"),
         ("json:varied:3", "family 'json:varied': varied is the suite's own, expected without a module"),
-        (
-            "json:vared:3",
-            "unknown family 'vared'; did you mean 'varied'? (there are: random, varied, few_legs, few_links)",
-        ),
+        ("json:vared:3", f"unknown family 'vared'; did you mean 'varied'? (there are: {FAMILIES})"),
     ],
 )
 def test_wrong_names_are_one_line(name, message):

@@ -11,7 +11,6 @@ from arc_suite.robots.spec import Motor, Solid
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 BODY = generator.generate(6, 3)
-CHASSIS = BODY.torso.solids[0]
 ALL = tuple(leg.name for leg in BODY.legs)
 WEAK = 0.05  # N m, of a knee's motor
 

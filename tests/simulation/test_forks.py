@@ -25,11 +25,7 @@ import arc_suite
 what, then = sys.argv[1:]
 if what == "vector environment":
     thing = gymnasium.make_vec("arc_suite/tick-walk-v0", num_envs=4, num_threads=4)
-    uses = {
-        "reset": thing.reset,
-        "step": lambda: thing.step(np.zeros((4, 18))),
-        "close": thing.close,
-    }
+    uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros((4, 18))), "close": thing.close}
 else:
     thing = arc_suite.load("tick", "walk")
     uses = {"reset": thing.reset, "step": lambda: thing.step(np.zeros(18)), "render": thing.physics.render}

@@ -17,24 +17,20 @@ from arc_suite.simulation.physics import Physics
 BODY = ROBOTS["tick"]
 
 
-def copied(physics):
-    return physics.copy()
+COPIES = {
+    "copied": Physics.copy,
+    "sharing the model": lambda physics: physics.copy(share_model=True),
+    "deeply": copy.deepcopy,
+    "pickled": lambda physics: pickle.loads(pickle.dumps(physics)),
+}
 
 
-def sharing(physics):
-    return physics.copy(share_model=True)
-
-
-def pickled(physics):
-    return pickle.loads(pickle.dumps(physics))
-
-
-@pytest.mark.parametrize("twin_of", tiers([copied, sharing, copy.deepcopy, pickled], lambda way: way == pickled))
-def test_copies_go_on_in_the_same_arena(twin_of):
+@pytest.mark.parametrize("way", tiers(COPIES, lambda way: way == "pickled"))
+def test_copies_go_on_in_the_same_arena(way):
     physics = Physics.from_body(BODY, fitted(BODY))
     physics.set_control(np.linspace(-1.0, 1.0, physics.model.nu))
     physics.step(100)
-    twin = twin_of(physics)
+    twin = COPIES[way](physics)
     assert (twin.body, twin.arena) == (BODY, fitted(BODY))
     assert_array_equal(twin.data.cfrc_ext, physics.data.cfrc_ext)
     twin.step(25), physics.step(25)

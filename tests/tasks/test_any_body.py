@@ -95,13 +95,6 @@ def test_knees_that_bend_one_way_only_hold_no_hip_up(robot):
     assert speed(body, seconds=20.0 * math.sqrt(body.torso.standing_height / 9.81)) > 0.1  # it was 0
 
 
-@pytest.mark.slow
-def test_bodies_of_one_shape_walk_alike():
-    walks = [(generator.scaled(BODY, scale), 8.0 * math.sqrt(scale)) for scale in (1.0, 2.0, 0.12, 12.5)]
-    speeds = [speed(body, seconds) for body, seconds in walks]  # 5 cm to 5 m high
-    assert speeds == pytest.approx([speeds[0]] * 4, rel=0.02)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("scale", [0.05, 12.5, 50.0])  # 2 cm, 5 m and 20 m high
 def test_bodies_of_one_shape_start_and_walk_alike_with_the_noise_of_the_task(scale):

@@ -23,7 +23,6 @@ from arc_suite.tasks.walk import Walk
 
 BODIES = {**ROBOTS, "random": generator.random_body(3)}
 every_task = pytest.mark.parametrize("task_name", TASKS)
-every_body = pytest.mark.parametrize("body", BODIES)
 # Every task in its own arena, or in one of each kind: a plane, a height field, boxes.
 PLACES = [
     (name, settings)

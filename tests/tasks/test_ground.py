@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import rays
 import twins
+from crossings import walked
 from episodes import opened
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
@@ -144,14 +145,6 @@ def test_difficulty_0_is_level(kind):
     assert not arena.height(x, y).any()
 
 
-def walked(envs, preset, steps):
-    """Yield the rewards and infos of steps of a demonstrator."""
-    policy, observations = Demonstrator(envs, preset), envs.reset(seed=0)[0]
-    for _ in range(steps):
-        observations, rewards, *_, infos = envs.step(policy.act(envs.task.split(observations.astype(float))))
-        yield rewards, infos
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "bastion"))
 def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
@@ -161,7 +154,7 @@ def test_on_level_lanes_demonstrators_earn_what_they_do_on_the_plane(robot):
         envs = VectorEnv(
             ROBOTS[robot], "walk", 6, task_kwargs={"arena": arena, "base_noise": 0.0, "joint_noise": 0.0}
         )  # none is lifted
-        returns.append(sum(rewards.mean() for rewards, _ in walked(envs, "tuned", 300)))
+        returns.append(sum(rewards.mean() for rewards, *_ in walked(envs, "tuned", 300)))
     # Bastion's speed sways more on a height field, which touches a foot in several points: 2.4 % once it walks.
     assert abs(returns[0] / returns[1] - 1.0) < (0.04 if robot == "bastion" else 0.01)
 
@@ -333,7 +326,7 @@ def test_ground_has_no_scale():
     for scale in (0.075, 1.0, 10.0):
         body = generator.scaled(generator.generate(6, 3), scale)
         envs = VectorEnv(body, "rough", 6, task_kwargs={"terrain_seed": 3})
-        *_, (_, infos) = walked(envs, "surefooted", 250)
+        *_, (*_, infos) = walked(envs, "surefooted", 250)
         distances.append(infos["progress_distance"].mean())
     assert np.ptp(distances) < 0.02 and min(distances) > 0.8
 

@@ -6,6 +6,7 @@ import types
 import gymnasium
 import numpy as np
 import pytest
+from crossings import walked
 from episodes import begun, opened
 from numpy.testing import assert_allclose, assert_array_equal
 from refusals import refused
@@ -222,21 +223,12 @@ def test_a_wrong_command_is_one_line_and_changes_nothing(task, name, value, mess
 
 @pytest.mark.long
 def test_an_obedient_body_earns_what_a_standing_or_a_deaf_one_does_not():
-    earned = {}
-    for preset in ("steered", "tuned", None):
-        envs = VectorEnv("tick", "steer", 6)
-        policy = Demonstrator("tick", preset) if preset else None
-        observations, _ = envs.reset(seed=0)
-        total = 0.0
-        for _ in range(300):
-            blocks = envs.task.split(observations)
-            actions = policy.act(blocks) if policy else np.zeros(envs.action_space.shape)
-            observations, rewards, *_ = envs.step(actions)
-            total += rewards.sum()
-        earned[preset] = total
-        envs.close()
-    assert earned[None] < 0.55 * earned["steered"]
-    assert earned["tuned"] < 0.45 * earned["steered"]
+    obedient, deaf, standing = (
+        sum(rewards.sum() for rewards, *_ in walked(VectorEnv("tick", "steer", 6), preset, 300))
+        for preset in ("steered", "tuned", None)
+    )
+    assert standing < 0.55 * obedient
+    assert deaf < 0.45 * obedient
 
 
 def test_at_a_stop_all_feet_are_to_stand_and_the_clock_rests():
