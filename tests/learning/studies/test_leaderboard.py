@@ -12,8 +12,7 @@ from arc_suite.learning.studies import leaderboard
 def entry(tmp_path_factory):
     """A file that `arc-suite evaluate --json` wrote: episodes of some thirty steps."""
     path = tmp_path_factory.mktemp("entry") / "entry.json"
-    done = programs.arc_suite("evaluate", "--robot=tick", "--policy=random", f"--json={path}")
-    assert done.returncode == 0, done.stderr
+    programs.passed(programs.arc_suite("evaluate", "--robot=tick", "--policy=random", f"--json={path}"))
     return path
 
 
@@ -23,10 +22,9 @@ def enter(folder, entry, *arguments):
 
 def test_an_entry_is_played_again_and_added(entry, tmp_path):
     for name in ("noise", "noise", "more"):  # the second replaces the first
-        done = enter(tmp_path, entry, f"--name={name}")
-        assert (done.returncode, done.stderr) == (0, "")
+        out = programs.passed(enter(tmp_path, entry, f"--name={name}"))
     mean = json.loads(entry.read_text())["robots"]["tick"]["return"]["mean"]
-    assert done.stdout == f"tick, walk: more, return {mean:.1f}, all episodes equal\nwrote studies/README.md\n"
+    assert out == f"tick, walk: more, return {mean:.1f}, all episodes equal\nwrote studies/README.md\n"
     rows = [line for line in (tmp_path / "studies" / "README.md").read_text().splitlines() if line.startswith("| tick")]
     assert [row.split(" | ")[1] for row in rows] == ["noise", "more"]
     assert f" | {mean:.1f} | " in rows[0] and "[entry](entries/tick-walk-noise.json)" in rows[0]
@@ -38,7 +36,7 @@ def test_rows_of_studies_stay(entry, tmp_path):
     cells |= {"robot, task": "tick, walk", "algorithm": "own", "seeds": "1", "return": "99.0"}
     for study in ("mine", "others", "mine"):  # the third replaces the first
         leaderboard.write(tmp_path / "studies", study, [cells | {"study": study, "configuration": study}])
-    assert enter(tmp_path, entry, "--name=noise").returncode == 0
+    programs.passed(enter(tmp_path, entry, "--name=noise"))
     page = (tmp_path / "studies" / "README.md").read_text()
     assert page.count("| tick, walk | own | ") == 2 and "| [mine](mine/README.md) |" in page
     assert page.index("| tick, walk | own | ") < page.index("| tick, walk | noise | ")  # the higher return first

@@ -5,9 +5,8 @@ import json
 import pathlib
 import re
 import shutil
-import subprocess
-import sys
 
+import interpreters
 import numpy as np
 import pytest
 
@@ -100,10 +99,8 @@ def test_claims(made):
             assert re.findall(r"\w+ [+-]", paper) == re.findall(r"\w+ [+-]", ours)
         else:
             assert (paper, there) == ("-", "not measured")
-    assert [held[claim.text][3] for claim in claims.CLAIMS] == [
-        *("4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "4 of 4 robots", "3 of 4 robots"),
-        *("0 of 4 robots", "0 of 4 robots", "4 of 4 robots"),
-    ]
+    counts = [held[claim.text][3] for claim in claims.CLAIMS]
+    assert counts == [f"{count} of 4 robots" for count in (4, 4, 4, 4, 3, 0, 0, 4)]
     assert "queen -300" in held["with prior data all end higher than without"][0]
     least = min(published.FINALS["queen"][name] for name in claims.ONLINE) - published.DEMONSTRATORS["queen"]
     assert f"queen +{least:.0f}" in held["all online algorithms surpass the demonstrator"][0]
@@ -141,11 +138,8 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
     (tmp_path / "evaluations.csv").write_text("\n".join(["step,seed,return", *lines]) + "\n")
     (tmp_path / "times.csv").write_text("step,cpu_seconds\n1000,1.0\n1500,2.0\n2000,3.0\n3000,4.0\n")
     found = publication._evaluated(tmp_path)
-    assert [(row["step"], row["seed"], row["cpu_seconds"]) for row in found[9:11]] == [
-        ("1000", "9", "1.0"),
-        ("2000", "0", "3.0"),
-    ]
-    assert len(found) == 20
+    rows = [(row["step"], row["seed"], row["cpu_seconds"]) for row in found]
+    assert len(rows) == 20 and rows[9:11] == [("1000", "9", "1.0"), ("2000", "0", "3.0")]
 
 
 def test_damaged_tables_are_one_line(tmp_path):
@@ -214,8 +208,6 @@ def test_nothing_published_is_one_line(tmp_path):
 
 
 COMMITTED = pathlib.Path(__file__).parents[3] / "studies"
-
-
 NAMES = sorted(path.parent.name for path in COMMITTED.glob(f"*/{results.RUNS}"))
 
 
@@ -235,7 +227,7 @@ REPEATED = """
 import json, shlex, sys
 from absl.testing import flagsaver
 from arc_suite.learning.cli import train
-for command in json.load(sys.stdin):
+for command in json.loads(sys.argv[1]):
     with flagsaver.flagsaver():
         train.FLAGS(shlex.split(command)[1:])
         print(json.dumps(train.configured().to_dict()))
@@ -247,9 +239,7 @@ def test_commands_repeat_runs():
     studies = [*tables.STUDIES.values(), tables.study("top-ppo"), tables.study("demonstrations-sope")]
     runs = [each.configuration for study in studies for each in study.runs]
     commands = json.dumps([each.command for each in runs])
-    done = subprocess.run([sys.executable, "-c", REPEATED], input=commands, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    for each, line in zip(runs, done.stdout.splitlines(), strict=True):
+    for each, line in zip(runs, interpreters.printed(REPEATED, commands), strict=True):
         assert json.loads(line) == json.loads(json.dumps(each.to_dict())), each.command
 
 
@@ -273,8 +263,7 @@ def test_the_papers_table_has_every_robot_and_algorithm():
 
 def test_the_papers_returns_as_a_table():
     """The file for users' plots holds the suite's own numbers."""
-    with (pathlib.Path(__file__).parents[3] / "studies" / "paper.csv").open(newline="") as file:
+    with (COMMITTED / "paper.csv").open(newline="") as file:
         rows = {(row["robot"], row["algorithm"]): float(row["return"]) for row in csv.DictReader(file)}
     finals = {(robot, name): value for robot, values in published.FINALS.items() for name, value in values.items()}
     assert rows == finals | {(robot, "demonstrator"): value for robot, value in published.DEMONSTRATORS.items()}
-    assert len(finals) == 24
