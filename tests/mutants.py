@@ -100,7 +100,7 @@ MUTANTS = {
     "the same noise in every step": "key« ^ (step * _GOLDEN)→»",
     "positions held without damping": "- «damping→0.0» * changes.speeds",
     "the reward sees what weak motors give": "self.task.before(memory.task, «→own.strength * »action)",
-    "a changed model stays so": "if «self._unchanged→False»:",
+    "a changed model stays so": "«self._change(self._unchanged)→pass»\n        super().reset(keyframe_id)",
     "the last substep of batches on the compiled model": "set_models(«self._own→None»)\n"
     "            simulations.step(mask)",
     # Environments.
@@ -108,7 +108,7 @@ MUTANTS = {
     "NaN let through": "invalid = np.«isnan(array→zeros(array.shape, bool»)",
     "ignored seed": "RandomState(«None if random is None else checks.seed(random)→»)",
     "fall reported as a time limit": "return «0.0→1.0» if terminated else",
-    "a new stream carries on the old one": "value, self.definition.first(), «True→False»",
+    "a new stream carries on the old one": "self._random, self._stream_begins = value, «True→False»",
     "a new stream of an environment carries on the old one": "self._streams_begin[index] = seeds[index], «True→False»",
     "environments share a seed": "checks.seed(first« + index→») for",
     "observations of a batch handed out live": "self._observation = observation«.copy()→»",

@@ -14,6 +14,24 @@ from arc_suite.tasks.parameters import LARGEST
 _NOT_REAL = "cOSUMmT"  # kinds of arrays that NumPy would make floats of: complex, objects, text, dates
 
 
+class KnownAttributes:
+    """An object whose public attributes are those that it was made with: others would be accepted, and do nothing.
+
+    It sets `_made` once it is complete. Classes of other packages that inherit may add attributes of their own.
+    """
+
+    def __setattr__(self, name: str, value: Any):
+        if name[0] != "_" and "_made" in self.__dict__:
+            self._check_known(name)
+        super().__setattr__(name, value)
+
+    def _check_known(self, name: str) -> None:
+        if name not in self.__dict__ and not hasattr(type(self), name) and type(self).__module__ == self._made:
+            raise AttributeError(
+                f"cannot set {name!r}: there is no such attribute; change_settings of the environment changes settings"
+            )
+
+
 class Lock(type(threading.RLock())):  # type: ignore[misc]  # the class has no name
     """The lock of one environment, as MuJoCo crashes where two threads step one simulation.
 
@@ -52,9 +70,8 @@ class LiveCommands:
     Pickles and copies hold the same values.
     """
 
-    def __init__(self, task: Task):
+    def __init__(self):
         """Start without any."""
-        self._task = task
         self._lock, self._latest = Lock(), {}  # the latter is replaced, never changed
 
     def put(self, name: str, value: np.ndarray, mask: np.ndarray | None = None) -> None:
@@ -65,21 +82,22 @@ class LiveCommands:
                 value, mask = np.where(mask[:, None], value, before), mask | others
             self._latest = {**self._latest, name: (value, mask)}
 
-    def seen(self, memory) -> Any:
-        """Return the memory of an episode as the next step will find it."""
-        return self._commanded(memory, self._latest)
+    def seen(self, task: Task, memory) -> Any:
+        """Return the memory of an episode of a task as the next step will find it."""
+        return _commanded(task, memory, self._latest)
 
-    def taken(self, memory) -> Any:
-        """Return the memory of an episode after the commands, which are gone then."""
+    def taken(self, task: Task, memory) -> Any:
+        """Return the memory of an episode of a task after the commands, which are gone then."""
         with self._lock:
             latest, self._latest = self._latest, {}
-        return self._commanded(memory, latest)
+        return _commanded(task, memory, latest)
 
-    def _commanded(self, memory, latest) -> Any:
-        for name, (value, mask) in latest.items():
-            changed = self._task.with_command(memory, name, value)
-            memory = changed if mask is None else trees.chosen(mask, changed, memory)
-        return memory
+
+def _commanded(task: Task, memory, latest) -> Any:
+    for name, (value, mask) in latest.items():
+        changed = task.with_command(memory, name, value)
+        memory = changed if mask is None else trees.chosen(mask, changed, memory)
+    return memory
 
 
 def checked_action(action, shape: tuple[int, ...]) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Tasks as dm_env environments: dm_control's `Environment` around any task of the contract."""
 
 import collections
+import functools
 import math
 import os
 from collections.abc import Mapping
@@ -13,13 +14,23 @@ from dm_control.rl import control
 from dm_env import specs
 
 from arc_suite import checks
-from arc_suite.envs.calls import LiveCommands, Lock, checked_action, checked_command, one_thread_at_a_time
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs import snapshots, trees
+from arc_suite.envs.calls import (
+    KnownAttributes,
+    LiveCommands,
+    Lock,
+    checked_action,
+    checked_command,
+    one_thread_at_a_time,
+)
+from arc_suite.envs.prepare import checked_changes, prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
+from arc_suite.simulation.model import checked_fields
 from arc_suite.simulation.physics import Physics
 from arc_suite.tasks import Task, terms
+from arc_suite.tasks.contract import CURRICULUM
 
 _FLAT = "observations"  # dm_control's name of a flat observation
 
@@ -74,7 +85,7 @@ def load(
     return Environment(Physics.from_body(task.scene.body, task.scene.arena), run, settings)
 
 
-class Environment(control.Environment):
+class Environment(KnownAttributes, control.Environment):
     """A task in a simulation; steps, resets and specs are those of dm_control.
 
     While one thread is in a step or reset, another's is refused with a RuntimeError. Any thread may set commands.
@@ -97,8 +108,75 @@ class Environment(control.Environment):
             n_sub_steps=SUBSTEPS,
             legacy_step=False,  # which would move the contact forces and foot heights one substep on
         )
+        self._made = __name__
 
     step = one_thread_at_a_time(control.Environment.step)
+
+    @one_thread_at_a_time
+    def change_model(self, fields: Mapping[str, Any]) -> None:
+        """Set fields of the model from the next step on; they stay over resets.
+
+        What the task would draw of a changed field, as modifiers draw friction and mass, gives way to it.
+
+        Args:
+            fields: values by name of `simulation.model.FIELDS`, the fields of `MjModel` and `gravity`; what broadcasts
+                to the field's shape.
+
+        Raises:
+            ValueError: no such field, one without effect, or a value that does not fit.
+        """
+        self.physics.change_model(checked_fields(self.physics.model.ptr, fields), lasting=True)
+
+    @one_thread_at_a_time
+    def change_settings(self, settings: Mapping[str, Any]) -> None:
+        """Set settings of the task from the next reset on.
+
+        They replace values of `task_kwargs` and of earlier calls. What changes the arena, the observation, or whether
+        there are kicks and other modifiers is refused. `level` begins the curriculum again at that level.
+
+        Args:
+            settings: some of `task_kwargs`.
+
+        Raises:
+            ValueError: an unknown name, or a setting that cannot be changed.
+        """
+        run = self.task
+        changes, task = checked_changes(run.opened, self.task_kwargs, run.next_changes, settings)
+        run.put_changes(changes, task, restart=CURRICULUM[1] in settings)
+
+    @one_thread_at_a_time
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return the state as arrays by name, from which `restore` goes on, or a `VectorEnv` of one environment.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        if self.task.memory is None:
+            raise RuntimeError("cannot take a snapshot: no episode has begun; call reset first")
+        return snapshots.arrays(self._state())
+
+    @one_thread_at_a_time
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on, bit-exact, from the snapshot of an environment of the same task.
+
+        Raises:
+            ValueError: an array is missing or does not fit; none has been used.
+        """
+        run = self.task
+        if run.memory is None:
+            super().reset()
+        like = self._state()
+        check = functools.partial(self.physics.checked, fields=run.definition.reads)
+        state, tasks = snapshots.checked(like, run.definition, check, arrays, [run.opened], self.task_kwargs)
+        self.physics.restore(state.simulations)
+        run.restore(state, *(each for (each,) in tasks))
+        own = {name: array[0] for name, array in state.own.items()}
+        self._step_count, self._reset_next_step = int(own["steps"]), bool(own["ended"])
+
+    def _state(self) -> snapshots.State:
+        """The state, with a leading axis as that of a `VectorEnv` of one environment."""
+        simulations = self.physics.snapshot(self.task.definition.reads)
+        return self.task.state(simulations, self.physics, self._step_count, self._reset_next_step)
 
     @one_thread_at_a_time
     def reset(self, seed: int | None = None) -> dm_env.TimeStep:
@@ -135,11 +213,13 @@ class Environment(control.Environment):
         return self.task.observation_spec(self.physics)
 
 
-class TaskRun(TaskView, control.Task):
+class TaskRun(TaskView, KnownAttributes, control.Task):
     """A task in one simulation, episode after episode, as dm_control's `Task`: it keeps the memory.
 
     Attributes:
-        definition: the task, a value of the contract.
+        definition: the task of the present episode, a value of the contract.
+        opened: the task before `Environment.change_settings`.
+        next_changes: JSON of the settings that differ in the next episode.
         memory: of the present episode, as the next step will find it; None before the first.
         terms: the unweighted terms of the latest reward by name; empty before the first step.
         visualize_reward: whether rendered pictures show the reward as a colour.
@@ -160,9 +240,10 @@ class TaskRun(TaskView, control.Task):
         """
         if not isinstance(random, np.random.RandomState):
             random = np.random.RandomState(None if random is None else checks.seed(random))
-        self.definition = task
-        self._memory = None
-        self._commands = LiveCommands(task)
+        self.definition = self.opened = self._next = task
+        self._changes = self.next_changes = "{}"
+        self._memory, self._stream = None, None
+        self._commands = LiveCommands()
         self.terms = {}
         self.visualize_reward = False
         self.random = random
@@ -171,6 +252,7 @@ class TaskRun(TaskView, control.Task):
         self._readings = None
         self._starting = False  # between a reset and its observation
         self._motors = (len(task.scene.body.joint_names),)
+        self._made = __name__
 
     @property
     def random(self) -> np.random.RandomState:
@@ -179,12 +261,12 @@ class TaskRun(TaskView, control.Task):
 
     @random.setter
     def random(self, value: np.random.RandomState):
-        self._random, self._stream, self._stream_begins = value, self.definition.first(), True
+        self._random, self._stream_begins = value, True
 
     @property
     def memory(self) -> Any:
         """The memory of the present episode."""
-        return self._commands.seen(self._memory)
+        return self._commands.seen(self.definition, self._memory)
 
     @memory.setter
     def memory(self, value: Any):
@@ -217,10 +299,10 @@ class TaskRun(TaskView, control.Task):
 
     def initialize_episode(self, physics):
         """Draw how the episode starts, and write it."""
-        self._memory = self._commands.taken(self._memory)
-        if self._memory is not None and not self._stream_begins:
-            self._stream = self.definition.stream_state(self._memory)
+        self._take_commands()
+        self._stream = self._next.first() if self._stream_begins else self.definition.stream_state(self._memory)
         self._stream_begins = False
+        self.definition, self._changes = self._next, self.next_changes
         start = self.definition.start(self._random, self._stream)
         if start.model:
             physics.change_model(start.model)
@@ -238,7 +320,7 @@ class TaskRun(TaskView, control.Task):
             ValueError: the action has another shape or holds NaN; nothing has changed then.
         """
         action = checked_action(action, self._motors)
-        self._memory, inputs = self.definition.before(self._commands.taken(self._memory), action)
+        self._memory, inputs = self.definition.before(self._commands.taken(self.definition, self._memory), action)
         data = physics.data.ptr
         physics.marker, physics.failed_legs = self.markers, self.failed_legs  # which a copy of the simulation has not
         data.ctrl[:] = inputs.ctrl
@@ -288,6 +370,41 @@ class TaskRun(TaskView, control.Task):
     def failed_legs(self) -> tuple[str, ...]:
         """Return the names of the legs whose motors have failed."""
         return self.definition.failed_legs(self._memory)
+
+    def put_changes(self, changes: str, task: Task, restart: bool) -> None:
+        """Let a task with changed settings, and JSON of these, hold from the next episode on.
+
+        With `restart` that episode starts as the first of a stream.
+        """
+        self.next_changes, self._next = changes, task
+        self._stream_begins |= restart
+
+    def state(self, simulations: Mapping[str, np.ndarray], physics, steps: int, ended: bool) -> snapshots.State:
+        """Return the state of an environment, with a leading axis, given that of its simulation."""
+        self._take_commands()
+        task = self.definition
+        observation = task.vector(task.observe(self._memory, task.read(physics.data.ptr)), np.float32)
+        own = (-1, self._stream_begins, steps, ended, False, observation)
+        return snapshots.State(
+            simulations=simulations,
+            memory=trees.mapped(lambda leaf: np.asarray(leaf)[None], self._memory),
+            streams=[self._stream],
+            randoms=[self._random.get_state()],
+            own={name: np.asarray(value)[None] for name, value in zip(snapshots.OWN, own, strict=True)},
+            settings=([self._changes], [self.next_changes]),
+        )
+
+    def restore(self, state: snapshots.State, task: Task, next_task: Task) -> None:
+        """Go on from a state, given the task of its episode and that of the next."""
+        self._memory = trees.mapped(lambda leaf, like: snapshots.number(leaf[0], like), state.memory, self._memory)
+        (self._stream,), (self._changes,), (self.next_changes,) = state.streams, *state.settings
+        self.definition, self._next, self._readings, self._starting = task, next_task, None, False
+        self._random.set_state(state.randoms[0])
+        self._stream_begins = bool(state.own["streams_begin"][0])
+
+    def _take_commands(self) -> None:
+        if self._memory is not None:
+            self._memory = self._commands.taken(self.definition, self._memory)
 
     def _latest(self, physics):
         """The readings of the latest step."""

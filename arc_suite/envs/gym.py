@@ -1,5 +1,7 @@
 """The suite as Gymnasium environments: shimmy's adapter, with what Gymnasium's users rely on."""
 
+import sys
+import types
 import weakref
 from collections.abc import Mapping
 from typing import Any
@@ -11,8 +13,9 @@ from shimmy.dm_control_compatibility import DmControlCompatibilityV0
 from shimmy.utils.dm_env import dm_env_step2gym_step
 
 from arc_suite import checks
-from arc_suite.envs.calls import one_thread_at_a_time
+from arc_suite.envs.calls import KnownAttributes, one_thread_at_a_time
 from arc_suite.envs.dm import load
+from arc_suite.envs.prepare import checked_limit
 from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.window import Window
 from arc_suite.simulation import opengl, pictures
@@ -20,7 +23,7 @@ from arc_suite.simulation import opengl, pictures
 _HEADLESS_MODES = ("rgb_array", "depth_array")
 
 
-class Env(DmControlCompatibilityV0):
+class Env(KnownAttributes, DmControlCompatibilityV0):
     """One task of the suite, made by `gymnasium.make("arc_suite/<robot>-<task>-v0", ...)`.
 
     Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
@@ -76,6 +79,8 @@ class Env(DmControlCompatibilityV0):
             checks.name(render_mode, modes, "render_mode")
         pictures.check_size(height, width)
         environment = load(domain_name, task_name, task_kwargs, {"flat_observation": True}, visualize_reward)
+        if (limit := _limit_of_make(sys._getframe(1))) is not None:
+            checked_limit(limit, environment.task.definition)
         pictures.check_camera(environment.physics.model.ptr, camera_id)
         self.metadata = {"render_modes": modes}  # before shimmy writes a rate into the class's
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
@@ -91,6 +96,17 @@ class Env(DmControlCompatibilityV0):
         random = (task_kwargs or {}).get("random")
         if random is not None and not isinstance(random, np.random.RandomState):
             self._np_random_seed = checks.seed(random)
+        self._made = __name__
+
+    def set_wrapper_attr(self, name: str, value: Any, **options) -> bool:
+        """Set an attribute that there is, as vector environments of Gymnasium do.
+
+        Raises:
+            AttributeError: there is no such attribute.
+        """
+        self._check_known(name)
+        setattr(self, name, value)
+        return True
 
     @property
     def task(self) -> TaskView:
@@ -112,17 +128,19 @@ class Env(DmControlCompatibilityV0):
 
         Args:
             seed: None to continue the stream of random numbers, or an integer to start a new one.
-            options: there are none; ignored.
+            options: there are none; an empty mapping or None.
 
         Returns:
             The observation and an empty info.
 
         Raises:
-            ValueError: not a seed.
+            ValueError: not a seed, or an option.
             RuntimeError: another thread is at work in the environment.
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
+        for name in checks.mapping("options", options):
+            raise ValueError(f"unknown option of reset {name!r}: one environment has none; vector ones have reset_mask")
         observation = self._env.reset(seed).observation
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
         self._stepping = True
@@ -165,6 +183,41 @@ class Env(DmControlCompatibilityV0):
         """
         self._check_open("command")
         self._env.command(name, value)
+
+    def change_model(self, fields: Mapping[str, Any]) -> None:
+        """Set fields of the model from the next step on; see `arc_suite.envs.dm.Environment.change_model`."""
+        self._check_open("change the model")
+        self._env.change_model(fields)
+
+    def change_settings(self, settings: Mapping[str, Any]) -> None:
+        """Set settings from the next reset on; see `arc_suite.envs.dm.Environment.change_settings`."""
+        self._check_open("change settings")
+        self._env.change_settings(settings)
+
+    def snapshot(self) -> dict[str, np.ndarray]:
+        """Return the state as arrays by name, from which `restore` goes on.
+
+        Wrappers around this environment, such as `TimeLimit`, keep a state of their own.
+
+        Raises:
+            ResetNeeded: before the first reset.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("take a snapshot")
+        if self._env.task.memory is None:
+            raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
+        return self._env.snapshot() | {"stream_seeds": np.array([self._np_random_seed])}
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on, bit-exact, from the snapshot of an environment of the same task.
+
+        Raises:
+            ValueError: an array is missing or does not fit; none has been used.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("restore")
+        self._env.restore(arrays)
+        self._np_random_seed, self._stepping = int(arrays["stream_seeds"][0]), not arrays["ended"][0]
 
     def render(self):
         """Return a picture of the present state in the mode and size chosen at the start.
@@ -211,6 +264,15 @@ class Env(DmControlCompatibilityV0):
 
     def __setstate__(self, state):
         self.__dict__.update(state)
+
+
+def _limit_of_make(caller: types.FrameType) -> int | None:
+    """The step limit that `gymnasium.make` was asked for, which it tells a wrapper and not the environment."""
+    if caller.f_code is not gymnasium.make.__code__:
+        return None
+    limit, spec = caller.f_locals.get("max_episode_steps"), caller.f_locals.get("env_spec")
+    limit = getattr(spec, "max_episode_steps", None) if limit is None else limit
+    return None if limit == -1 else limit  # Gymnasium's word for no limit of its own
 
 
 def _floats(kind: str, figures: Mapping[str, Any]) -> dict[str, float]:

@@ -1,5 +1,6 @@
 """Prepares tasks: a body, an arena and their compiled model, for any driver."""
 
+import json
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -48,6 +49,74 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     )
     task = kind(scene, settings, _step_limit(time_limit, step))
     return modified_task.modified(task, changes) if changes else task, model
+
+
+# What an environment keeps from its opening on, and what to do instead.
+_KEPT = {
+    "arena": "open another environment",
+    "time_limit": "open another environment",
+    "random": "reset(seed=...) begins a stream",
+    "on_divergence": "open another environment",
+}
+
+_KEPT_OF_TASKS = {
+    "motors, senses or kicks": lambda task: (type(task), task.structure),
+    "ground": lambda task: task.scene.arena,
+    "observation": lambda task: task.sizes,
+}
+
+
+def checked_changes(task: Task, settings: Mapping[str, Any], before: str, changes: Any) -> tuple[str, Task]:
+    """Return changed settings as JSON, and the task with them, for the simulation of a task.
+
+    Args:
+        task: as the environment was opened.
+        settings: with which it was.
+        before: JSON of the settings that have been changed already.
+        changes: further settings by name.
+
+    Raises:
+        ValueError: an unknown name, a value that does not fit, or a setting that changes more than numbers of the task.
+    """
+    text = checks.json_text("settings", {**json.loads(before), **checks.mapping("settings", changes)})
+    return text, with_changes(task, settings, text)
+
+
+def with_changes(task: Task, settings: Mapping[str, Any], text: str) -> Task:
+    """Return a task with changed settings, JSON of `checked_changes`.
+
+    Raises:
+        ValueError: as `checked_changes`.
+    """
+    changes = checks.mapping("settings", json.loads(text))
+    for name in changes.keys() & _KEPT.keys():
+        raise ValueError(f"setting {name!r}: environments keep it; {_KEPT[name]}")
+    if not changes:
+        return task
+    changed, _ = prepared(task.scene.body, task.name, {**settings, **changes})
+    for what, kept in _KEPT_OF_TASKS.items():
+        if kept(task) != kept(changed):
+            raise ValueError(
+                f"settings {', '.join(map(repr, changes))}: they would change the {what}, which environments keep; "
+                "open another environment with them"
+            )
+    return changed
+
+
+def checked_limit(max_episode_steps: Any, task: Task) -> int:
+    """Return the step at which Gymnasium truncates episodes, if the task goes on until then.
+
+    Raises:
+        ValueError: no integer from 1, or more steps than an episode has and than every id has by default.
+    """
+    limit = checks.integer("max_episode_steps", max_episode_steps, 1)
+    if limit > max(STEPS, task.step_limit):
+        seconds = limit * task.scene.control_timestep
+        raise ValueError(
+            f"max_episode_steps: episodes of this task end after {task.step_limit} steps, got {limit}; "
+            f"longer ones need task_kwargs={{'time_limit': {seconds:g}}}, too"
+        )
+    return limit
 
 
 def symmetry(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None = None) -> Symmetry:

@@ -9,8 +9,11 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from stable_baselines3.common import vec_env
 
+from arc_suite import checks
 from arc_suite.envs.setup import ATTRIBUTE, Setup
 from arc_suite.envs.vector import VectorEnv
+
+_MASKED = ("change_model", "change_settings", "command")  # methods that take a mask
 
 
 class VecEnv(vec_env.VecEnv):
@@ -47,7 +50,13 @@ class VecEnv(vec_env.VecEnv):
         super().__init__(environments.num_envs, observations, environments.single_action_space)
 
     def reset(self) -> np.ndarray:
-        """Start an episode in every environment, from the seeds of the latest `seed` if that was not used yet."""
+        """Start an episode in every environment, from the seeds of the latest `seed` if that was not used yet.
+
+        Raises:
+            ValueError: options were set; there are none.
+        """
+        if any(self._options):
+            raise ValueError(f"options of reset: expected none, got {checks.quoted(self._options)}")
         observations, _ = self.environments.reset(seed=self._seeds)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._reset_seeds()
@@ -99,11 +108,15 @@ class VecEnv(vec_env.VecEnv):
         self.environments.set_attr(attr_name, value)
 
     def env_method(self, method_name: str, *method_args, indices=None, **method_kwargs) -> list:
-        """Call a method of all environments; see `VectorEnv.call`.
+        """Call a method of all environments, see `VectorEnv.call`, or one with a mask of some.
 
         Raises:
-            ValueError: of some environments alone.
+            ValueError: of some environments alone, where the method has no mask.
         """
+        if indices is not None and method_name in _MASKED:
+            mask = np.zeros(self.num_envs, bool)
+            mask[list(self._get_indices(indices))] = True
+            return [self.environments.call(method_name, *method_args, mask=mask, **method_kwargs)[0]] * int(mask.sum())
         self._check_all(method_name, indices)
         return list(self.environments.call(method_name, *method_args, **method_kwargs))
 

@@ -51,6 +51,7 @@ class Together(gymnasium.vector.VectorEnv):
 
         Raises:
             ValueError: another number of values, or different ones.
+            AttributeError: there is no such attribute.
         """
         values = list(values) if isinstance(values, list | tuple) else [values]
         if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
@@ -69,6 +70,12 @@ class Together(gymnasium.vector.VectorEnv):
             return [None if each is None else checks.seed(each) for each in seed]
         first = checks.seed(seed)
         return [checks.seed(first + index) for index in range(self.num_envs)]
+
+    def _reset_mask(self, options) -> np.ndarray:
+        """The checked mask of `reset`'s options."""
+        for name in checks.mapping("options", options):
+            checks.name(name, ["reset_mask"], "option of reset")
+        return self._mask((options or {}).get("reset_mask"))
 
     def _mask(self, mask, name: str = "reset_mask") -> np.ndarray:
         """A checked mask; all environments for None."""

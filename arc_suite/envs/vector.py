@@ -12,27 +12,36 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks
-from arc_suite.envs import snapshots, trees
-from arc_suite.envs.calls import LiveCommands, Lock, checked_action, checked_command, one_thread_at_a_time
-from arc_suite.envs.prepare import prepared
+from arc_suite.envs import snapshots, stacked, trees
+from arc_suite.envs.calls import (
+    KnownAttributes,
+    LiveCommands,
+    Lock,
+    checked_action,
+    checked_command,
+    one_thread_at_a_time,
+)
+from arc_suite.envs.prepare import checked_changes, checked_limit, prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.together import Together
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
+from arc_suite.simulation.model import checked_fields
 from arc_suite.tasks import Task, terms
+from arc_suite.tasks.contract import CURRICULUM
 
 _MOST_ENVS, _MOST_THREADS = 1 << 20, 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
 
 
-class VectorTask(TaskView):
+class VectorTask(TaskView, KnownAttributes):
     """The task of a vector environment; terms and metrics are (num_envs,)."""
 
     def __init__(self, environment: "VectorEnv"):
         """View a vector environment that has prepared its task."""
-        self._environment = environment
+        self._environment, self._made = environment, __name__
 
     @property
     def definition(self) -> Task:
@@ -56,7 +65,7 @@ class VectorTask(TaskView):
         return self.definition.progress(self._environment._memory)
 
 
-class VectorEnv(Together):
+class VectorEnv(KnownAttributes, Together):
     """Environments of one task, made by `gymnasium.make_vec("arc_suite/<robot>-<task>-v0", num_envs=n, ...)`.
 
     An environment seeded s is bit-equal to `arc_suite.envs.gym.Env` seeded s, from step to step and from episode
@@ -130,20 +139,23 @@ class VectorEnv(Together):
         threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
 
         self.arguments = domain_name, task_name, task_kwargs
-        self._task, self._tasks, model = self._prepared()
+        self._tasks, model = self._prepared()
+        self._task = _one(self._tasks)
         pictures.check_camera(model if isinstance(model, mujoco.MjModel) else model[0], camera_id)
         self.step_limit = self._task.step_limit
         if max_episode_steps is not None:
-            limit = checks.integer("max_episode_steps", max_episode_steps, 1)
+            limit = checked_limit(max_episode_steps, self._tasks[0])
             self.step_limit = np.minimum(self.step_limit, limit)[()]
 
         self.batch = Batch(model, self.num_envs, threads, self._task.reads)
         self.task = VectorTask(self)
         self._terms = {}  # of the latest step
         self._memory = None  # of all environments, with a leading axis
-        self._commands = LiveCommands(self._task)
+        self._commands = LiveCommands()
+        self._opened, self._next = list(self._tasks), list(self._tasks)  # tasks as opened, and of the next episodes
+        self._changes, self._next_changes = (np.full(self.num_envs, "{}", object) for _ in range(2))  # JSON of settings
         self._randoms = [np.random.RandomState() for _ in range(self.num_envs)]
-        self._streams = [task.first() for task in self._tasks]
+        self._streams = [task.first() for task in self._tasks]  # states, as the present episodes began
         self._stream_seeds = np.full(self.num_envs, -1)  # Gymnasium's sign for a stream of unknown seed
         self._streams_begin = np.ones(self.num_envs, bool)  # environments whose next episode is the first of its stream
         if seed is not None:
@@ -169,6 +181,7 @@ class VectorEnv(Together):
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.batch.data.ctrl.shape[1],), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._made = __name__
 
     @one_thread_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
@@ -188,7 +201,7 @@ class VectorEnv(Together):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("reset")
-        mask = self._mask(checks.mapping("options", options).get("reset_mask"))
+        mask = self._reset_mask(options)
         if self._memory is None and not mask.all():
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         if seed is not None:
@@ -289,6 +302,62 @@ class VectorEnv(Together):
         self._commands.put(name, value, mask)
 
     @one_thread_at_a_time
+    def change_model(self, fields: Mapping[str, Any], mask=None) -> None:
+        """Set fields of the models of some environments from the next step on; they stay over resets.
+
+        What a task would draw of a changed field, as modifiers draw friction and mass, gives way to it.
+
+        Args:
+            fields: values by name of `simulation.model.FIELDS`, the fields of `MjModel` and `gravity`: what broadcasts
+                to the field's shape, or (num_envs, *shape).
+            mask: (num_envs,) booleans, the environments that it goes to; None for all.
+
+        Raises:
+            ValueError: no such field, one without effect, or a value or mask that does not fit.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("change the model")
+        mask, fields = self._mask(mask, "mask"), self._checked_fields(fields)
+        self.batch.change_model(fields, mask)
+
+    def _checked_fields(self, fields: Any) -> dict[str, np.ndarray]:
+        return checked_fields(self.batch.models[0], fields, self.num_envs)
+
+    @one_thread_at_a_time
+    def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:
+        """Set settings of the task of some environments, from their next reset on.
+
+        They replace values of `task_kwargs` and of earlier calls. What changes the arena, the observation, or whether
+        there are kicks and other modifiers is refused. `level` begins the curriculum again at that level.
+
+        Args:
+            settings: some of `task_kwargs`.
+            mask: (num_envs,) booleans, the environments that it goes to; None for all.
+
+        Raises:
+            ValueError: an unknown name, a setting that cannot be changed, or a value or mask that does not fit.
+            ClosedEnvironmentError: after `close`.
+        """
+        self._check_open("change settings")
+        self._put_changes(self._mask(mask, "mask"), self._checked_changes(settings), CURRICULUM[1] in settings)
+
+    def _checked_changes(self, settings: Any) -> list[tuple[str, Task]]:
+        """For each environment, the JSON of its changed settings, and its next task."""
+        found: dict[tuple[int, str], tuple[str, Task]] = {}
+        keys = [(id(task), text) for task, text in zip(self._opened, self._next_changes, strict=True)]
+        for key, task in zip(keys, self._opened, strict=True):
+            if key not in found:
+                found[key] = checked_changes(task, self.arguments[2], key[1], settings)
+                if stacked.kind(task) is None:
+                    raise ValueError(f"task {task.name}: without from_body environments cannot differ in settings")
+        return [found[key] for key in keys]
+
+    def _put_changes(self, mask: np.ndarray, changes: Sequence[tuple[str, Task]], restart: bool) -> None:
+        for index in np.flatnonzero(mask).tolist():
+            self._next_changes[index], self._next[index] = changes[index]
+        self._streams_begin |= mask & restart
+
+    @one_thread_at_a_time
     def rest(self, mask) -> None:
         """Let environments, and no others, stand still until they are reset; meanwhile they cost next to nothing.
 
@@ -314,7 +383,7 @@ class VectorEnv(Together):
         if self._memory is None:
             raise ResetNeeded("cannot take a snapshot: no episode has begun; call reset first")
         self._take_commands()
-        return snapshots.taken(self)
+        return snapshots.arrays(self._state())
 
     @one_thread_at_a_time
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
@@ -325,7 +394,7 @@ class VectorEnv(Together):
             ClosedEnvironmentError: after `close`.
         """
         self._check_open("restore")
-        snapshots.put(self, self._checked_snapshot(arrays))
+        self._put(self._checked_snapshot(arrays))
 
     @one_thread_at_a_time
     def render(self, indices: Iterable[int] | None = None) -> tuple[np.ndarray, ...] | None:
@@ -372,24 +441,36 @@ class VectorEnv(Together):
         """The seed of each environment's stream of random numbers; -1 where none was given."""
         return tuple(self._stream_seeds.tolist())
 
-    def _prepared(self) -> tuple[Task, list[Task], mujoco.MjModel | list[mujoco.MjModel]]:
-        """The task of all environments, that of each, and the model, or that of each."""
+    def _prepared(self) -> tuple[list[Task], mujoco.MjModel | list[mujoco.MjModel]]:
+        """The task of each environment, and the model of all, or that of each."""
         task, model = prepared(*self.arguments)
-        return task, [task] * self.num_envs, model
+        return [task] * self.num_envs, model
 
-    def _part(self, mask: np.ndarray) -> Task:
-        """The task of some environments, (num_envs,) booleans."""
-        return self._task
+    def _state(self) -> snapshots.State:
+        own = {name: getattr(self, f"_{name}").copy() for name in snapshots.OWN}
+        settings = self._changes.tolist(), self._next_changes.tolist()
+        randoms = [random.get_state() for random in self._randoms]
+        return snapshots.State(self.batch.snapshot(), self._memory, self._streams, randoms, own, settings)
 
-    def _checked_snapshot(self, arrays: Mapping[str, np.ndarray]) -> snapshots.Checked:
-        """A snapshot that fits; episodes have begun then."""
+    def _checked_snapshot(self, arrays: Mapping[str, np.ndarray]) -> tuple[snapshots.State, list[list[Task]]]:
+        """A snapshot that fits, and the tasks of its episodes and of the next ones; episodes have begun then."""
         if self._memory is None:
             self._begin(np.ones(self.num_envs, bool), self._observation)
         self._take_commands()
-        return snapshots.checked(self, arrays)
+        return snapshots.checked(self._state(), self._task, self.batch.checked, arrays, self._opened, self.arguments[2])
+
+    def _put(self, snapshot: tuple[snapshots.State, list[list[Task]]]) -> None:
+        state, (self._tasks, self._next) = snapshot
+        self.batch.restore(state.simulations)
+        self._task, self._memory, self._streams = _one(self._tasks), state.memory, state.streams
+        self._changes, self._next_changes = (np.array(texts, object) for texts in state.settings)
+        for name, array in state.own.items():
+            setattr(self, f"_{name}", array)
+        for random, each in zip(self._randoms, state.randoms, strict=True):
+            random.set_state(each)
 
     def _take_commands(self) -> None:
-        self._memory = self._commands.taken(self._memory)
+        self._memory = self._commands.taken(self._task, self._memory)
 
     def _picture_of(self, index: int) -> np.ndarray:
         task, scene, shown = self._tasks[index], self._tasks[index].scene, {}
@@ -404,26 +485,41 @@ class VectorEnv(Together):
         """Start episodes in some environments, (num_envs,) booleans, and put their observations among the others."""
         starts = []
         for index in np.flatnonzero(mask).tolist():
-            own = self._tasks[index]
-            if not self._streams_begin[index]:
-                self._streams[index] = own.stream_state(trees.at(self._memory, index))
+            own = self._next[index]
+            if self._streams_begin[index]:
+                self._streams[index] = own.first()
+            else:
+                self._streams[index] = self._tasks[index].stream_state(trees.at(self._memory, index))
             starts.append(own.start(self._randoms[index], self._streams[index]))
-        task = self._part(mask)
-        qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         self._streams_begin &= ~mask
+        self._take_settings(mask)
+        qpos, qvel, memories, mocap, models = zip(*starts, strict=True)
         mocap = None if mocap[0] is None else np.stack(mocap)
         self.batch.reset(mask, np.stack(qpos), np.stack(qvel), mocap, models)
-        memory, readings = trees.mapped(lambda *fields: np.stack(fields), *memories), task.read(self.batch.part(mask))
+        memory, task, part = trees.mapped(lambda *fields: np.stack(fields), *memories), self._task, mask
+        if task is not self._tasks[0]:  # a stacked one, which takes all environments
+            part = np.ones(self.num_envs, bool)
+            memory = memory if self._memory is None else _scattered(mask, memory, self._memory)
+        readings, begun = task.read(self.batch.part(part)), mask[part]
         lifted = task.clear_spawn(memory, readings)
         if lifted is not None:
-            self.batch.place(mask, lifted)
-            readings = task.read(self.batch.part(mask))
+            self.batch.place(mask, lifted[begun])
+            readings = task.read(self.batch.part(part))
         memory = task.begin(memory, readings)
+        observation[mask] = task.vector(task.observe(memory, readings), np.float32)[begun]
         # Before the first step there is nothing to keep, as all environments begin.
-        self._memory = memory if self._memory is None else _scattered(mask, memory, self._memory)
+        some = memory if begun.all() else trees.mapped(lambda leaf: leaf[begun], memory)
+        self._memory = memory if self._memory is None else _scattered(mask, some, self._memory)
         self._steps[mask] = 0
         self._ended, self._resting = self._ended & ~mask, self._resting & ~mask
-        observation[mask] = task.vector(task.observe(memory, readings), np.float32)
+
+    def _take_settings(self, mask: np.ndarray) -> None:
+        """Let changed settings hold in some environments, (num_envs,) booleans."""
+        if (changed := mask & (self._changes != self._next_changes)).any():
+            self._changes[changed] = self._next_changes[changed]
+            pairs = zip(self._tasks, self._next, strict=True)
+            self._tasks = [pair[there] for pair, there in zip(pairs, changed.tolist(), strict=True)]
+            self._task = _one(self._tasks)
 
     def _info(self, mask: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
         """What the latest step tells of some environments."""
@@ -441,13 +537,18 @@ class VectorEnv(Together):
         """Start new streams of random numbers in some environments, except those whose seed is None."""
         for index in np.flatnonzero(mask).tolist():
             if seeds[index] is not None:
-                self._randoms[index], self._streams[index] = np.random.RandomState(seeds[index]), self._task.first()
+                self._randoms[index] = np.random.RandomState(seeds[index])
                 self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
 
 
 def usable_cores() -> int:
     """Return how many cores this process may use, where the system tells; else how many there are."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+def _one(tasks: Sequence[Task]) -> Task:
+    """One task for all environments, of the tasks of each."""
+    return tasks[0] if all(task is tasks[0] for task in tasks) else stacked.stacked(tasks)
 
 
 def _scattered(mask: np.ndarray, some, memory):

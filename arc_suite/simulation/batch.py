@@ -9,12 +9,12 @@ import mujoco.batch
 import numpy as np
 
 from arc_suite.simulation import forks, timers
-from arc_suite.simulation.model import change
+from arc_suite.simulation.model import ReadOnly, change, field
+from arc_suite.simulation.snapshots import LASTING, OF_MODEL, checked_snapshot, model_fields
 
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 # Sizes of models that make no difference to `MjData`.
 _TEXTS = ("nbuffer", "nnames", "nnames_map", "npaths", "ntext", "ntextdata")
-_OF_MODEL = "model_"  # with which names of models' fields begin in a snapshot
 
 
 class Batch:
@@ -50,6 +50,7 @@ class Batch:
         forks.keep(self._simulations)
         self._simulations.set_models(self._own)
         self._changed: dict[str, None] = {}  # names of fields that ever were
+        self._lasting: dict[str, np.ndarray] = {}  # (count, *shape) values that stay over resets, NaN for none
         self._silent = _silent(model) if self._compiled is None else [_silent(each) for each in model]
         # What is bound is filled by every call, so it must be bound before the first.
         fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
@@ -61,13 +62,13 @@ class Batch:
         return self._simulations.bind("mocap_pos")
 
     @property
-    def models(self) -> list[mujoco.MjModel]:
-        """The model of each simulation."""
-        return self._own or [self._simulations.model] * self._simulations.nsim
+    def models(self) -> list[ReadOnly]:
+        """The model of each simulation, to read; `change_model` changes them."""
+        return [ReadOnly(model) for model in self._own or [self._simulations.model] * self._simulations.nsim]
 
     @property
     def changed(self) -> list[str]:
-        """Names of the models' fields that a reset has ever changed."""
+        """Names of the models' fields that ever were changed."""
         return list(self._changed)
 
     def part(self, mask: np.ndarray | int) -> types.SimpleNamespace:
@@ -126,7 +127,7 @@ class Batch:
         self._simulations.set_models(self._compiled)
         self._simulations.reset(mask)  # runs mj_forward, from whose result the solver starts next
         if self._own is not self._compiled or any(models):
-            self._change(mask, models or [{}] * len(qpos))
+            self._change(mask, models or [{}] * len(qpos))  # with lasting changes
         self._simulations.set_models(self._own)
         self.data.qpos[mask], self.data.qvel[mask] = qpos, qvel
         if mocap_pos is not None:
@@ -147,50 +148,65 @@ class Batch:
         self.data.qpos[mask] = qpos
         self._simulations.forward(mask)
 
+    def change_model(self, fields: Mapping[str, np.ndarray], mask: np.ndarray) -> None:
+        """Set fields of the models of some simulations from now on, over resets.
+
+        Args:
+            fields: values (count, *shape) by name.
+            mask: (count,) of those to change.
+
+        Raises:
+            ForkError: made before a fork.
+        """
+        self._check_process()
+        for name, values in fields.items():
+            lasting = self._lasting.setdefault(name, np.full(values.shape, np.nan))
+            lasting[mask] = values[mask]
+        self._write(mask, [{name: fields[name][index] for name in fields} for index in np.flatnonzero(mask)])
+        self._simulations.set_models(self._own)
+
     def _change(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
-        compiled = self._compiled or [self._simulations.model] * len(mask)
-        if self._own is self._compiled:
-            self._own, self._silent = [copy.copy(each) for each in compiled], [_silent(each) for each in compiled]
+        """Let models of some simulations be the compiled ones with lasting changes, and with fields of one episode."""
         self._changed |= dict.fromkeys(name for fields in models for name in fields)
+        compiled = self._compiled or [self._simulations.model] * len(mask)
+        changes = []
+        for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
+            unchanged = {name: field(compiled[index], name) for name in self._changed}
+            changes.append({**unchanged, **fields, **self._lasting_of(index)})
+        self._write(mask, changes)
+
+    def _write(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
+        self._changed |= dict.fromkeys(name for fields in models for name in fields)
+        if self._own is self._compiled:
+            compiled = self._compiled or [self._simulations.model] * len(mask)
+            self._own, self._silent = [copy.copy(each) for each in compiled], [_silent(each) for each in compiled]
         scratch = mujoco.MjData(self._simulations.model)
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
-            unchanged = {name: getattr(compiled[index], name) for name in self._changed}
             for own in (self._own[index], self._silent[index]):
-                change(own, {**unchanged, **fields}, scratch)
+                change(own, fields, scratch)
+
+    def _lasting_of(self, index: int) -> dict[str, np.ndarray]:
+        return {name: each[index] for name, each in self._lasting.items() if not np.isnan(each[index]).any()}
 
     def snapshot(self) -> dict[str, np.ndarray]:
         """Return copies of the simulations' state, of `data` and of changed model fields, for `restore`."""
         fields = {name: array.copy() for name, array in vars(self.data).items()}
-        models = {f"{_OF_MODEL}{name}": np.stack([getattr(own, name) for own in self._own]) for name in self._changed}
-        return {"state": self._simulations.state.copy(), **fields, **models}
+        models = {f"{OF_MODEL}{name}": np.stack([field(own, name) for own in self._own]) for name in self._changed}
+        lasting = {f"{LASTING}{name}": values.copy() for name, values in self._lasting.items()}
+        return {"state": self._simulations.state.copy(), **fields, **models, **lasting}
 
-    def checked(self, arrays: Mapping[str, np.ndarray], changeable: Iterable[str]) -> Mapping[str, np.ndarray]:
-        """Return the arrays if `restore` can take them: MuJoCo trusts what it is given, and ends the process.
-
-        Args:
-            arrays: of a snapshot.
-            changeable: fields of the model that it may hold.
+    def checked(self, arrays: Mapping[str, np.ndarray]) -> Mapping[str, np.ndarray]:
+        """Return the arrays of a snapshot if `restore` can take them.
 
         Raises:
-            ValueError: an array is missing, too many, of another shape or type, or not finite.
+            ValueError: an array is missing, too many, of another shape or type, or holds a value out of range.
         """
-        model, count = self._simulations.model, self._simulations.nsim
-        expected = {"state": self._simulations.state, **vars(self.data)}
-        for field in changeable:
-            name, compiled = f"{_OF_MODEL}{field}", getattr(model, field)
-            if name in arrays:
-                expected[name] = np.broadcast_to(compiled, (count, *compiled.shape))
-        if missing := expected.keys() ^ arrays.keys():
-            raise ValueError(f"{min(missing)}: {'missing' if min(missing) in expected else 'no array of a snapshot'}")
-        for name, like in expected.items():
-            found = fitting(name, arrays[name], like)
-            if not np.isfinite(found).all():
-                raise ValueError(f"{name}: expected finite numbers")
-        return arrays
+        models = self._compiled or [self._simulations.model] * self._simulations.nsim
+        return checked_snapshot({"state": self._simulations.state, **vars(self.data)}, models, arrays)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Continue bit-identically from the arrays of `snapshot`."""
-        models = {name.removeprefix(_OF_MODEL): array for name, array in arrays.items() if name.startswith(_OF_MODEL)}
+        models, self._lasting = model_fields(arrays)
         if models or self._own is not self._compiled:
             each = range(self._simulations.nsim)
             self._change(np.ones(len(each), bool), [{name: models[name][index] for name in models} for index in each])
@@ -217,17 +233,6 @@ def layout(model: mujoco.MjModel) -> tuple[int, ...]:
     """Return the sizes of a model that simulations of one batch share; names and texts may differ."""
     names = (name for name in dir(model) if name.startswith("n") and name not in _TEXTS)
     return tuple(size for size in (getattr(model, name) for name in names) if isinstance(size, int))
-
-
-def fitting(name: str, array: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """Return an array that has the shape and type of another one.
-
-    Raises:
-        ValueError: it has not.
-    """
-    if (array.shape, array.dtype) != (like.shape, like.dtype):
-        raise ValueError(f"{name}: expected {like.dtype} {like.shape}, got {array.dtype} {array.shape}")
-    return array
 
 
 def _silent(model: mujoco.MjModel) -> mujoco.MjModel:

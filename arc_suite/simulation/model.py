@@ -3,15 +3,36 @@
 import copy
 import functools
 from collections.abc import Mapping
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from arc_suite import models
+from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.models import direct
 from arc_suite.models.sizing import sized
 from arc_suite.robots.spec import Body
+
+_MOST = 1e6  # of a value of a model's field
+_POSITIVE = ("body_mass", "body_inertia")  # which accelerations divide by
+
+# Fields that `checked_fields` takes, with the bounds of their values.
+FIELDS = {
+    "gravity": (-_MOST, _MOST),  # of `opt`
+    **dict.fromkeys(_POSITIVE, (0.0, _MOST)),
+    "body_ipos": (-_MOST, _MOST),
+    "dof_armature": (0.0, _MOST),
+    "dof_damping": (0.0, _MOST),
+    "dof_frictionloss": (0.0, _MOST),
+    "jnt_stiffness": (0.0, _MOST),
+    "actuator_gear": (-_MOST, _MOST),
+    "pair_friction": (0.0, _MOST),
+    "pair_solref": (-_MOST, _MOST),
+    "pair_solimp": (0.0, _MOST),
+    "pair_margin": (0.0, _MOST),
+    "geom_friction": (0.0, _MOST),
+}
 
 _LARGE = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
 _NO_DAMPING = int(mujoco.mjtDisableBit.mjDSBL_DAMPER | mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
@@ -55,8 +76,68 @@ def change(model: mujoco.MjModel, fields: Mapping[str, np.ndarray], scratch: muj
         scratch: data of such a model; overwritten.
     """
     for name, values in fields.items():
-        getattr(model, name)[:] = values
+        field(model, name)[:] = values
     mujoco.mj_setConst(model, scratch)
+
+
+def field(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """Return a field of a model or of its options, live."""
+    return getattr(model if hasattr(model, name) else model.opt, name)
+
+
+def checked_fields(
+    model: mujoco.MjModel, fields: Any, count: int | None = None, every: bool = False
+) -> dict[str, np.ndarray]:
+    """Return values of a model's fields, each in the field's shape.
+
+    Args:
+        model: as compiled.
+        fields: values by name: what broadcasts to the field's shape, or of several models (count, *shape).
+        count: number of models, which the values then have as a leading axis; None for one model.
+        every: whether fields without effect on this model are taken, too.
+
+    Raises:
+        ValueError: no such field, one without effect on this model, or values that do not fit.
+    """
+    valid = [name for name in FIELDS if every or name != "geom_friction" or model.geom_contype.any()]
+    if "geom_friction" in checks.mapping("model", fields) and "geom_friction" not in valid:
+        raise ValueError("model field 'geom_friction': contacts of this model read pair_friction; change that")
+    found = {}
+    for name, values in checks.mapping("model", fields).items():
+        like = field(model, checks.name(name, valid, "model field"))
+        found[name] = _values(name, values, like if count is None else np.broadcast_to(like, (count, *like.shape)))
+    return found
+
+
+def _values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
+    low, high = FIELDS[name]
+    try:
+        found = np.broadcast_to(np.asarray(values, float), like.shape).copy()
+    except (TypeError, ValueError):
+        raise ValueError(f"model field {name!r}: expected numbers of shape {like.shape}, got {values!r}") from None
+    least = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
+    if not ((found >= least) & (found <= high)).all():
+        above = ", above 0 where the model's are" if name in _POSITIVE else ""
+        raise ValueError(f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {values!r}")
+    return found
+
+
+class ReadOnly:
+    """A model whose fields can be read."""
+
+    def __init__(self, model: mujoco.MjModel):
+        """View a model, or its options."""
+        self.__dict__["_model"] = model
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self._model, name)
+        if isinstance(value, np.ndarray):
+            value = value.view()
+            value.flags.writeable = False
+        return ReadOnly(value) if isinstance(value, mujoco.MjOption) else value
+
+    def __setattr__(self, name: str, value: Any):
+        raise AttributeError(f"cannot set {name!r}: models are read-only; use change_model of the environments")
 
 
 def list_contacts(spec: mujoco.MjSpec, model: mujoco.MjModel, all_geoms: bool = True) -> None:

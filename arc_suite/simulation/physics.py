@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import numpy as np
@@ -11,10 +11,13 @@ from dm_control import mujoco as dm_mujoco
 from dm_control.mujoco import wrapper
 
 from arc_suite.arenas import FLAT, Arena
+from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import forks, pictures, timers
-from arc_suite.simulation.model import change, compiled
+from arc_suite.simulation.model import change, compiled, field
+from arc_suite.simulation.snapshots import LASTING, OF_MODEL, checked_snapshot, model_fields
 
+_STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 _SENSOR = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 
 
@@ -45,31 +48,41 @@ class Physics(dm_mujoco.Physics):
     @classmethod
     def from_body(cls, body: Body, arena: Arena = FLAT) -> Physics:
         """Simulate a body in an arena, from its standing pose."""
-        physics = cls.from_model(wrapper.MjModel(compiled(body, arena)))
+        model = compiled(body, arena)
+        model.vis.global_.offwidth, model.vis.global_.offheight = MAX_WIDTH, MAX_HEIGHT  # for renderers of others
+        physics = cls.from_model(wrapper.MjModel(model))
         physics.body, physics.arena = body, arena
         return physics
 
     def _reload_from_data(self, data):
         super()._reload_from_data(data)
         self._decorated = None
-        self._unchanged, self._scratch = {}, None
+        self._unchanged, self._lasting, self._scratch = {}, {}, None
         self.shown_reward = self.marker = self.failed_legs = None
         self._forks = forks.count
         self._option = self.model.ptr.opt
 
     def reset(self, keyframe_id=None) -> None:
-        """Restart from the default pose, as in dm_control, with the model before `change_model`."""
+        """Restart from the default pose, as in dm_control, with the compiled model and its lasting changes."""
         self._check_process()
         if self._unchanged:
             self._change(self._unchanged)
-            self._unchanged = {}
         super().reset(keyframe_id)
+        if self._lasting:
+            self._change(self._lasting)
+        self._unchanged = {name: self._unchanged[name] for name in self._lasting}
 
-    def change_model(self, fields: Mapping[str, np.ndarray]) -> None:
-        """Set fields of the model, by name, until the next reset."""
+    def change_model(self, fields: Mapping[str, np.ndarray], lasting: bool = False) -> None:
+        """Set fields of the model.
+
+        Args:
+            fields: values by name, in the shapes of the model's fields.
+            lasting: whether they stay over resets, in place of others that are set later; else until the next reset.
+        """
         model = self.model.ptr
-        self._unchanged = {name: getattr(model, name).copy() for name in fields} | self._unchanged
-        self._change(fields)
+        self._unchanged = {name: field(model, name).copy() for name in fields} | self._unchanged
+        self._lasting = {**self._lasting, **fields} if lasting else self._lasting
+        self._change({**fields, **{name: self._lasting[name] for name in fields if name in self._lasting}})
 
     def _change(self, fields: Mapping[str, np.ndarray]) -> None:
         if self._scratch is None:
@@ -170,16 +183,50 @@ class Physics(dm_mujoco.Physics):
         if share_model:
             self._shared = copied._shared = True
         else:
-            copied._unchanged = self._unchanged
+            copied._unchanged, copied._lasting = self._unchanged, self._lasting
         return copied
 
+    def snapshot(self, fields: Iterable[str]) -> dict[str, np.ndarray]:
+        """Return the simulation's state and derived fields of `MjData` as a snapshot of a `Batch` of one."""
+        model, data = self.model.ptr, self.data.ptr
+        state = np.empty((1, mujoco.mj_stateSize(model, _STATE)))
+        mujoco.mj_getState(model, data, state[0], _STATE)
+        fields = dict.fromkeys(("qpos", "qvel", "ctrl", *fields))
+        models = {f"{OF_MODEL}{name}": field(model, name)[None].copy() for name in self._unchanged}
+        lasting = {f"{LASTING}{name}": np.array(values)[None] for name, values in self._lasting.items()}
+        return {"state": state, **{name: getattr(data, name)[None].copy() for name in fields}, **models, **lasting}
+
+    def checked(self, arrays: Mapping[str, np.ndarray], fields: Iterable[str]) -> Mapping[str, np.ndarray]:
+        """Return the arrays of a snapshot if `restore` can take them; see `Batch.checked`."""
+        own = self.snapshot(fields)
+        like = {name: own[name] for name in own if not name.startswith((OF_MODEL, LASTING))}
+        return checked_snapshot(like, [self.model.ptr], arrays)
+
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Continue bit-identically from the arrays of `snapshot`."""
+        self._check_process()
+        models, lasting = ({name: each[0] for name, each in fields.items()} for fields in model_fields(arrays))
+        if self._unchanged:
+            self._change(self._unchanged)
+        self._unchanged, self._lasting = {}, {name: each for name, each in lasting.items() if not np.isnan(each).any()}
+        if models:
+            self.change_model(models)
+        model, data = self.model.ptr, self.data.ptr
+        mujoco.mj_setState(model, data, arrays["state"][0], _STATE)
+        mujoco.mj_forward(model, data)
+        mujoco.mj_setState(model, data, arrays["state"][0], _STATE)  # from which the solver starts, too
+        for name, array in arrays.items():
+            if name != "state" and not name.startswith((OF_MODEL, LASTING)):
+                getattr(data, name)[:] = array[0]
+        self.divergence = None
+
     def __getstate__(self):
-        return super().__getstate__(), self.body, self.arena, self._unchanged
+        return super().__getstate__(), self.body, self.arena, self._unchanged, self._lasting
 
     def __setstate__(self, state):
-        data, self.body, self.arena, unchanged = state
+        data, self.body, self.arena, *changes = state
         # dm_control recomputes the derived quantities; here they are one substep behind the state.
         as_it_stands = copy.copy(data.ptr)
         super().__setstate__(data)
         mujoco.mj_copyData(data.ptr, data.model.ptr, as_it_stands)
-        self._unchanged = unchanged
+        self._unchanged, self._lasting = changes

@@ -92,10 +92,6 @@ class Clocks(NamedTuple):
         """Return the entries (environments, n) of a table at ticks (environments,)."""
         return table[self.starts + tick % self.counts]
 
-    def part(self, indices) -> Self:
-        """Return the clocks of some environments."""
-        return self._replace(starts=self.starts[indices], counts=self.counts[indices])
-
 
 def desired_contacts(phase, duty_factor: float, offsets):
     """Return which feet (..., feet) a gait schedules on the ground at phases (...), rad (the paper's Section 4)."""

@@ -377,7 +377,14 @@ class CommandTask(Task):
         return numpy.where(terminated | truncated, self.context.steps, steps + (steps == 0))
 
     def stream_state(self, memory: CommandTaskMemory) -> Any:
-        """Return the stream state of the ground, by the outcome of the episode."""
+        """Return the stream state of the ground, by the outcome of the episode.
+
+        One that was cut off within the first cycle of the gait has none.
+        """
+        steps, (terminated, truncated) = memory.core.steps, self.ended(memory, None)
+        ended = terminated or truncated or steps >= self.step_limit
+        if not (ended or steps * self.context.leak >= 1.0):
+            return self.settings.ground.stream_state(memory.ground, np.nan, False)
         outcome = self.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 

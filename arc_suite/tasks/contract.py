@@ -32,7 +32,7 @@ import functools
 import itertools
 import types
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -217,9 +217,10 @@ class Task(Observed):
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
         actions: what an action asks of a motor: "torque" or "position".
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
-        from_body: cached attributes with numbers that follow from the body. With these and the settings stacked along a
-            leading axis, its functions serve a batch of different bodies. A class that inherits declares its own, as
-            it may have further ones; without it, each body has a batch of its own.
+        from_body: cached attributes with numbers that follow from the body or the settings. With these and the settings
+            stacked along a leading axis, its functions serve a batch of different bodies or settings. A class that
+            inherits declares its own, as it may have further ones; without it, each body has a batch of its own.
+        structure: what else environments of one batch share.
     """
 
     scene: Scene
@@ -237,6 +238,7 @@ class Task(Observed):
     actions: ClassVar[str] = "torque"
     demonstrators: ClassVar[tuple[str, ...]] = ()
     from_body: ClassVar[tuple[str, ...]] = ()
+    structure: ClassVar[Hashable] = ()
 
     @classmethod
     @abstractmethod

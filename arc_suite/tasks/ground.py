@@ -169,10 +169,12 @@ def next_level(stream: Stream, stays, other, down: float, up: float):
     level = np.asarray(stream.level) if isinstance(stream.level, int) else stream.level
     numpy, highest = level.__array_namespace__(), LEVELS - 1
     rises = (stream.outcome > up) & numpy.logical_not(stream.failed)
-    visits = rises & (level == highest) & numpy.logical_not(stream.visited) & (stays >= STAYS)
-    risen = numpy.where(visits, other, (level + 1).clip(max=highest))
+    starts = rises & (level == highest) & numpy.logical_not(stream.visited) & (stays >= STAYS)
+    goes_on = stream.visited & numpy.isnan(stream.outcome)  # nothing happened on the visit
+    risen = numpy.where(starts, other, (level + 1).clip(max=highest))
     fallen = numpy.where(stream.outcome < down, (level - 1).clip(0), level)
-    return numpy.where(stream.visited, highest, numpy.where(rises, risen, fallen)), visits
+    returns = stream.visited & ~goes_on
+    return numpy.where(returns, highest, numpy.where(rises, risen, fallen)), starts | goes_on
 
 
 @dataclasses.dataclass(frozen=True)
@@ -277,7 +279,8 @@ class Lanes(Ground):
         """
         position, heading, arena = readings.torso_position, place[..., 2], context.arena
         numpy = position.__array_namespace__()
-        forward, left = numpy.asarray(SCAN * context.reach)
+        reach = numpy.asarray(context.reach)[..., None]
+        forward, left = (numpy.asarray(places) * reach for places in SCAN)
         cosine, sine = numpy.cos(heading)[..., None], numpy.sin(heading)[..., None]
         x = position[..., 0:1] + cosine * forward - sine * left
         y = position[..., 1:2] + sine * forward + cosine * left

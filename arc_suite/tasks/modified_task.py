@@ -7,7 +7,7 @@ adds kicks, and changes fields of the model. Its memory holds that of the other.
 import dataclasses
 import functools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -139,6 +139,13 @@ class Modified(Wrapper):
     from_body = ("gains", "reach", "noises")
 
     changes: Modifiers
+
+    @property
+    def structure(self) -> Hashable:
+        """Which modifiers there are, and the shape of their memory."""
+        own = self.changes
+        switches = own.kicks > 0.0, own.delay[1], own.actuator_failure is False, own.actions, own.exclude_blocks
+        return (*switches, *self.noises)
 
     @property
     def actions(self) -> str:

@@ -8,30 +8,31 @@ from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
 from arc_suite.tasks.command_task import COSTS, CommandTask
 from arc_suite.tasks.ground import Lanes, PillarField
 
-_LEVEL = ("clock", "clearances", "context", "_torques")  # what follows from the body on level ground
+_STACKED = ("clock", "clearances", "context", "_torques")  # what follows from body and settings
 
 
 class Steer(CommandTask):
     """Following a velocity forward, sideways and in turning, stops included."""
 
-    name, command, from_body = "steer", Schedule(), _LEVEL
+    name, command, from_body = "steer", Schedule(), _STACKED
 
 
 class Shoved(CommandTask):
     """Following a velocity command under kicks."""
 
-    name, command, modifiers, from_body = "shoved", Schedule(), {"kicks": 1.5}, _LEVEL
+    name, command, modifiers, from_body = "shoved", Schedule(), {"kicks": 1.5}, _STACKED
 
 
 class Limp(CommandTask):
     """Following a velocity command with a leg, drawn for each episode, whose motors fail."""
 
-    name, command, modifiers, from_body = "limp", Schedule(), {"actuator_failure": True}, _LEVEL
+    name, command, modifiers, from_body = "limp", Schedule(), {"actuator_failure": True}, _STACKED
 
 
 class Rough(CommandTask):
     """Walking over rough ground."""
 
+    from_body = _STACKED
     name, yaw = "rough", 0.3
     command, ground = AlongLane(), Lanes(("rough",))
     demonstrators = ("balanced", "surefooted")
@@ -40,6 +41,7 @@ class Rough(CommandTask):
 class Slopes(CommandTask):
     """Walking up and down slopes."""
 
+    from_body = _STACKED
     name, yaw = "slopes", 0.3
     command, ground = AlongLane(), Lanes(("slopes",))
     demonstrators = ("balanced", "surefooted")
@@ -48,6 +50,7 @@ class Slopes(CommandTask):
 class Stairs(CommandTask):
     """Walking up and down flights of stairs."""
 
+    from_body = _STACKED
     name, yaw = "stairs", 0.3
     command, ground = AlongLane(), Lanes(("stairs",), copies=(4, 1))
     demonstrators = ("balanced", "surefooted")
@@ -56,6 +59,7 @@ class Stairs(CommandTask):
 class Gaps(CommandTask):
     """Walking over trenches."""
 
+    from_body = _STACKED
     name, yaw = "gaps", 0.3
     command, ground = AlongLane(), Lanes(("gaps",), copies=(4, 1))
     demonstrators = ("sighted",)
@@ -64,6 +68,7 @@ class Gaps(CommandTask):
 class Course(CommandTask):
     """Walking over one of the four kinds of ground, drawn for every episode."""
 
+    from_body = _STACKED
     name, yaw = "course", 0.3
     command, ground = AlongLane(), Lanes(terrain.KINDS, copies=(2, 1))
     demonstrators = ("balanced", "surefooted")
@@ -72,6 +77,7 @@ class Course(CommandTask):
 class Roam(CommandTask):
     """Following a velocity command over rough ground under kicks; a curriculum judges by the mean tracking."""
 
+    from_body = _STACKED
     name, modifiers = "roam", {"kicks": 1.5}
     command, ground = Schedule(), Lanes(("rough",), middle=0.5, thresholds=(0.25, 0.5))
     demonstrators = ("balanced", "surefooted")
@@ -80,6 +86,7 @@ class Roam(CommandTask):
 class Navigate(CommandTask):
     """Reaching goal after goal among pillars."""
 
+    from_body = _STACKED
     name = "navigate"
     command, ground = ToGoal(), PillarField()
     demonstrators = ("planned",)

@@ -6,6 +6,8 @@ Arrays may carry any leading axes `...`: the same text serves one environment, a
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import numpy as np
+
 from arc_suite import checks
 from arc_suite.tasks.readings import Readings, component
 
@@ -46,7 +48,7 @@ def reward(terms: Mapping, weights: Mapping, cost_limit=None) -> tuple[dict, Any
 
     Args:
         terms: raw terms (...) by name.
-        weights: the weight of each.
+        weights: the weight of each, or weights (...) of environments that have different ones.
         cost_limit: bound of the weighted sum of the costs, the terms whose weights are negative; None for no bound.
 
     Raises:
@@ -73,12 +75,19 @@ def _limited(terms: Mapping, weights: Mapping, limit) -> dict:
     Small costs count in full, and more always costs more. Random actions cost the most; within a limit it pays to
     stay alive while a learner explores.
     """
-    costs = [name for name, weight in weights.items() if weight < 0.0]
+    costs = {name: weight for name, weight in weights.items() if _differs(weight) or weight < 0.0}
     if not costs:
         return {}
-    excess = _total(terms, weights, costs) / limit
+    parts = {name: weight.clip(max=0.0) if _differs(weight) else weight for name, weight in costs.items()}
+    excess = _total(terms, parts, parts) / limit
     share = 1.0 / excess.__array_namespace__().sqrt(1.0 + excess * excess)
-    return {name: terms[name] * share for name in costs}
+    shares = {name: np.where(each < 0.0, share, 1.0) if _differs(each) else share for name, each in costs.items()}
+    return {name: terms[name] * shares[name] for name in costs}
+
+
+def _differs(weight) -> bool:
+    """Whether environments have different ones."""
+    return isinstance(weight, np.ndarray) and weight.ndim > 0
 
 
 def _total(terms: Mapping, weights: Mapping, names: Iterable[str]):

@@ -15,7 +15,8 @@ from refusals import refused
 
 import arc_suite
 from arc_suite import registry
-from arc_suite.envs.bodies import BodiesEnv, stacked
+from arc_suite.envs import stacked
+from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models.families import varied_body

@@ -190,13 +190,13 @@ def test_calls_and_attributes_of_environments_are_those_of_single_environments()
     assert same(batch.reset(), singles.reset())
     assert make("tick", 2, task_kwargs={"random": 5}).np_random_seed == (5, 6)
     assert make("tick", 2).call("render") == (None, None)
-    batch.set_attr("note", [7, 7, 7])
-    assert batch.get_attr("note") == (7, 7, 7)
-    batch.set_attr("note", "all")
-    assert batch.note == "all"
+    batch.set_attr("render_mode", [7, 7, 7])
+    assert batch.get_attr("render_mode") == (7, 7, 7)
+    batch.set_attr("render_mode", "all")
+    assert batch.render_mode == "all"
     for values in ([1, 2, 3], [1, 1]):
-        with refused("set_attr 'note': environments share it; expected one value for all, got", begins=True):
-            batch.set_attr("note", values)
+        with refused("set_attr 'render_mode': environments share it; expected one value for all, got", begins=True):
+            batch.set_attr("render_mode", values)
     with refused("call 'step': environments do it together; call step of the environment itself"):
         batch.call("step", np.zeros((3, 18)))
     with pytest.raises(AttributeError, match="nothing"):

@@ -11,12 +11,12 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from arc_suite import checks, registry
-from arc_suite.envs import snapshots
 from arc_suite.envs.bodies.groups import Group, Member, Place, grouped, scatter
-from arc_suite.envs.calls import Lock, checked_action, checked_command, one_thread_at_a_time
+from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.together import Together
 from arc_suite.tasks import tokens
+from arc_suite.tasks.contract import CURRICULUM
 from arc_suite.tasks.tokens import Description, Tokens
 
 
@@ -52,7 +52,7 @@ class BodiesTask(NamedTuple):
         return tokens.split(observation)
 
 
-class BodiesEnv(Together):
+class BodiesEnv(KnownAttributes, Together):
     """Environments of different bodies, `gymnasium.make_vec("arc_suite/bodies-<task>-v0", num_envs=n, bodies=...)`.
 
     Observations are legs (num_envs, 12, 12), torso (num_envs, 12) and command (num_envs, 6), float32 without
@@ -157,12 +157,13 @@ class BodiesEnv(Together):
             seeds = self._seeds(seed)
             for group, indices, _ in self._places:
                 group._seed([seeds[index] for index in indices], np.ones(len(indices), bool))
+        self._made = __name__
 
     @one_thread_at_a_time
     def reset(self, *, seed: int | Sequence[int | None] | None = None, options: Mapping[str, Any] | None = None):
         """Start an episode in every environment, or in some; see `VectorEnv.reset`."""
         self._check_open("reset")
-        mask = self._mask(checks.mapping("options", options).get("reset_mask"))
+        mask = self._reset_mask(options)
         if not (self._begun or mask.all()):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
         seeds = [None] * self.num_envs if seed is None else self._seeds(seed)
@@ -225,6 +226,31 @@ class BodiesEnv(Together):
                 group.command(name, value[indices], mask[indices])
 
     @one_thread_at_a_time
+    def change_model(self, fields: Mapping[str, Any], mask=None) -> None:
+        """Set fields of the models of some environments; see `VectorEnv.change_model`.
+
+        Values broadcast to the fields of each body.
+        """
+        self._check_open("change the model")
+        chosen, mask = [], self._mask(mask, "mask")
+        for group, indices, _ in self._places:
+            if mask[indices].any():
+                chosen.append((group, group._checked_fields(fields), mask[indices]))
+        for group, values, own in chosen:
+            group.batch.change_model(values, own)
+
+    @one_thread_at_a_time
+    def change_settings(self, settings: Mapping[str, Any], mask=None) -> None:
+        """Set settings of some environments from their next reset on; see `VectorEnv.change_settings`."""
+        self._check_open("change settings")
+        chosen, mask = [], self._mask(mask, "mask")
+        for group, indices, _ in self._places:
+            if mask[indices].any():
+                chosen.append((group, mask[indices], group._checked_changes(settings)))
+        for group, own, changes in chosen:
+            group._put_changes(own, changes, CURRICULUM[1] in settings)
+
+    @one_thread_at_a_time
     def rest(self, mask) -> None:
         """Let environments, and no others, stand still until they are reset; see `VectorEnv.rest`."""
         self._check_open("rest")
@@ -266,7 +292,7 @@ class BodiesEnv(Together):
             own["steps"] = steps[place.indices] if steps.shape == (self.num_envs,) else steps
             checked.append(place.group._checked_snapshot(own))
         for place, snapshot in zip(self._places, checked, strict=True):
-            snapshots.put(place.group, snapshot)
+            place.group._put(snapshot)
         self._begun = True
 
     @one_thread_at_a_time

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.envs.bodies import stacked
+from arc_suite.envs import stacked
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.simulation.batch import layout
 from arc_suite.tasks import Task
@@ -33,13 +33,7 @@ class Group(VectorEnv):
 
     def _prepared(self):
         tasks, models = zip(*self._members, strict=True)
-        self._stacked = any(task is not tasks[0] for task in tasks)
-        if not self._stacked:
-            return tasks[0], list(tasks), models[0]
-        return stacked.stacked(tasks), list(tasks), list(models)
-
-    def _part(self, mask: np.ndarray) -> Task:
-        return stacked.part(self._task, np.flatnonzero(mask)) if self._stacked and not mask.all() else self._task
+        return list(tasks), models[0] if all(task is tasks[0] for task in tasks) else list(models)
 
 
 class Place(NamedTuple):

@@ -1,4 +1,4 @@
-"""One task for a batch of different bodies: numbers that follow from the body get a leading axis.
+"""One task for a batch of different bodies or settings: numbers that differ get a leading axis.
 
 The functions of a task stay as they are, as its arrays may have any leading axes. Bodies of one batch have
 the same legs, joints and parts; see `kind`.
@@ -14,7 +14,6 @@ from arc_suite.envs import trees
 from arc_suite.tasks.clock import Clock, Clocks
 from arc_suite.tasks.contract import Task
 
-_EQUAL = ("weights",)  # fields that tasks of one kind share
 _AGAINST_FEET = ("stance_threshold",)  # numbers that are compared with those of every foot
 
 
@@ -24,7 +23,7 @@ def kind(task: Task) -> Hashable | None:
     if not all(vars(type(each)).get("from_body") for each in (task, inner)):  # of the class itself
         return None
     scene = task.scene
-    return type(task), type(inner), repr(scene.layout), scene.arena, tuple(task.settings.weights.items())
+    return type(task), type(inner), repr(scene.layout), scene.arena, tuple(task.settings.weights), task.structure
 
 
 def stacked(tasks: Sequence[Task]) -> Task:
@@ -37,11 +36,6 @@ def stacked(tasks: Sequence[Task]) -> Task:
         tasks: of one kind.
     """
     return _with_values(tasks[0], {name: _stacked([_value(t, name) for t in tasks]) for name in _names(tasks[0])})
-
-
-def part(task: Task, indices: np.ndarray) -> Task:
-    """Return the task of some environments of a stacked one."""
-    return _with_values(task, {name: _part(_value(task, name), indices) for name in _names(task)})
 
 
 def _names(task: Task) -> tuple[str, ...]:
@@ -70,30 +64,15 @@ def _stacked(values: Sequence[Any], name: str = "") -> Any:
     if isinstance(first, Task):
         return stacked(values)
     if isinstance(first, Clock):
-        return Clocks.of(values)
-    if name in _EQUAL:
-        return first
+        return first if all(value is first for value in values) else Clocks.of(values)
     if isinstance(first, dict):
         return {key: _stacked([value[key] for value in values]) for key in first}
     if isinstance(first, tuple):
         names = getattr(first, "_fields", ("",) * len(first))
         return trees.rebuilt(first, [_stacked(items, field) for field, *items in zip(names, *values, strict=True)])
     if isinstance(first, (np.ndarray, float, int)):
+        if all(np.array_equal(value, first) for value in values):
+            return first
         numbers = np.stack(values)
         return numbers[:, None] if name in _AGAINST_FEET else numbers
     return first
-
-
-def _part(value: Any, indices: np.ndarray, name: str = "") -> Any:
-    if isinstance(value, Task):
-        return part(value, indices)
-    if isinstance(value, Clocks):
-        return value.part(indices)
-    if name in _EQUAL:
-        return value
-    if isinstance(value, dict):
-        return {key: _part(item, indices) for key, item in value.items()}
-    if isinstance(value, tuple):
-        names = getattr(value, "_fields", ("",) * len(value))
-        return trees.rebuilt(value, [_part(item, indices, field) for field, item in zip(names, value, strict=True)])
-    return value[indices] if isinstance(value, np.ndarray) else value

@@ -1,0 +1,311 @@
+"""Model fields and settings that change while environments run: one is a vector to the bit, and nothing is silent."""
+
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+import arc_suite
+from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.envs.gym import Env
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.simulation.model import FIELDS, field
+from arc_suite.tasks import TASKS
+
+NUM_ENVS, SHORT = 3, {"time_limit": 1.0}
+SOME = np.array([True, False, True])
+MODEL = {"gravity": (0.0, 0.0, -4.0), "pair_friction": 1e-3, "body_mass": 2.0}
+
+
+def both(task, **settings):
+    vector = VectorEnv("tick", task, NUM_ENVS, 2, "SameStep", task_kwargs=SHORT | settings)
+    singles = [Env("tick", task, SHORT | settings) for _ in range(NUM_ENVS)]
+    vector.reset(seed=3)
+    for index, single in enumerate(singles):
+        single.reset(seed=3 + index)
+    return vector, singles
+
+
+def change(vector, singles, call, values, mask):
+    getattr(vector, call)(values, mask)
+    for single, there in zip(singles, mask, strict=True):
+        if there:
+            getattr(single, call)(values)
+
+
+def assert_steps_are_equal(vector, singles, actions):
+    for action in actions:
+        observations, rewards, *ends, _ = vector.step(action)
+        for index, single in enumerate(singles):
+            observation, reward, terminated, truncated, _ = single.step(action[index])
+            if terminated or truncated:
+                observation, _ = single.reset()
+            np.testing.assert_array_equal(observations[index], observation)
+            assert (rewards[index], ends[0][index], ends[1][index]) == (reward, terminated, truncated)
+
+
+@pytest.mark.parametrize("task", ["walk", "shoved", "rough", "navigate"])
+def test_one_is_a_vector_over_resets_pickles_and_snapshots(task):
+    vector, singles = both(task)
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (80, NUM_ENVS, 18)).astype(np.float32)
+    change(vector, singles, "change_model", MODEL, SOME)
+    change(vector, singles, "change_settings", {"weights": {"control": 0.0}, "gait_frequency": 2.0}, ~SOME)
+    assert_steps_are_equal(vector, singles, actions[:30])
+    vector, singles = pickle.loads(pickle.dumps((vector, singles)))
+    change(vector, singles, "change_settings", {"duty_factor": 0.7}, SOME)
+    assert_steps_are_equal(vector, singles, actions[30:50])
+    again, alone = both(task)
+    again.restore(vector.snapshot())
+    for single, fresh in zip(singles, alone, strict=True):
+        fresh.restore(single.snapshot())
+    assert_steps_are_equal(again, alone, actions[50:])
+
+
+def test_different_bodies_change_too():
+    bodies = BodiesEnv("walk", 4, "varied:0-1", task_kwargs=SHORT)
+    twin = BodiesEnv("walk", 4, "varied:0-1", task_kwargs=SHORT)
+    action = np.zeros(bodies.action_space.shape)
+    for each in (bodies, twin):
+        each.reset(seed=0)
+    bodies.change_model({"gravity": (0.0, 0.0, 0.0)}, np.array([True, False, False, False]))
+    bodies.change_settings({"weights": {"healthy": 0.0}}, np.array([False, True, False, False]))
+    bodies.reset(seed=0), twin.reset(seed=0)
+    for _ in range(10):
+        rewards, plain = bodies.step(action)[1], twin.step(action)[1]
+    assert rewards[1] == pytest.approx(plain[1] - 1.0)
+    assert (rewards == plain).tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize("name", FIELDS)
+def test_every_field_moves_what_follows(name):
+    """What pairs of contacts do not read is refused in walk; pillars read it."""
+    observations = []
+    for change in (False, True):
+        environment = Env("tick", "navigate" if name == "geom_friction" else "walk", {"base_noise": 0.0})
+        environment.reset(seed=0)
+        value = field(environment.unwrapped._env.physics.model.ptr, name)
+        if change and name == "geom_friction":
+            environment.change_model({name: value})
+            return
+        environment.change_model({name: 0.5 * value + 0.01} if change else {})
+        observations.append([environment.step(np.full(18, 0.1, np.float32))[0] for _ in range(10)])
+    assert not np.array_equal(*observations)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        (
+            {"body_mas": 1.0},
+            "unknown model field 'body_mas'; did you mean 'body_mass'? (there are: gravity, body_mass, ",
+        ),
+        ({"geom_friction": 1.0}, "model field 'geom_friction': contacts of this model read pair_friction; change that"),
+        ({"gravity": (1.0, 2.0)}, "model field 'gravity': expected numbers of shape (3,), got (1.0, 2.0)"),
+        (
+            {"body_mass": 0.0},
+            "model field 'body_mass': expected numbers from 0 to 1e+06, above 0 where the model's are",
+        ),
+        ({"gravity": np.nan}, "model field 'gravity': expected numbers from -1e+06 to 1e+06, got nan"),
+        ([1], "model: expected a mapping of names to values, got [1]"),
+    ],
+)
+def test_fields_that_do_not_fit(fields, message):
+    vector, singles = both("walk")
+    for each in (singles[0], arc_suite.load("tick", "walk")):
+        with pytest.raises(ValueError) as caught:
+            each.change_model(fields)
+        assert str(caught.value).startswith(message)
+    with pytest.raises(ValueError) as caught:
+        vector.change_model(fields)
+    assert str(caught.value).startswith(message.replace("(3,)", "(3, 3)"))
+
+
+def test_models_of_a_vector_are_read_only():
+    vector, _ = both("walk")
+    model = vector.batch.models[0]
+    with pytest.raises(ValueError, match="read-only"):
+        model.opt.gravity[:] = 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        model.pair_friction *= 0.5
+    with pytest.raises(AttributeError) as caught:
+        model.opt.timestep = 1.0
+    assert str(caught.value) == "cannot set 'timestep': models are read-only; use change_model of the environments"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"time_limit": 3.0}, "setting 'time_limit': environments keep it; open another environment"),
+        ({"random": 3}, "setting 'random': environments keep it; reset(seed=...) begins a stream"),
+        ({"dificulty": 1}, "unknown setting of rough 'dificulty'; did you mean 'difficulty'?"),
+        (
+            {"difficulty": 1.0},
+            "settings 'difficulty': they would change the ground, which environments keep; open another environment",
+        ),
+        ({"kicks": 1.0}, "settings 'kicks': they would change the motors, senses or kicks, which environments keep;"),
+        ({"gait_frequency": "fast"}, "gait_frequency: expected a "),
+    ],
+)
+def test_settings_that_do_not_fit(settings, message):
+    for each in (*both("rough")[1][:1], both("rough")[0], arc_suite.load("tick", "rough")):
+        with pytest.raises(ValueError) as caught:
+            each.change_settings(settings)
+        assert str(caught.value).startswith(message)
+
+
+def test_settings_hold_from_the_next_reset_on():
+    single = Env("tick", "walk")
+    single.reset(seed=0)
+    single.change_settings({"target_velocity": 0.5})
+    assert single.task.definition.target_velocity == 0.33
+    single.reset()
+    assert single.task.definition.target_velocity == 0.5
+
+
+def test_attributes_that_nothing_reads_are_errors():
+    vector, (single, *_) = both("walk")
+    runs = arc_suite.load("tick", "walk")
+    message = "cannot set '{}': there is no such attribute; change_settings of the environment changes settings"
+    for each in (vector, vector.task, single, single.task, runs, runs.task):
+        for name in ("target_velocity", "nonsense"):
+            with pytest.raises(AttributeError) as caught:
+                setattr(each, name, 1)
+            assert str(caught.value) == message.format(name)
+    for each in (vector, SyncVectorEnv([lambda: gymnasium.make("arc_suite/tick-walk-v0")])):
+        with pytest.raises(AttributeError) as caught:
+            each.set_attr("target_velocity", 0.5)
+        assert str(caught.value) == message.format("target_velocity")
+
+
+def test_environments_of_gymnasium_take_changes():
+    make = lambda: gymnasium.make("arc_suite/tick-walk-v0")  # noqa: E731
+    rewards = []
+    for vector in (SyncVectorEnv([make] * 2), AsyncVectorEnv([make] * 2)):
+        vector.reset(seed=0)
+        vector.call("change_settings", {"weights": {"forward": 0.0}})
+        vector.call("change_model", {"gravity": (0.0, 0.0, -1.0)})
+        vector.reset(seed=0)
+        rewards.append(vector.step(np.zeros((2, 18), np.float32))[1])
+        vector.close()
+    np.testing.assert_array_equal(*rewards)
+    own = VectorEnv("tick", "walk", 2)
+    own.call("change_settings", {"weights": {"forward": 0.0}})
+    own.call("change_model", {"gravity": (0.0, 0.0, -1.0)})
+    own.reset(seed=0)
+    np.testing.assert_array_equal(own.step(np.zeros((2, 18)))[1], rewards[0])
+
+
+def test_one_environment_and_a_vector_of_one_share_snapshots():
+    single, vector, action = Env("tick", "steer"), VectorEnv("tick", "steer", 1), np.full(18, 0.2, np.float32)
+    single.reset(seed=7)
+    for _ in range(5):
+        single.step(action)
+    arrays = single.snapshot()
+    vector.restore(arrays)
+    expected = single.step(action)
+    found = vector.step(action[None])
+    np.testing.assert_array_equal(found[0][0], expected[0])
+    assert found[1][0] == expected[1]
+    back = arc_suite.load("tick", "steer")
+    back.restore(vector.snapshot())
+    assert back.step(action).reward == single.step(action)[1]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_one_environment_goes_back(task):
+    single = Env("tick", task, {"time_limit": 0.5})
+    actions = np.random.default_rng(0).uniform(-0.5, 0.5, (25, 18)).astype(np.float32)
+    single.reset(seed=1)
+    for action in actions[:3]:
+        single.step(action)
+    arrays, runs = single.snapshot(), []
+    for _ in range(2):
+        single.restore(arrays)
+        run = []
+        for action in actions[3:]:
+            observation, reward, terminated, truncated, _ = single.step(action)
+            run.append(np.append(observation, reward))
+            if terminated or truncated:
+                run.append(np.append(single.reset()[0], 0.0))
+        runs.append(run)
+    np.testing.assert_array_equal(*runs)
+
+
+@pytest.mark.parametrize("name", ["memory/2", "memory/6", "steps", "stream/0/0"])
+@pytest.mark.parametrize("value", [1e300, 10**15])
+def test_snapshots_with_nonsense_are_refused(name, value):
+    single = Env("tick", "rough", {"curriculum": True})
+    single.reset(seed=0)
+    arrays = single.snapshot()
+    if arrays[name].dtype.kind != "f" and value > 1e18:
+        value = 10**18
+    arrays[name] = np.full_like(arrays[name], value)
+    with pytest.raises(ValueError) as caught:
+        single.restore(arrays)
+    assert str(caught.value).endswith(": expected finite numbers of at most 1e+10")
+
+
+@pytest.mark.parametrize("text", ['{"arena": "os:path"}', "[" * 9000, '{"nothing": 1}', "3", "{"])
+def test_settings_of_a_snapshot_are_checked(text):
+    single = Env("tick", "walk")
+    single.reset(seed=0)
+    names = "settings/present", "settings/next"
+    with pytest.raises(ValueError, match="^snapshot: of another task or number of environments: "):
+        single.restore(single.snapshot() | {name: np.array([text]) for name in names})
+
+
+def test_resets_without_steps_leave_a_curriculum_where_it_is():
+    level = lambda env: env.task.memory.ground.level  # noqa: E731
+    single = Env("tick", "rough", {"curriculum": True, "level": 5})
+    single.reset(seed=0)
+    levels = []
+    for steps in (0, 0, 1, 13):  # a cycle of the gait takes 13.3 steps
+        for _ in range(steps):
+            single.step(np.zeros(18, np.float32))
+        single.reset()
+        levels.append(level(single))
+    assert levels == [5, 5, 5, 5]
+    for _ in range(14):
+        single.step(np.zeros(18, np.float32))
+    single.reset()
+    assert level(single) == 4
+    single.change_settings({"level": 8})
+    single.reset()
+    assert level(single) == 8
+
+
+@pytest.mark.parametrize("make", [lambda: VectorEnv("tick", "walk", 2), lambda: BodiesEnv("walk", 2)])
+def test_options_of_reset_of_vectors(make):
+    with pytest.raises(ValueError) as caught:
+        make().reset(options={"reset_masks": [True, False]})
+    message = "unknown option of reset 'reset_masks'; did you mean 'reset_mask'? (there are: reset_mask)"
+    assert str(caught.value) == message
+
+
+def test_options_of_reset_of_one():
+    with pytest.raises(ValueError) as caught:
+        gymnasium.make("arc_suite/tick-walk-v0").reset(options={"reset_mask": 1})
+    assert str(caught.value) == (
+        "unknown option of reset 'reset_mask': one environment has none; vector ones have reset_mask"
+    )
+
+
+@pytest.mark.parametrize("make", [gymnasium.make, gymnasium.make_vec])
+def test_more_steps_than_an_episode_has(make):
+    with pytest.raises(ValueError) as caught:
+        make("arc_suite/tick-walk-v0", max_episode_steps=3000)
+    assert str(caught.value) == (
+        "max_episode_steps: episodes of this task end after 1000 steps, got 3000; longer ones need "
+        "task_kwargs={'time_limit': 150}, too"
+    )
+    longer = make("arc_suite/tick-walk-v0", max_episode_steps=3000, task_kwargs={"time_limit": 150.0})
+    steps = longer.spec.max_episode_steps if make is gymnasium.make else longer.step_limit
+    assert steps == 3000
+    assert make("arc_suite/tick-walk-v0", task_kwargs={"time_limit": 2.0})
+
+
+def test_a_renderer_of_the_user_has_room():
+    buffer = arc_suite.load("tick", "walk").physics.model.ptr.vis.global_
+    assert buffer.offwidth >= 1920 and buffer.offheight >= 1080  # `mujoco.Renderer` refuses more than that
