@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
+from episodes import begun
 from tiers import tiers
 
 import arc_suite
@@ -88,12 +89,10 @@ def test_near_cameras_frame_the_standing_body(body, camera):
 
 @every_robot
 def test_pictures_show_something_and_differ_by_camera(robot):
-    environment = arc_suite.load(robot, "walk", {"random": 0})
-    environment.reset()
+    environment = begun(robot)
     pictures = [environment.physics.render(90, 120, camera) for camera in ("tracking", "portrait", "profile")]
     for i, picture in enumerate(pictures):
-        assert picture.shape == (90, 120, 3)
-        assert picture.dtype == np.uint8
+        assert (picture.shape, picture.dtype) == ((90, 120, 3), np.uint8)
         assert picture.std() > 10.0
         assert (picture == 255).mean() < 0.02  # hardly anything is over-exposed
         assert not any(np.array_equal(picture, other) for other in pictures[:i])
@@ -107,10 +106,8 @@ def glow_in(physics) -> np.ndarray:
 @pytest.mark.slow
 @every_robot
 def test_visualize_reward_colours_the_glow(robot):
-    plain = arc_suite.load(robot, "walk", {"random": 0})
-    shown = arc_suite.load(robot, "walk", {"random": 0}, visualize_reward=True)
-    for environment in (plain, shown):
-        environment.reset()
+    plain, shown = begun(robot), arc_suite.load(robot, "walk", {"random": 0}, visualize_reward=True)
+    shown.reset()
     own = compiled(ROBOTS[robot], True).mat("glow").rgba
     np.testing.assert_array_equal(glow_in(plain.physics), own)
     np.testing.assert_array_equal(glow_in(shown.physics), own)
@@ -123,8 +120,6 @@ def test_visualize_reward_colours_the_glow(robot):
     assert (before != after).any()
     shown.reset()
     np.testing.assert_array_equal(glow_in(shown.physics), own)
-    for environment in (plain, shown):
-        environment.close()
 
 
 def test_reward_colours_go_from_red_to_green():

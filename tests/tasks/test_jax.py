@@ -2,6 +2,7 @@
 
 import pathlib
 import re
+import types
 
 import numpy as np
 import pytest
@@ -18,14 +19,8 @@ GUIDE = (pathlib.Path(__file__).parents[2] / "docs" / "adding_a_task.md").read_t
 
 BODIES = {"queen": ROBOTS["queen"], "leaper": ROBOTS["leaper"], "random": generator.random_body(3)}
 NUM_ENVS, STEPS = 3, 60
-MODIFIERS = {
-    "kicks": 1.0,
-    "motor_strength": (0.5, 1.0),
-    "actuator_failure": True,
-    "observation_noise": 1.0,
-    "delay": (0, 3),
-}
-MODIFIERS |= {"actions": "position", "exclude_blocks": "gait_clock"}
+MODIFIERS = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "actuator_failure": True, "observation_noise": 1.0}
+MODIFIERS |= {"delay": (0, 3), "actions": "position", "exclude_blocks": "gait_clock"}
 
 
 def assert_close(ours, theirs):
@@ -45,7 +40,6 @@ def recorded(body, task_name, settings):
         action = random.uniform(-0.4, 0.4, envs.action_space.shape)
         envs.step(action)
         yield task, memory, action, {name: getattr(envs.batch.data, name).copy() for name in task.reads}
-    envs.close()
 
 
 PLACES = [
@@ -71,7 +65,7 @@ def test_the_term_and_the_block_of_the_guide():
 def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
     def step(task, memory, action, fields):
         """A control step as a driver runs it, without the simulation: everything that a task computes."""
-        readings = task.read(Fields(fields))
+        readings = task.read(types.SimpleNamespace(**fields))
         memory, inputs = task.before(memory, action)
         memory = task.after(memory, readings)
         ends = tuple(end | np.zeros((), bool) for end in task.ended(memory, readings))
@@ -98,10 +92,3 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
         expected = step(task, memory, action, fields)
         for function in compiled.values():
             assert_close(expected, function(*jax.tree.map(jax.numpy.asarray, (memory, action, fields))))
-
-
-class Fields:
-    """Fields of a simulation by name."""
-
-    def __init__(self, fields):
-        self.__dict__.update(fields)
