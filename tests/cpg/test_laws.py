@@ -1,8 +1,5 @@
 """Laws as pure functions: held at stops, the same under JAX, fitted to a task however it is given."""
 
-import pathlib
-import re
-
 import gymnasium
 import numpy as np
 import pytest
@@ -132,8 +129,3 @@ def test_what_suits_a_task_follows_from_its_attributes(monkeypatch):
     assert suited_preset(arc_suite.load("tick", "ragged", {"kicks": 1.0}).task.definition) == "surefooted"
     with pytest.raises(ValueError, match="^task stay: nothing suits .*steered"):
         suited_preset(arc_suite.load("tick", "stay").task.definition)
-
-
-def test_guide():
-    pages = pathlib.Path(__file__).parents[2] / "docs" / "demonstrators.md"
-    exec("".join(re.findall(r"```python\n(.*?)```", pages.read_text(), re.DOTALL)), {})
