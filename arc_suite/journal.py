@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from arc_suite import files
+from arc_suite import checks, files
 
 
 class Journal:
@@ -73,8 +73,9 @@ def _generations(path: Path, text: bytes, header: bytes, generation: Callable[..
         wanted = json.loads(header)
         differing = [name for name in wanted if found[name] != wanted[name]]
         generations = [generation(**line) for line in lines]
-    except (ValueError, LookupError, TypeError):
+    except (ValueError, LookupError, TypeError, RecursionError):
         raise ValueError(f"{path}: no journal of a search; {advice}") from None
     for name in differing:
-        raise ValueError(f"{path}: of a search with {name} {found[name]}, not {wanted[name]}; {advice}")
+        there, asked = checks.quoted(found[name]), checks.quoted(wanted[name])
+        raise ValueError(f"{path}: of a search with {name} {there}, not {asked}; {advice}")
     return generations

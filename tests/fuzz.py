@@ -1,4 +1,4 @@
-"""Damages files at random and reads them: specs, tracks and datasets; `make check-fuzz`, some minutes.
+"""Damages files at random and reads them: specs, tracks, policies, journals, datasets; `make check-fuzz`, minutes.
 
 `python tests/fuzz.py` prints, for each kind of file, how many damaged ones were read all the same,
 refused in one line, ended in a traceback, crashed, or took too long. Each is read in a process of its
@@ -7,6 +7,7 @@ status 1 if anything but that happened. The same seed damages the same places. L
 """
 
 import argparse
+import contextlib
 import functools
 import json
 import os
@@ -24,8 +25,10 @@ import numpy as np
 from tqdm import tqdm
 
 import arc_suite
-from arc_suite import data, policies, style
+from arc_suite import data, evaluation, policies, style
 from arc_suite.envs.setup import Setup
+from arc_suite.journal import Journal
+from arc_suite.policies import network
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
@@ -78,9 +81,42 @@ def _continue() -> None:
 _USES = (lambda: list(data.open(ID)), lambda: data.verify(ID, progress=QUIET), _continue)
 
 
+def _make_policy() -> None:
+    """Leave a policy, and its header as a file of its own: an archive notices most damage by itself."""
+    shutil.copy(network.PACKAGED / "tick-walk.npz", "policy.npz")
+    with np.load("policy.npz") as arrays:
+        pathlib.Path("header.json").write_text(str(arrays["policy"]))
+
+
+def _act() -> None:
+    policy = policies.policy("./policy.npz", "tick")
+    evaluation.run(arc_suite.load("tick", "walk", {"time_limit": 0.2}), policy, 0)
+
+
+def _act_by_header() -> None:
+    with np.load("policy.npz") as arrays:
+        np.savez("policy.npz", **{**arrays, "policy": np.array(pathlib.Path("header.json").read_text("latin-1"))})
+    _act()
+
+
+def _search() -> None:
+    with contextlib.closing(Journal("journal.jsonl", {"seed": 0, "task": "walk"}, Generation)) as journal:
+        journal.append(Generation(1.5, (0.25, -0.5)))
+
+
+class Generation(NamedTuple):
+    """Of a search that is none."""
+
+    reward: float
+    result: tuple[float, ...]
+
+
 KINDS = {
     "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),
     "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),)),
+    "policy": Kind("policy.npz", _make_policy, (_act,)),
+    "header of a policy": Kind("header.json", _make_policy, (_act_by_header,)),
+    "journal of a search": Kind("journal.jsonl", _search, (_search,)),
     "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _USES),
     "episodes of a dataset": Kind(f"datasets/{ID}/data/main_data.hdf5", _collect, _USES, may_loop=True),
 }
@@ -89,7 +125,10 @@ KINDS = {
 def damaged(sound: bytes, random: np.random.Generator) -> bytes:
     """Return a file with a few bytes changed, cut out, doubled or put in; of JSON also with an odd value in it."""
     if sound.startswith(b"{") and random.integers(2):
-        return _oddly_valued(sound, random)
+        first, *others = (
+            sound.splitlines(keepends=True) if sound.startswith(b'{"') else [sound]
+        )  # a line is JSON, or all
+        return b"".join([_oddly_valued(first, random), b"\n" * bool(others), *others])
     # Half of the places lie anywhere, half near the beginning, where binary files describe themselves.
     first = int(random.integers(len(sound)) if random.integers(2) else len(sound) ** random.uniform()) % len(sound)
     last = first + int(random.integers(1, 9))
