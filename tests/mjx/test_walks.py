@@ -53,15 +53,8 @@ def test_tasks_with_a_command(task):
     np.testing.assert_allclose(progress["gait_compliance"], expected["gait_compliance"], atol=0.05)
 
 
-MODIFIERS = {
-    "kicks": 1.0,
-    "motor_strength": (0.5, 1.0),
-    "friction": (0.5, 1.0),
-    "mass": (0.8, 1.2),
-    "observation_noise": 1.0,
-    "delay": (0, 3),
-    "actions": "position",
-}
+MODIFIERS = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "friction": (0.5, 1.0), "mass": (0.8, 1.2)}
+MODIFIERS |= {"observation_noise": 1.0, "delay": (0, 3), "actions": "position"}
 
 
 def test_modifiers():

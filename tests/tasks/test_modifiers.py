@@ -142,22 +142,6 @@ def test_the_draws_are_these_in_this_order():
     assert_allclose(first + last, GOLDEN, rtol=1e-15)
 
 
-def test_draws_are_spread_as_they_say():
-    random = np.random.RandomState(0)
-    drawn = [modified_task.draw(random, 6) for _ in range(2000)]
-    gaps = np.diff([one.kick_steps for one in drawn], prepend=0, axis=-1)
-    assert (gaps.min(), gaps.max()) == (40, 120)
-    assert gaps.mean() == pytest.approx(80.0, abs=0.5)
-    sizes, directions = (np.ravel([getattr(one, name) for one in drawn]) for name in ("kick_sizes", "kick_directions"))
-    assert sizes.mean() == pytest.approx(0.5, abs=0.01) and 0.0 <= sizes.min() < 0.001 and 0.999 < sizes.max() < 1.0
-    assert abs(np.exp(1j * directions).mean()) < 0.01
-    assert_allclose(np.bincount([one.leg for one in drawn]) / 2000, 1 / 6, atol=0.03)
-    for name in ("strength", "friction", "mass", "delay"):
-        shares = np.array([getattr(one, name) for one in drawn])
-        assert shares.mean() == pytest.approx(0.5, abs=0.03) and shares.std() == pytest.approx(12**-0.5, abs=0.02)
-    assert len({int(one.noise_key) for one in drawn}) == 2000
-
-
 def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_again():
     environment = begun("tick", "walk", kicks=1.5, time_limit=math.inf)
     task, memory, seen = environment.task.definition, environment.task.memory, {}
