@@ -78,10 +78,3 @@ def test_bad_input_is_one_line_and_exit_status_1(root, arguments, message):
 def test_an_unknown_dataset_is_one_line_with_the_folder(root):
     line = f"arc-suite collect: unknown dataset 'arc_suite/queen/cpg-v0': there are none in {root}\n"
     programs.refused(run("--verify=arc_suite/queen/cpg-v0"), line)
-
-
-@pytest.mark.slow
-def test_without_minari_a_line_says_what_to_install(tmp_path):
-    done = programs.without("minari", tmp_path, "collect", "--episodes=1")
-    line = f"arc-suite collect: datasets need Minari: {programs.install('data')} (No module named 'minari')\n"
-    programs.refused(done, line)

@@ -29,16 +29,6 @@ def test_evaluate_takes_a_spec_and_a_body_made_to_order():
     assert done.stdout.splitlines()[-1].split()[0] == "walker_4x2"
 
 
-@pytest.mark.slow
-def test_render_takes_a_body_made_to_order(tmp_path):
-    path = tmp_path / "walker.png"
-    done = programs.arc_suite("render", "--legs=5", "--steps=5", "--width=64", "--height=48", "--output", path)
-    if "cannot render" in done.stderr:
-        pytest.skip("no OpenGL here")
-    assert programs.passed(done).startswith("walker_5x3: return ")
-    assert path.read_bytes().startswith(b"\x89PNG")
-
-
 @pytest.mark.parametrize("program", ["evaluate", "render", "style", "collect"])
 @pytest.mark.parametrize(
     ("arguments", "message"),
@@ -121,19 +111,3 @@ def test_gymnasium_takes_a_body_where_a_robot_stands(body):
     made = gymnasium.make("arc_suite/queen-walk-v0", domain_name=body)
     np.testing.assert_array_equal(made.reset(seed=7)[0], observation)
     made.close()
-
-
-def test_environments_of_a_body_are_bit_equal_to_single_environments():
-    body = load_body(SPIDER)
-    envs = gymnasium.make_vec("arc_suite/queen-walk-v0", num_envs=2, domain_name=body)
-    singles = [Env(body, "walk") for _ in range(2)]
-    batch, _ = envs.reset(seed=3)
-    np.testing.assert_array_equal(batch, [env.reset(seed=3 + i)[0] for i, env in enumerate(singles)])
-    random = np.random.default_rng(0)
-    for _ in range(5):
-        actions = random.uniform(-1.0, 1.0, envs.action_space.shape).astype(np.float32)
-        batch, rewards, *_ = envs.step(actions)
-        steps = [env.step(action) for env, action in zip(singles, actions, strict=True)]
-        np.testing.assert_array_equal(batch, [step[0] for step in steps])
-        np.testing.assert_array_equal(rewards, [step[1] for step in steps])
-    envs.close()

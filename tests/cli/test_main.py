@@ -95,6 +95,27 @@ def test_modules_of_the_current_folder_come_last(tmp_path):
     programs.refused(done, "arc-suite evaluate: policy 'lop:make': No module named 'lop'\n")
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("module", "extra", "command", "needed"),
+    [
+        ("minari", "learn", "study --help", "studies need JAX, Minari and matplotlib"),
+        ("minari", "data", "collect --episodes=1", "datasets need Minari"),
+        ("minari", "data", "style --policy=arc_suite/tick/noisy-v0", "datasets need Minari"),
+        ("matplotlib", "animate", "style --output=pictures", "pictures need matplotlib"),
+        ("imageio_ffmpeg", "video", "render --steps=1 --output=a.mp4", "MP4 needs imageio-ffmpeg"),
+        ("viser", "animate", "studio --robot=tick", "the studio needs viser"),
+        ("submitit", "learn", "study paper --submit=2", "--submit needs submitit"),
+        ("jax", "learn", "train", "training needs JAX"),
+    ],
+)
+def test_without_an_extra_a_line_says_what_to_install(tmp_path, monkeypatch, module, extra, command, needed):
+    monkeypatch.chdir(tmp_path)
+    program, *flags = command.split()
+    line = f"arc-suite {program}: {needed}: {programs.install(extra)} (No module named '{module}')\n"
+    programs.refused(programs.without(module, tmp_path, program, *flags), line)
+
+
 @functools.cache
 def help_of(program):
     return programs.passed(run(program, "--help"))

@@ -36,7 +36,4 @@ code --flag
     words, sentences = count_words.count(text)
     assert words == 19
     assert sentences == [2, 5, 2, 5, 1, 2, 1, 1]
-
-
-def test_a_long_sentence_counts():
     assert count_words.short([5, 25, 26, 5]) == 0.75

@@ -64,14 +64,6 @@ def test_any_program_takes_it(trained, body):
     assert one.total == pytest.approx(together[1].total, rel=1e-4) and one.length == together[1].length
 
 
-def test_a_file_of_it_is_read_as_it_was_written(trained):
-    read, made = network.load(trained), drawn()
-    assert read.setup == made.setup and read.setup.robot == "random:0-1" and read.blocks == made.blocks
-    assert read.graph.nodes == made.graph.nodes and read.graph.arrays.keys() == made.graph.arrays.keys()
-    for name, array in read.graph.arrays.items():
-        assert_array_equal(array, made.graph.arrays[name])
-
-
 def test_a_damaged_file_is_one_line(tmp_path):
     made, path = drawn(), tmp_path / "policy.npz"
     graph, at = made.graph, {node.operator: index for index, node in enumerate(made.graph.nodes)}

@@ -125,14 +125,6 @@ def test_settings_of_the_task_are_seen(tmp_path):
     assert quick.stdout != plain.stdout
 
 
-@pytest.mark.slow
-def test_mp4_without_its_encoder_says_what_to_install(tmp_path):
-    path = tmp_path / "a.mp4"
-    done = programs.without("imageio_ffmpeg", tmp_path, "render", "--steps=1", f"--output={path}")
-    message = f"MP4 needs imageio-ffmpeg: {programs.install('video')} (No module named 'imageio_ffmpeg')"
-    programs.refused(done, f"arc-suite render: {message}\n")
-
-
 def test_a_take_stays_at_its_end():
     environment = arc_suite.load("leaper", "walk", {"random": 0})
     footage = films.Footage("leaper", environment, alone(policy("random", "leaper"), 0), "profile", (64, 48))

@@ -94,20 +94,6 @@ def test_a_dataset_beside_its_demonstrator(tmp_path, monkeypatch):
     assert float(change[0]) > float(change[1]) + 0.05
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("module", "extra", "flag", "needed"),
-    [
-        ("minari", "data", "--policy=arc_suite/tick/noisy-v0", "datasets need Minari"),
-        ("matplotlib", "animate", "--output=pictures", "pictures need matplotlib"),
-    ],
-)
-def test_without_an_extra_a_line_says_what_to_install(tmp_path, module, extra, flag, needed):
-    done = programs.without(module, tmp_path, "style", flag)
-    line = f"arc-suite style: {needed}: {programs.install(extra)} (No module named '{module}')\n"
-    programs.refused(done, line)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("task", ["steer", "staying:stay"])
 def test_other_tasks(tmp_path, task):

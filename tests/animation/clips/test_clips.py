@@ -375,12 +375,6 @@ def test_the_recording_is_the_episode_to_the_bit():
     np.testing.assert_array_equal(recording.qpos[::SUBSTEPS], poses[9:])
 
 
-@pytest.mark.release
-def test_the_same_bytes():
-    first, second = (export.glb(ROBOTS["tick"], export.clips(Setup.of("tick"), ["walk", "idle"])) for _ in range(2))
-    assert first == second
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

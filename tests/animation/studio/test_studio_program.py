@@ -1,9 +1,7 @@
-"""The program: what its flags say, and one line where viser is missing."""
+"""The program: what its flags say."""
 
 import subprocess
 import sys
-
-import programs
 
 from arc_suite.animation.studio.sketch import FILE, OWN, Sketch
 from arc_suite.robots import generator
@@ -42,10 +40,3 @@ def test_flags(tmp_path):
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert [eval(line) for line in done.stdout.splitlines()] == list(arguments.values())
-
-
-def test_without_viser_a_line_says_how_to_get_it(tmp_path):
-    done = programs.without("viser", tmp_path, "studio", "--robot=tick")
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith("arc-suite studio: the studio needs viser: pip install")
-    assert programs.install("animate") in done.stderr

@@ -86,11 +86,6 @@ def test_configurations_that_do_not_fit_are_one_line(text, line, tmp_path):
         configuration.read(tmp_path / "run.json")
 
 
-@pytest.mark.skipif(HAS_JAX, reason="JAX is installed")
-def test_without_jax_it_says_what_to_install(tmp_path):
-    programs.refused(run("train", cwd=tmp_path), f"arc-suite train: training needs JAX: {programs.install('learn')} (")
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

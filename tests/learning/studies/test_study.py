@@ -305,19 +305,6 @@ def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_without_the_extra_it_says_what_to_install(tmp_path):
-    done = programs.without("minari", tmp_path, "study", "--help")
-    line = f"studies need JAX, Minari and matplotlib: {programs.install('learn')} (No module named 'minari')"
-    programs.refused(done, f"arc-suite study: {line}\n")
-
-
-@pytest.mark.skipif(importlib.util.find_spec("submitit") is not None, reason="submitit is installed")
-def test_without_submitit_it_says_what_to_install(tmp_path):
-    done = programs.run("-m", "arc_suite", "study", "paper", "--submit=2", cwd=tmp_path)
-    programs.refused(done, f"arc-suite study: --submit needs submitit: {programs.install('learn')} (")
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("task", "presets"),
     [
