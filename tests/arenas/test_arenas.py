@@ -1,11 +1,13 @@
 """Arenas: the height of the ground is that of the geometry, and bodies start clear of it."""
 
+import itertools
+
 import mujoco
 import numpy as np
 import pytest
 import rays
 from numpy.testing import assert_allclose, assert_array_equal
-from tiers import tiers, turn
+from tiers import tiers, turns
 
 import arc_suite
 from arc_suite import models
@@ -17,13 +19,7 @@ BODIES = {**ROBOTS, "small": generator.scaled(generator.generate(6, 3), 0.1)}
 every_body = pytest.mark.parametrize("body", tiers(BODIES, lambda body: body in ("bastion", "small")))
 
 
-@pytest.mark.parametrize(
-    ("arena", "body"),
-    tiers(
-        [(arena, body) for arena in ARENAS for body in BODIES],
-        lambda arena, body: turn(body, BODIES, list(ARENAS).index(arena)),
-    ),
-)
+@pytest.mark.parametrize(("body", "arena"), tiers(itertools.product(BODIES, ARENAS), turns(BODIES, ARENAS)))
 def test_height_is_that_of_rays(arena, body):
     body = BODIES[body]
     place, height = ARENAS[arena](body), body.torso.standing_height

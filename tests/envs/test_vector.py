@@ -3,6 +3,7 @@
 import copy
 import functools
 import gc
+import itertools
 import pickle
 import sys
 
@@ -15,7 +16,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import vector as wrappers
 from numpy.testing import assert_array_equal
 from refusals import refused
-from tiers import never, tiers, turn
+from tiers import never, tiers, turns
 
 import arc_suite
 from arc_suite.envs.vector import VectorEnv
@@ -61,14 +62,7 @@ def arrays(value):
     return [value] if isinstance(value, np.ndarray) else []
 
 
-@pytest.mark.parametrize(
-    ("robot", "mode"),
-    tiers(
-        [(robot, mode) for robot in ROBOTS for mode in MODES],
-        never,
-        lambda robot, mode: turn(mode, MODES, ROBOTS.index(robot)),
-    ),
-)
+@pytest.mark.parametrize(("mode", "robot"), tiers(itertools.product(MODES, ROBOTS), never, turns(MODES, ROBOTS)))
 def test_environments_are_single_environments_whatever_the_threads(robot, mode):
     singles = make_singles(robot, 5, mode, task_kwargs=SHORT[robot])
     batches = [

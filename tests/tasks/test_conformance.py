@@ -13,7 +13,7 @@ from dm_env.test_utils import EnvironmentTestMixin
 from episodes import assert_same_steps, begun, flat, load, random_actions
 from numpy.testing import assert_array_equal
 from refusals import refused
-from tiers import never, tiers, turn
+from tiers import never, tiers, turns
 
 import arc_suite
 from arc_suite.robots import ROBOTS
@@ -21,10 +21,7 @@ from arc_suite.tasks import TASKS
 
 JOINTS = {name: len(body.joint_names) for name, body in ROBOTS.items()}
 # Robots take turns from task to task.
-every_task = pytest.mark.parametrize(
-    ("domain", "task"),
-    tiers(arc_suite.ALL_TASKS, check=lambda domain, task: turn(domain, JOINTS, list(TASKS).index(task))),
-)
+every_task = pytest.mark.parametrize(("domain", "task"), tiers(arc_suite.ALL_TASKS, check=turns(JOINTS, TASKS)))
 
 
 @pytest.mark.parametrize(
@@ -32,7 +29,7 @@ every_task = pytest.mark.parametrize(
     tiers(
         arc_suite.ALL_TASKS,
         check=lambda domain, task: (domain, task) in (("tick", "walk"), ("leaper", "roam"), ("bastion", "navigate")),
-        test=lambda domain, task: turn(domain, JOINTS, list(TASKS).index(task)),
+        test=turns(JOINTS, TASKS),
     ),
 )
 def test_dm_env_contract(domain, task):

@@ -1,5 +1,6 @@
 """The contract: every task of the registry, on every robot and another body, keeps it, where it takes place or may."""
 
+import itertools
 import types
 
 import gymnasium
@@ -8,7 +9,7 @@ import pytest
 import twins
 from numpy.testing import assert_array_equal
 from refusals import refused
-from tiers import tiers, turn
+from tiers import tiers, turn, turns
 
 import arc_suite
 from arc_suite.arenas import ARENAS
@@ -107,13 +108,7 @@ def leaves(value):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("task_name", "body"),
-    tiers(
-        [(task_name, body) for task_name in TASKS for body in BODIES],
-        lambda task_name, body: turn(body, BODIES, list(TASKS).index(task_name)),
-    ),
-)
+@pytest.mark.parametrize(("body", "task_name"), tiers(itertools.product(BODIES, TASKS), turns(BODIES, TASKS)))
 def test_the_number_of_draws_is_fixed(task_name, body):
     """Whatever is drawn, and whatever the settings are, the stream is at the same place afterwards."""
     task, _ = prepared(BODIES[body], task_name)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from refusals import refused
-from tiers import tiers, turn
+from tiers import tiers, turns
 
 import arc_suite
 from arc_suite.robots import ROBOTS, generator, mirror
@@ -118,9 +118,7 @@ def test_a_task_that_does_not_tell_is_refused():
         arc_suite.symmetry("tick", "stay")
 
 
-@pytest.mark.parametrize(
-    ("robot", "task"), tiers(arc_suite.ALL_TASKS, lambda robot, task: turn(robot, ROBOTS, list(TASKS).index(task)))
-)
+@pytest.mark.parametrize(("robot", "task"), tiers(arc_suite.ALL_TASKS, turns(ROBOTS, TASKS)))
 def test_every_task_has_a_mirror(robot, task):
     observation, _ = arc_suite.symmetry(robot, task)
     size = arc_suite.load(robot, task).task.definition.size
