@@ -7,7 +7,7 @@ from arc_suite.evaluation.protocol import (
     episodes,
     episodes_in_batch,
     expert_return,
-    published_finals,
+    published_returns,
     rollout,
     run,
 )
@@ -38,7 +38,7 @@ __all__ = [
     "mean_and_interval",
     "performance_profile",
     "probability_of_improvement",
-    "published_finals",
+    "published_returns",
     "rollout",
     "run",
     "summary",

@@ -9,7 +9,7 @@ import numpy as np
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.evaluation.published import DEMONSTRATORS, FINALS
+from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
 
 EPISODES = 10  # the paper's Section 6, Experimental Setting
@@ -33,18 +33,19 @@ class EpisodeResult(NamedTuple):
 
 def expert_return(setup: Setup) -> float | None:
     """Return what the paper's demonstrator earns; None for other tasks, settings and robots than the paper's."""
-    return DEMONSTRATORS.get(setup.name) if _is_published(setup) else None
+    return published.DEMONSTRATORS.get(setup.name) if _is_published(setup) else None
 
 
-def published_finals(setup: Setup, algorithms: Iterable[str]) -> dict[str, float]:
-    """Return the paper's returns after 1,000,000 steps by algorithm, of those given, or of the best without any.
+def published_returns(setup: Setup, algorithms: Iterable[str], steps: int) -> dict[str, float]:
+    """Return the paper's returns after environment steps by algorithm, of those given, or of the best without any.
 
-    Empty for other tasks, settings and robots than the paper's.
+    Empty for other tasks, settings and robots than the paper's, and before the first points of its curves.
     """
-    finals = FINALS.get(setup.name, {}) if _is_published(setup) else {}
-    if given := {name: finals[name] for name in algorithms if name in finals}:
+    curves = published.CURVES.get(setup.name, {}) if _is_published(setup) else {}
+    found = {name: point for name in curves if (point := published.at(setup.name, name, steps)) is not None}
+    if given := {name: found[name] for name in algorithms if name in found}:
         return given
-    return {name: value for name, value in finals.items() if value == max(finals.values())}
+    return {name: point for name, point in found.items() if point == max(found.values())}
 
 
 def _is_published(setup: Setup) -> bool:

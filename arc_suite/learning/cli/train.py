@@ -125,7 +125,7 @@ def picture(run: Configuration, folder: Path) -> Callable:
             lines = {"standing still": scale.zero}
             if scale.demonstrator is not None:
                 lines[f"demonstrator {scale.preset}"] = scale.demonstrator
-            finals = evaluation.published_finals(run.setup, [run.algorithm])
+            finals = evaluation.published_returns(run.setup, [run.algorithm], run.steps)
             figure = plots.returns(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
             with files.writing(folder / "curve.png") as temporary:
                 figure.savefig(temporary)

@@ -1,4 +1,4 @@
-"""Claims of the paper, checked on its own final returns and on results of studies."""
+"""Claims of the paper, checked on its own curves and on results of studies at equal steps."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -7,7 +7,8 @@ import numpy as np
 
 from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation.published import FINALS as PAPER
+from arc_suite.evaluation.published import CURVES as PAPER
+from arc_suite.evaluation.published import STEPS, at
 from arc_suite.learning.studies import results
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.studies.results import RunResult
@@ -27,7 +28,7 @@ class Claim(NamedTuple):
         compared: of a robot and the metrics of algorithms, the margin, which is above zero if the claim holds; None
             if a metric is missing.
         figure: the metric of a result.
-        in_paper: whether the paper's final returns decide the claim, too.
+        in_paper: whether the paper's returns decide the claim, too.
     """
 
     text: str
@@ -98,14 +99,15 @@ CLAIMS = (
 )
 
 TEXT = (
-    "Margin of each claim, in its own unit: it holds above zero. The paper's margin is from its final returns after "
-    "1,000,000 steps, if they decide the claim. Ours are from finished runs alone, at their steps."
+    "Margin of each claim, in its own unit: it holds above zero. The paper's margin is from its returns after as many "
+    "steps, if they decide the claim. Ours are from finished runs alone."
 )
 
 
 def checked(found: Sequence[RunResult]) -> str:
     """Return a table of the margins of all claims in Markdown."""
     own = [each for each in found if is_papers(each) and each.steps[-1] >= each.run.configuration.steps]
+    steps = min((each.run.configuration.steps for each in own), default=STEPS[-1])
     lines = []
     for claim in CLAIMS:
 
@@ -113,7 +115,8 @@ def checked(found: Sequence[RunResult]) -> str:
             figures = [claim.figure(each) for each in own if _robot_and_algorithm(each) == (robot, name)]
             return float(np.mean(figures)) if figures else None
 
-        paper = {robot: claim.compared(robot, lambda r, n: PAPER[r][n]) for robot in PAPER} if claim.in_paper else {}
+        told = {robot: claim.compared(robot, lambda r, n: at(r, n, steps)) for robot in PAPER}
+        paper = told if claim.in_paper else {}
         ours = {robot: claim.compared(robot, measured) for robot in PAPER}
         lines.append((claim.text, _leads(paper), _verdict(paper), _leads(ours), _verdict(ours)))
     return table(("claim", "paper's margin", "holds there", "ours", "holds here"), lines)
@@ -124,7 +127,7 @@ def _robot_and_algorithm(result: RunResult) -> tuple[str, str]:
 
 
 def is_papers(result: RunResult) -> bool:
-    """Return whether the paper's table of final returns has a run."""
+    """Return whether the paper's curves have a run."""
     setup, algorithm = result.run.configuration.setup, result.run.configuration.algorithm
     plain = setup.kind.name == "walk" and not setup.task_kwargs and not result.run.label
     return plain and algorithm in PAPER.get(setup.body.name, {})

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from arc_suite import evaluation, files
-from arc_suite.evaluation import anchors
-from arc_suite.evaluation.published import FINALS as PAPER
+from arc_suite.evaluation import anchors, published
 from arc_suite.learning.studies import claims, leaderboard, results
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.studies.results import Groups, RunResult
@@ -58,13 +57,13 @@ def write(name: str, study: Study, published: Path) -> Path:
 
 _CURVES = (
     "Interquartile mean over seeds with its 95 % bootstrap interval; of a single seed the mean. Dashed: standing "
-    "still and demonstrators. Dotted: the paper's returns after 1,000,000 steps."
+    "still and demonstrators. Dotted: the paper's returns at the last step, from 50,000 on."
 )
 _FINALS = (
     "Mean of the latest evaluation, ten seeded episodes, and standard deviation over seeds; interquartile mean with "
     "95 % bootstrap interval over seeds. A single seed has neither. Score: (return - standing still) / (best "
-    "demonstrator - standing still). The last column is the paper's, after 1,000,000 steps, read off its curves within "
-    "about 30. Then come standing still and the demonstrators, with the standard deviation over episodes."
+    "demonstrator - standing still). The paper's returns are at equal steps, read off its curves within about 30. "
+    "Then come standing still and the demonstrators, with the standard deviation over episodes."
 )
 _EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
@@ -115,9 +114,8 @@ def _curves(groups: Groups, demonstrators):
             count = min(len(each.steps) for each in seeds)
             returns = np.array([each.returns.mean(axis=1)[:count] for each in seeds])
             drawn[place][kind] = plots.Curve(_algorithm(seeds[0].run), seeds[0].steps[:count], returns)
-        finals[place] = evaluation.published_finals(
-            seeds[0].run.configuration.setup, [each.algorithm for each in drawn[place].values()]
-        )
+        names, ends = zip(*((each.algorithm, each.steps[-1]) for each in drawn[place].values()), strict=True)
+        finals[place] = evaluation.published_returns(seeds[0].run.configuration.setup, names, max(ends))
     lines = {p: {_policy(n): v.mean() for n, v in every.items()} for p, every in demonstrators.items()}
     return plots.study(drawn, lines, finals)
 
@@ -153,22 +151,28 @@ def _expert(run: Run) -> float | None:
     return evaluation.expert_return(run.configuration.setup)
 
 
+def _paper(result: RunResult, steps: int) -> str:
+    """The paper's return after as many steps; a dash where its curves have none."""
+    setup = result.run.configuration.setup
+    found = published.at(setup.body.name, _algorithm(result.run), steps) if claims.is_papers(result) else None
+    return "-" if found is None else f"{found:.0f}"
+
+
 def _finals(groups: Groups, demonstrators) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
             run, values = seeds[0].run, results.scores(seeds)
-            own = PAPER[run.configuration.setup.body.name][_algorithm(run)] if claims.is_papers(seeds[0]) else "-"
-            reached, score = f"{min(each.steps[-1] for each in seeds):,}", _score(values, place, demonstrators)
-            cells = (place, kind, reached, str(len(seeds)), _mean(values), score, _iqm(values), str(own))
-            lines.append((*cells, results.notes(seeds)))
+            steps, score = min(each.steps[-1] for each in seeds), _score(values, place, demonstrators)
+            cells = (place, kind, f"{steps:,}", str(len(seeds)), _mean(values), score, _iqm(values))
+            lines.append((*cells, _paper(seeds[0], steps), results.notes(seeds)))
         expert = _expert(run)
         for name, totals in demonstrators.get(place, {}).items():
             own = f"{expert:.0f}" if name == "medium" and expert else "-"
             score = _score(totals, place, demonstrators)
             lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own, "-"))
-    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]", "paper, 1M steps", "notes")
-    return table(heads, lines)
+    heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]")
+    return table((*heads, "paper, equal steps", "notes"), lines)
 
 
 def _efficiency(groups: Groups, demonstrators) -> str:

@@ -10,13 +10,15 @@ import interpreters
 import numpy as np
 import pytest
 
+from arc_suite import evaluation
+from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors, published
 from arc_suite.learning.agents.configuration import CONFIGURATION, Configuration
 from arc_suite.learning.studies import claims, csv_files, publication, report, results, tables
 from arc_suite.learning.studies.tables import Study, run
 
 METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "foot_slip", "asymmetry")
-STEPS = (1000, 2000)
+STEPS = (500_000, 1_000_000)
 
 
 def publish(folder, each, returns, style=0.1, phases=""):
@@ -44,7 +46,7 @@ def constant(*levels):
 def made(tmp_path):
     """A study as the paper's table of finals would have it, two seeds of everything, and its folder."""
     keys = [(robot, name, seed) for robot in published.FINALS for name in published.FINALS[robot] for seed in (0, 1)]
-    runs = tuple(run(robot, name, 2000, seed) for robot, name, seed in keys)
+    runs = tuple(run(robot, name, 1_000_000, seed) for robot, name, seed in keys)
     for each, (robot, name, seed) in zip(runs, keys, strict=True):
         start, style = 100.0 if name in claims.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
         publish(tmp_path / "mine", each, constant(start, float(published.FINALS[robot][name]) + seed), style)
@@ -67,21 +69,23 @@ def test_report(made):
     study, folder = made
     page = report.write("mine", study, folder).read_text()
     assert (folder / "curves.png").stat().st_size > 10_000
-    command = "`arc-suite train --robot=tick --task=walk --algorithm=sope --steps=2000 --seed=0 --evaluate_every=10000`"
-    assert cells(page, "tick, walk", "sope", "0")[3:] == ["2,000 of 2,000", "3.0", command]
+    command = (
+        "`arc-suite train --robot=tick --task=walk --algorithm=sope --steps=1000000 --seed=0 --evaluate_every=10000`"
+    )
+    assert cells(page, "tick, walk", "sope", "0")[3:] == ["1,000,000 of 1,000,000", "3.0", command]
     # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
     final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610", "-"]
-    assert cells(page, "tick, walk", "sope", "2,000")[3:] == final
-    assert cells(page, "leaper, walk", "sope", "2,000")[5] == "-", "without anchors"
+    assert cells(page, "tick, walk", "sope", "1,000,000")[3:] == final
+    assert cells(page, "leaper, walk", "sope", "1,000,000")[5] == "-", "without anchors"
     assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048", "-"]
     assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "0.00", "-", "-", "-"]
     area = f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}"
     assert cells(page, "tick, walk", "sac", "-", "-") == ["tick, walk", "sac", "-", "-", "-", "-", area]
-    assert cells(page, "tick, walk", "sope", "2,000", "3.0")[4:6] == ["2,000", "3.0"]
+    assert cells(page, "tick, walk", "sope", "1,000,000", "3.0")[4:6] == ["1,000,000", "3.0"]
     assert cells(page, "bastion, walk", "sac", "0.500")[2:] == ["0.500"] * 6
     assert cells(page, "sope")[2] == "1.00 [1.00, 1.00]", "more than SPEQ, on every robot"
     assert "As in the paper.\n" in page
-    more = study._replace(runs=(*study.runs, run("tick", "sac", 2000, seed=2)))
+    more = study._replace(runs=(*study.runs, run("tick", "sac", 1_000_000, seed=2)))
     assert "As in the paper. Begun: 48 of 49 runs.\n" in report.write("more", more, folder).read_text()
 
 
@@ -127,7 +131,7 @@ def test_claims_need_what_they_compare(made):
     assert cells(page, claims.CLAIMS[0].text)[3:] == ["-", "not measured"]
     found = results.results(few.runs, folder)
     assert claims.is_papers(found[0])
-    usual = {"robot": "tick", "algorithm": "sac", "steps": 2000}
+    usual = {"robot": "tick", "algorithm": "sac", "steps": 1_000_000}
     for other in ({"task": "steer"}, {"algorithm": "ppo"}, {"label": "b"}, {"task_kwargs": {"target_velocity": 0.4}}):
         assert not claims.is_papers(found[0]._replace(run=run(**usual | other)))
 
@@ -142,17 +146,17 @@ def test_unfinished_evaluations_do_not_count(tmp_path):
 
 
 def test_damaged_tables_are_one_line(tmp_path):
-    each = run("tick", "sac", 2000)
+    each = run("tick", "sac", 1_000_000)
     publish(tmp_path, each, constant(100.0))
     path = tmp_path / results.EVALUATIONS
-    path.write_text(path.read_text() + f"{each.name},2000,0,1.0,1000,0.3,0.9,1.0,1.0" + 6 * "," + "\n")
+    path.write_text(path.read_text() + f"{each.name},1000000,0,1.0,1000,0.3,0.9,1.0,1.0" + 6 * "," + "\n")
     with pytest.raises(ValueError, match=r"evaluations.csv: damaged: "):
         results.results([each], tmp_path)
 
 
 def test_runs_are_compared_where_both_have_been(tmp_path):
     """At the latest step that all have reached, and where both have several seeds."""
-    runs = [run("tick", name, 2000, seed) for seed in range(2) for name in ("sac", "speq")]
+    runs = [run("tick", name, 1_000_000, seed) for seed in range(2) for name in ("sac", "speq")]
     for each in runs:
         publish(tmp_path, each, constant(100.0, 900.0) if each.kind == "sac" else constant(500.0))
     groups = results.grouped(results.results(runs, tmp_path))
@@ -164,11 +168,11 @@ def test_runs_are_compared_where_both_have_been(tmp_path):
 
 @pytest.mark.slow
 def test_one_seed_has_no_interval(tmp_path):
-    runs = run("tick", "sac", 2000), run("tick", "speq", 2000)
+    runs = run("tick", "sac", 1_000_000), run("tick", "speq", 1_000_000)
     for each in runs:
         publish(tmp_path / "mine", each, constant(100.0, 200.0))
     page = report.write("mine", Study("one seed each", runs), tmp_path / "mine").read_text()
-    assert cells(page, "tick, walk", "sac", "2,000", "1")[4:] == ["204.5", "-", "-", "2590", "-"]
+    assert cells(page, "tick, walk", "sac", "1,000,000", "1")[4:] == ["204.5", "-", "-", "2590", "-"]
     assert "Probability" not in page
     assert cells((tmp_path / "README.md").read_text(), "tick, walk", "sac")[4:8] == ["1", "204.5", "-", "-"]
 
@@ -177,8 +181,12 @@ def test_one_seed_has_no_interval(tmp_path):
 def test_the_leaderboard_holds_each_configuration_once(tmp_path):
     """The row with more seeds; phases tell two configurations of one algorithm apart."""
     phases = {"phase_updates": 7500, "check_every": 100, "patience": 1000}
-    few, many = (run("tick", "sac", 2000),), tuple(run("tick", "sac", 2000, seed) for seed in range(2))
-    other = (*many, run("tick", "speq", 2000), run("tick", "speq", 2000, hyperparameters=phases, label="speq-short"))
+    few, many = (run("tick", "sac", 1_000_000),), tuple(run("tick", "sac", 1_000_000, seed) for seed in range(2))
+    other = (
+        *many,
+        run("tick", "speq", 1_000_000),
+        run("tick", "speq", 1_000_000, hyperparameters=phases, label="speq-short"),
+    )
     for name, runs in (("a", few), ("b", other)):
         for each in runs:
             publish(tmp_path / name, each, constant(100.0, 200.0))
@@ -193,11 +201,11 @@ def test_the_leaderboard_holds_each_configuration_once(tmp_path):
 
 
 def test_until(tmp_path):
-    runs = run("tick", "sac", 2000), run("tick", "sac", 2000, 1)
+    runs = run("tick", "sac", 1_000_000), run("tick", "sac", 1_000_000, 1)
     publish(tmp_path, runs[0], constant(100.0, 900.0))
     publish(tmp_path, runs[1], constant(500.0, 600.0))
     found = results.results(runs, tmp_path)
-    assert results.until(found, 500.0) == (1500.0, 120.0)
+    assert results.until(found, 500.0) == (750_000.0, 120.0)
     assert results.until(found, 700.0) == (np.inf, np.inf)
 
 
@@ -253,9 +261,44 @@ def test_committed_reports_are_made_of_committed_tables(tmp_path):
         assert (tmp_path / "studies" / path).read_text() == (COMMITTED / path).read_text(), path
 
 
+def test_the_papers_table_has_every_robot_and_algorithm():
+    assert published.CURVES.keys() == published.DEMONSTRATORS.keys()
+    for curves in published.CURVES.values():
+        assert set(curves) == {*claims.ONLINE, *claims.WITH_PRIOR}
+        assert all(len(points) == len(published.STEPS) for points in curves.values())
+
+
 def test_the_papers_returns_as_a_table():
     """The file for users' plots holds the suite's own numbers."""
     with (COMMITTED / "paper.csv").open(newline="") as file:
-        rows = {(row["robot"], row["algorithm"]): float(row["return"]) for row in csv.DictReader(file)}
-    finals = {(robot, name): value for robot, values in published.FINALS.items() for name, value in values.items()}
-    assert rows == finals | {(robot, "demonstrator"): value for robot, value in published.DEMONSTRATORS.items()}
+        rows = {tuple(row.values())[:3]: float(row["return"]) for row in csv.DictReader(file)}
+    expected = {(robot, "demonstrator", ""): value for robot, value in published.DEMONSTRATORS.items()}
+    for robot, curves in published.CURVES.items():
+        for name, points in curves.items():
+            known = zip(published.STEPS, points, strict=True)
+            expected |= {(robot, name, str(step)): point for step, point in known if point is not None}
+    assert rows == expected and len(rows) == 4 * 6 * 5 - 1 + 4
+
+
+@pytest.mark.parametrize(
+    ("name", "steps", "found"),
+    [
+        ("sac", 100_000, 1190),
+        ("sac", 75_000, 745),
+        ("speq", 99_999, None),
+        ("sac", 49_999, None),
+        ("sac", 1_000_001, None),
+        ("ppo", 100_000, None),
+    ],
+)
+def test_the_paper_is_read_at_equal_steps(name, steps, found):
+    assert published.at("leaper", name, steps) == found
+
+
+def test_a_level_of_the_paper_is_that_of_the_steps():
+    setup = Setup.of("tick")
+    assert evaluation.published_returns(setup, ["sac", "ppo"], 100_000) == {"sac": 350.0}
+    assert evaluation.published_returns(setup, ["ppo"], 100_000) == {"speq_o2o": 2370.0}
+    assert evaluation.published_returns(setup, ["ppo"], 1_000_000) == {"speq_o2o": 3720.0}
+    assert evaluation.published_returns(setup, ["ppo"], 25_600) == {}
+    assert evaluation.published_returns(Setup.of("tick", "steer"), ["sac"], 100_000) == {}
