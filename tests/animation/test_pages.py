@@ -161,18 +161,6 @@ def test_programs_write_pages(tmp_path):
     assert labels == ["tick, cpg", "tick, zero"]
 
 
-@pytest.mark.parametrize(
-    ("command", "message"),
-    [
-        (("render", "--steps=0", "-o", "a.html"), "--steps=0: expected 1 or more for a film or a page"),
-        (("style", "--page=a.htm"), "--page=a.htm: expected a file that ends in .html"),
-    ],
-)
-def test_errors_are_one_line(tmp_path, command, message):
-    programs.refused(programs.run("-m", "arc_suite", *command, cwd=tmp_path), f"arc-suite {command[0]}: {message}\n")
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.fixture(scope="module")
 def shown(browser, tracks, tmp_path_factory):
     """The page of both tracks, opened from disk, and all that it said and asked for."""

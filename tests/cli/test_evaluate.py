@@ -118,10 +118,8 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
         ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
         (["--json=/nowhere/a.json"], "cannot write /nowhere/a.json: no such file or directory"),
         (["--episodes=0"], "flag --episodes=0: expected an integer in the range [1, 100000]"),
-        (["--episodes=200000"], "flag --episodes=200000: expected an integer in the range [1, 100000]"),
         (["--episodes=1e20"], "flag --episodes=1e20: expected an integer in the range [1, 100000]"),
         (["--set=time_limit=Infinity"], "time_limit: expected a finite number, as every episode must end, got inf"),
-        (["queen"], "unexpected argument 'queen'; see --help"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_status_1(arguments, message):

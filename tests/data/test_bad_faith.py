@@ -9,12 +9,11 @@ import h5py
 import numpy as np
 import programs
 import pytest
-from datasets import ID, QUEEN, SHORT, collect, digests, edited, verify
+from datasets import ID, SETTINGS, collect, digests, edited, verify
 from tiers import never, tiers
 
 from arc_suite import data, style
 
-SETTINGS = data.DatasetSettings(QUEEN, **SHORT)
 READERS = {"open": lambda dataset_id: list(data.open(dataset_id)), "verify": verify}
 
 STROLL = """
@@ -64,9 +63,8 @@ def about(root, **changes):
     [{"robot": "strolling:queen"}, {"task": "strolling:walk"}, {"task_kwargs": {"arena": "strolling:flat"}}],
     ids=["robot", "task", "arena"],
 )
-def test_metadata_import_nothing(root, module, change):
-    collect(ID, SETTINGS, 1)
-    about(root, **change)
+def test_metadata_import_nothing(kept, module, change):
+    about(kept, **change)
     for use in (*READERS.values(), style.source):
         assert_refused(use, "files import nothing; import 'strolling' first")
     done = collected(f"--verify={ID}")
@@ -91,12 +89,11 @@ def test_what_the_caller_names_is_imported(module):
 
 
 @pytest.mark.parametrize("value", tiers(["1\n2", "x" * 10_000, ["\n"] * 1000], lambda value: value == "1\n2"))
-def test_versions_are_told_in_one_line(root, value):
-    collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=value))
+def test_versions_are_told_in_one_line(kept, value):
+    edited(kept, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=value))
     assert_refused(verify, "was collected with numpy ")
-    edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=np.__version__))
-    about(root, task_version=value)
+    edited(kept, lambda metadata: metadata["arc_suite"]["versions"].update(numpy=np.__version__))
+    about(kept, task_version=value)
     assert_refused(verify, "was collected with version ", " of walk; ")
 
 
@@ -104,9 +101,8 @@ def test_versions_are_told_in_one_line(root, value):
 @pytest.mark.parametrize(
     "robot", ["/dev/zero", "spider.json", "", "nobody", "{", "{}", "[" * 9999, None, 3, ["queen"], {"name": "queen"}]
 )
-def test_robots_are_registered_names_and_inline_bodies_alone(root, robot):
-    collect(ID, SETTINGS, 1)
-    about(root, robot=robot)
+def test_robots_are_registered_names_and_inline_bodies_alone(kept, robot):
+    about(kept, robot=robot)
     assert_refused(data.open, "metadata.json: ")
 
 
@@ -122,25 +118,22 @@ def test_robots_are_registered_names_and_inline_bodies_alone(root, robot):
         ("policy", 7),
     ],
 )
-def test_settings_of_another_type_are_named(root, name, value):
-    collect(ID, SETTINGS, 1)
-    about(root, **{name: value})
+def test_settings_of_another_type_are_named(kept, name, value):
+    about(kept, **{name: value})
     for use in READERS.values():
         assert_refused(use, f"metadata.json: {name}" if name in ("seed", "steps", "noise") else f"expected {name} ")
 
 
 @pytest.mark.parametrize("value", tiers(["1", -1, 2**70, 1.0, None], lambda value: value == -1))
 @pytest.mark.parametrize("name", ["total_episodes", "total_steps"])
-def test_counts_of_another_type_are_named(root, name, value):
-    collect(ID, SETTINGS, 1)
-    edited(root, lambda metadata: metadata.update({name: value}))
+def test_counts_of_another_type_are_named(kept, name, value):
+    edited(kept, lambda metadata: metadata.update({name: value}))
     assert_refused(data.open, name)
 
 
-def test_steps_that_no_episode_has_are_not_allocated(root):
-    collect(ID, SETTINGS, 1)
-    about(root, steps=10**15)
-    edited(root, lambda metadata: metadata.pop("env_spec"))
+def test_steps_that_no_episode_has_are_not_allocated(kept):
+    about(kept, steps=10**15)
+    edited(kept, lambda metadata: metadata.pop("env_spec"))
     assert_refused(verify, "20 steps were recorded, 21 replayed")
 
 
@@ -202,31 +195,28 @@ def test_episodes_that_are_stored_otherwise_are_one_line(root, name):
 
 
 @pytest.mark.slow
-def test_an_array_of_one_place_many_times_is_not_read(root):
-    collect(ID, SETTINGS, 1)
+def test_an_array_of_one_place_many_times_is_not_read(kept):
 
     def change(file):
         group = file["episode_0"]["infos/reward_terms"]
         for number in range(1000):
             group[f"again{number}"] = group["forward"]
 
-    altered(root, change)
+    altered(kept, change)
     assert_refused(READERS["open"], "its arrays claim")
 
 
 @pytest.mark.slow
-def test_continuing_compares_what_it_keeps(root):
-    collect(ID, SETTINGS, 2)
-    altered(root, lambda file: file["episode_1/rewards"].__setitem__(3, 7.0))
+def test_continuing_compares_what_it_keeps(kept):
+    altered(kept, lambda file: file["episode_1/rewards"].__setitem__(3, 7.0))
     assert_refused(lambda dataset_id: collect(dataset_id, SETTINGS, 3), "main_data.hdf5: episode_1: expected ")
     collect(ID, SETTINGS, 3, overwrite=True)
     assert len(digests()) == 3
 
 
-def test_episodes_of_no_index_are_named(root):
-    collect(ID, SETTINGS, 1)
-    altered(root, lambda file: file.move("episode_0", "episode_00"))
-    assert_refused(lambda dataset_id: collect(dataset_id, SETTINGS, 2), "'episode_00': expected the name of an episode")
+def test_episodes_of_no_index_are_named(kept):
+    altered(kept, lambda file: file.move("episode_0", "episode_00"))
+    assert_refused(lambda dataset_id: collect(dataset_id, SETTINGS, 3), "'episode_00': expected the name of an episode")
 
 
 def test_nothing_outside_is_deleted(root, tmp_path):
@@ -239,34 +229,30 @@ def test_nothing_outside_is_deleted(root, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["metadata.json", "main_data.hdf5"])
-def test_a_pipe_is_not_waited_for(root, name):
-    collect(ID, SETTINGS, 1)
-    path = root / ID / "data" / name
+def test_a_pipe_is_not_waited_for(kept, name):
+    path = kept / ID / "data" / name
     path.unlink()
     os.mkfifo(path)
     assert_refused(READERS["open"], f"{name}: expected a file")
 
 
-def test_metadata_of_any_size_are_not_read(root):
-    collect(ID, SETTINGS, 1)
-    os.truncate(root / ID / "data" / "metadata.json", 1 << 40)
+def test_metadata_of_any_size_are_not_read(kept):
+    os.truncate(kept / ID / "data" / "metadata.json", 1 << 40)
     assert_refused(data.open, "metadata.json: expected at most 16777216 bytes")
 
 
-def test_author_and_code_are_in_the_metadata_where_they_are_said(root):
-    collect(ID, SETTINGS, 1)
+def test_author_and_code_are_in_the_metadata_where_they_are_said(kept):
     assert not {"author", "code_permalink"} & data.open(ID).metadata.keys()
-    collect(ID, SETTINGS, 2, author="A. Walker", code_permalink="file:///walks/1")
-    collect(ID, SETTINGS, 3)
+    collect(ID, SETTINGS, 3, author="A. Walker", code_permalink="file:///walks/1")
+    collect(ID, SETTINGS, 4)
     import minari
 
     metadata = minari.load_dataset(ID).storage.metadata
     assert (metadata["author"], metadata["code_permalink"]) == ({"A. Walker"}, "file:///walks/1")
 
 
-def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(root):
+def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(kept):
     """Minari's `recover_environment` makes the environment by the spec, and a replay by the settings."""
-    collect(ID, SETTINGS, 1)
     spec = json.loads(data.open(ID).metadata["env_spec"])
     for change, line in (
         ({"max_episode_steps": 40}, "max_episode_steps of its env_spec is 40, and its settings say 20"),
@@ -275,11 +261,11 @@ def test_a_spec_of_the_environment_that_contradicts_the_settings_is_refused(root
         ({"kwargs": spec["kwargs"] | {"domain_name": "tick"}}, 'kwargs of its env_spec is {"domain_name": "tick", "ta'),
         ({"kwargs": spec["kwargs"] | {"task_kwargs": {"gait": "wave"}}}, "kwargs of its env_spec is "),
     ):
-        edited(root, lambda metadata, change=change: metadata.update(env_spec=json.dumps(spec | change)))
+        edited(kept, lambda metadata, change=change: metadata.update(env_spec=json.dumps(spec | change)))
         assert_refused(data.open, "metadata.json: ", line)
         assert_refused(verify, line)
     for damaged in ("{", "[]", "{}", 3, "[" * 9999):
-        edited(root, lambda metadata, damaged=damaged: metadata.update(env_spec=damaged))
+        edited(kept, lambda metadata, damaged=damaged: metadata.update(env_spec=damaged))
         assert_refused(data.open, "metadata.json: ")
-    edited(root, lambda metadata: metadata.update(env_spec=json.dumps(spec | {"id": "arc_suite/queen-walk-v7"})))
-    assert len(data.open(ID)) == 1  # of a version that this one does not replay
+    edited(kept, lambda metadata: metadata.update(env_spec=json.dumps(spec | {"id": "arc_suite/queen-walk-v7"})))
+    assert len(data.open(ID)) == 2  # of a version that this one does not replay

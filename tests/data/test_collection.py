@@ -8,7 +8,7 @@ import interpreters
 import minari
 import numpy as np
 import pytest
-from datasets import ID, QUEEN, SHORT, SPIDER, TICK, collect, digests, quiet, verify
+from datasets import ID, QUEEN, SETTINGS, SHORT, SPIDER, TICK, collect, digests, quiet, verify
 from refusals import refused
 from tiers import never, tiers
 
@@ -203,17 +203,15 @@ def test_more_episodes_continue_and_a_finished_dataset_stays_as_it_is(root):
 
 
 @pytest.mark.slow
-def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
-    settings = data.DatasetSettings(QUEEN, **SHORT)
-    collect(ID, settings, 2)
+def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(kept):
     before = digests()
     for changed, difference in (
-        (settings._replace(noise=0.5), "its noise is 0.0, and not 0.5"),
-        (settings._replace(seed=10_001), "its seed is 10005, and not 10001"),
-        (settings._replace(presets=("fast", "medium")), "its presets is ['medium'], and not ['fast', 'medium']"),
-        (settings._replace(setup=TICK), "its robot is 'queen', and not 'tick'"),
-        (settings._replace(setup=Setup.of("queen", "steer")), "its task is 'walk', and not 'steer'"),
-        (settings._replace(setup=WAVE), "its task_kwargs is {}, and not {'gait': 'wave'}"),
+        (SETTINGS._replace(noise=0.5), "its noise is 0.0, and not 0.5"),
+        (SETTINGS._replace(seed=10_001), "its seed is 10005, and not 10001"),
+        (SETTINGS._replace(presets=("fast", "medium")), "its presets is ['medium'], and not ['fast', 'medium']"),
+        (SETTINGS._replace(setup=TICK), "its robot is 'queen', and not 'tick'"),
+        (SETTINGS._replace(setup=Setup.of("queen", "steer")), "its task is 'walk', and not 'steer'"),
+        (SETTINGS._replace(setup=WAVE), "its task_kwargs is {}, and not {'gait': 'wave'}"),
     ):
         with refused(f"dataset {ID!r} is another: {difference}; --overwrite replaces it"):
             collect(ID, changed, 2)
@@ -223,10 +221,10 @@ def test_another_dataset_under_the_id_is_refused_and_overwritten_at_will(root):
         assert digests() == before
         return quiet(*args, **kwargs)
 
-    data.collect(ID, settings._replace(seed=10_006), 3, overwrite=True, progress=watched)
+    data.collect(ID, SETTINGS._replace(seed=10_006), 3, overwrite=True, progress=watched)
     assert digests()[0] == before[1]
     assert len(data.open(ID)) == 3
-    assert [path.name for path in (root / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
+    assert [path.name for path in (kept / ID).parent.iterdir() if path.is_dir()] == ["some-v0"]
 
 
 @pytest.mark.slow

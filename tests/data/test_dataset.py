@@ -6,7 +6,7 @@ import os
 import minari
 import numpy as np
 import pytest
-from datasets import ID, QUEEN, SHORT, TICK, collect, digests, edited, verify
+from datasets import ID, QUEEN, SETTINGS, SHORT, TICK, collect, digests, edited, verify
 from refusals import refused
 from tiers import tiers
 
@@ -37,8 +37,7 @@ def test_metadata():
     assert list(minari.list_local_datasets()) == [ID]
 
 
-def test_style_records_a_dataset():
-    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 2)
+def test_style_records_a_dataset(kept):
     dataset = data.open(ID)
     environment = dataset.settings.setup.load()
     for episode in dataset:
@@ -52,32 +51,27 @@ def test_style_records_a_dataset():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["versions", "model_sha256"])
-def test_metadata_that_do_not_tell_all_are_damage(root, name):
-    settings = data.DatasetSettings(QUEEN, **SHORT)
-    collect(ID, settings, 1)
+def test_metadata_that_do_not_tell_all_are_damage(kept, name):
     for change in (lambda about: about.update({name: 1}), lambda about: about.pop(name)):
-        edited(root, lambda metadata, change=change: change(metadata["arc_suite"]))
-        for use in (verify, data.open, lambda dataset_id: collect(dataset_id, settings, 2)):
+        edited(kept, lambda metadata, change=change: change(metadata["arc_suite"]))
+        for use in (verify, data.open, lambda dataset_id: collect(dataset_id, SETTINGS, 2)):
             with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: .*{name}"):
                 use(ID)
 
 
-def test_episodes_without_metadata_are_not_continued_as_others(root):
-    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 2)
-    (root / ID / "data" / "metadata.json").unlink()
+def test_episodes_without_metadata_are_not_continued_as_others(kept):
+    (kept / ID / "data" / "metadata.json").unlink()
     with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*metadata.json: "):
         collect(ID, data.DatasetSettings(TICK, **SHORT), 3)
 
 
 @pytest.mark.parametrize("name", ["main_data.hdf5", "metadata.json"])
 @pytest.mark.parametrize("length", tiers([0, 100], lambda length: length == 100))
-def test_a_truncated_file_is_one_line_and_overwrite_mends_it(root, name, length):
-    settings = data.DatasetSettings(QUEEN, **SHORT)
-    collect(ID, settings, 2)
-    before, path = digests(), root / ID / "data" / name
+def test_a_truncated_file_is_one_line_and_overwrite_mends_it(kept, name, length):
+    before, path = digests(), kept / ID / "data" / name
     os.truncate(path, length)
-    for use in (verify, lambda dataset_id: collect(dataset_id, settings, 3)):
+    for use in (verify, lambda dataset_id: collect(dataset_id, SETTINGS, 3)):
         with refused(f"dataset {ID!r} is damaged: {path}: ", begins=True):
             use(ID)
-    collect(ID, settings, 2, overwrite=True)
+    collect(ID, SETTINGS, 2, overwrite=True)
     assert digests() == before

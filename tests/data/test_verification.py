@@ -3,7 +3,7 @@
 import h5py
 import minari
 import pytest
-from datasets import ID, QUEEN, SHORT, TICK, collect, edited, verify
+from datasets import ID, QUEEN, SETTINGS, SHORT, TICK, collect, edited, verify
 from refusals import refused
 from tiers import tiers
 
@@ -34,9 +34,8 @@ def test_a_bit_that_changed_is_found(root, key):
 
 
 @pytest.mark.parametrize("key", tiers(["seed", "preset", "return", "length", "id"], lambda key: key == "seed"))
-def test_episode_metadata_that_changed_is_found(root, key):
-    collect(ID, data.DatasetSettings(QUEEN, **SHORT), 2)
-    with h5py.File(root / ID / "data" / "main_data.hdf5", "a") as file:
+def test_episode_metadata_that_changed_is_found(kept, key):
+    with h5py.File(kept / ID / "data" / "main_data.hdf5", "a") as file:
         attributes = file["episode_0"].attrs
         attributes[key] = attributes[key] + ("x" if key == "preset" else 1)
     with pytest.raises(ValueError, match=f"^dataset '{ID}' is damaged: .*: episode_0: expected "):
@@ -66,29 +65,27 @@ def test_an_episode_that_is_whole_but_not_what_its_seed_gives_is_found(root, key
         verify(ID)
 
 
-def test_another_version_or_model_is_refused(root):
-    settings = data.DatasetSettings(QUEEN, **SHORT)
-    collect(ID, settings, 2)
-    edited(root, lambda metadata: metadata["arc_suite"].update(model_sha256="0" * 64))
+def test_another_version_or_model_is_refused(kept):
+    edited(kept, lambda metadata: metadata["arc_suite"].update(model_sha256="0" * 64))
     with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with another model of queen$"):
         verify(ID)
     with pytest.raises(ValueError, match="is another: its model_sha256 is '0{64}', and not '[0-9a-f]{64}'; "):
-        collect(ID, settings, 3)
-    edited(root, lambda metadata: metadata["arc_suite"].update(task_version=1))
+        collect(ID, SETTINGS, 3)
+    edited(kept, lambda metadata: metadata["arc_suite"].update(task_version=1))
     with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with version 1 of walk; 0 is installed$"):
         verify(ID)
     with pytest.raises(ValueError, match="is another: its task_version is 1, and not 0; "):
-        collect(ID, settings, 3)
-    edited(root, lambda metadata: metadata["arc_suite"].update(task_version=0))
-    edited(root, lambda metadata: metadata["arc_suite"]["versions"].update(mujoco="3.16.0"))
+        collect(ID, SETTINGS, 3)
+    edited(kept, lambda metadata: metadata["arc_suite"].update(task_version=0))
+    edited(kept, lambda metadata: metadata["arc_suite"]["versions"].update(mujoco="3.16.0"))
     with pytest.raises(ValueError, match=f"^dataset '{ID}' was collected with mujoco 3.16.0; 3.17.* is installed$"):
         verify(ID)
     with pytest.raises(ValueError, match="is another: its mujoco is '3.16.0', and not '3.17"):
-        collect(ID, settings, 3)
+        collect(ID, SETTINGS, 3)
     with pytest.raises(ValueError, match=f"^dataset '{ID}' holds episodes of queen, and not of tick$"):
         verify(ID, TICK.body)
-    edited(root, lambda metadata: metadata.pop("arc_suite"))
-    for use in (verify, data.open, lambda dataset_id: collect(dataset_id, settings, 3)):
+    edited(kept, lambda metadata: metadata.pop("arc_suite"))
+    for use in (verify, data.open, lambda dataset_id: collect(dataset_id, SETTINGS, 3)):
         with pytest.raises(ValueError, match=f"^dataset '{ID}' was not collected by arc_suite$"):
             use(ID)
     assert len(minari.load_dataset(ID)) == 2

@@ -1,8 +1,6 @@
 """Zips of stable-baselines3 as policies of every program."""
 
-import importlib.util
 import pickle
-import zipfile
 
 import gymnasium
 import numpy as np
@@ -13,19 +11,10 @@ import arc_suite
 from arc_suite import evaluation, policies
 from arc_suite.envs.vector import VectorEnv
 
-HAS_SB3 = importlib.util.find_spec("stable_baselines3") is not None
 UNKNOWN = "does not hold the robot and task that it was trained for; train in arc_suite.envs.sb3.VecEnv"
 
+pytest.importorskip("stable_baselines3", reason="of the extra `sb3`: make check-sb3")
 pytestmark = pytest.mark.filterwarnings(f"ignore:.*{UNKNOWN}")
-needs_sb3 = pytest.mark.skipif(not HAS_SB3, reason="of the extra `sb3`: make check-sb3")
-
-
-@pytest.mark.skipif(HAS_SB3, reason="stable-baselines3 is installed")
-def test_without_it_one_line_says_what_to_install(tmp_path):
-    with zipfile.ZipFile(tmp_path / "sac.zip", "w") as archive:
-        archive.writestr("data", "{}")
-    with pytest.raises(ValueError, match=r"^policy .*\.zip: zips need stable-baselines3: pip install -e '.*\[sb3\]'"):
-        policies.policy(str(tmp_path / "sac.zip"), "tick")
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +31,6 @@ def saved(tmp_path_factory):
     return path, answers
 
 
-@needs_sb3
 @pytest.mark.parametrize("name", ["SAC", "PPO", "TD3", "A2C"])
 def test_does_what_the_agent_does(name, saved):
     path, answers = saved
@@ -51,7 +39,6 @@ def test_does_what_the_agent_does(name, saved):
     assert np.array_equal(policies.alone(policy)(timestep), answers[name].astype(float))
 
 
-@needs_sb3
 def test_in_a_batch_it_does_the_same(saved):
     policy, task = policies.policy(str(saved[0] / "SAC.zip"), "tick"), {"time_limit": 1.0}
     envs = VectorEnv("tick", "walk", 3, 1, "Disabled", task_kwargs=task)
@@ -60,7 +47,6 @@ def test_in_a_batch_it_does_the_same(saved):
     )
 
 
-@needs_sb3
 def test_errors_are_one_line(saved, tmp_path):
     path = saved[0]
     with pytest.raises(ValueError, match=r"SAC\.zip: moves 18 joints, and leaper has 12$"):
@@ -94,7 +80,6 @@ def normalised(tmp_path_factory):
     return folder, observation, agent.predict(environments.normalize_obs(flat), deterministic=True)[0]
 
 
-@needs_sb3
 def test_statistics_are_applied(normalised):
     folder, timestep, expected = normalised
     with pytest.raises(ValueError, match=r"ppo\.zip: was trained with VecNormalize, whose statistics are missing: "):
@@ -103,7 +88,6 @@ def test_statistics_are_applied(normalised):
     assert np.array_equal(policies.alone(policy)(timestep), expected.astype(float))
 
 
-@needs_sb3
 def test_a_zip_knows_its_robot(normalised, saved, recwarn):
     name = f"{normalised[0] / 'ppo.zip'}+{normalised[0] / 'stats.pkl'}"
     with pytest.raises(ValueError, match=r"ppo\.zip: made for tick, and not for queen$"):
@@ -114,7 +98,6 @@ def test_a_zip_knows_its_robot(normalised, saved, recwarn):
         policies.policy(str(saved[0] / "PPO.zip"), "queen")
 
 
-@needs_sb3
 def test_programs_take_statistics(normalised):
     folder = normalised[0]
     evaluate = ("evaluate", "--robot=tick", "--policy=ppo.zip", "--episodes=1", "--set=time_limit=1")
@@ -124,7 +107,6 @@ def test_programs_take_statistics(normalised):
     programs.refused(done, f"arc-suite evaluate: {line}\n")
 
 
-@needs_sb3
 def test_a_program_warns_in_one_line(saved):
     done = programs.arc_suite(
         "evaluate", "--robot=tick", "--policy=PPO.zip", "--episodes=1", "--set=time_limit=1", cwd=saved[0]
@@ -133,7 +115,6 @@ def test_a_program_warns_in_one_line(saved):
     assert done.stderr.startswith("arc-suite evaluate: policy PPO.zip: does not hold the robot and task ")
 
 
-@needs_sb3
 def test_what_are_no_statistics_is_one_line(normalised, tmp_path):
     zipped = normalised[0] / "ppo.zip"
     (tmp_path / "text.pkl").write_text("text")
@@ -144,7 +125,6 @@ def test_what_are_no_statistics_is_one_line(normalised, tmp_path):
         assert "\n" not in str(error.value)
 
 
-@needs_sb3
 @pytest.mark.parametrize("name", ["SAC", "PPO", "TD3"])
 def test_as_layers(name, tmp_path):
     """The network that `arc-suite export` writes does what the agent does."""
@@ -162,7 +142,6 @@ def test_as_layers(name, tmp_path):
     np.testing.assert_allclose(network.act(observation, np.zeros(1)), policy.act(observation, np.zeros(1)), atol=1e-5)
 
 
-@needs_sb3
 def test_statistics_are_the_first_nodes(normalised):
     folder, timestep, expected = normalised
     network = policies.trained(f"{folder / 'ppo.zip'}+{folder / 'stats.pkl'}")
@@ -171,7 +150,6 @@ def test_statistics_are_the_first_nodes(normalised):
     np.testing.assert_allclose(policies.alone(network)(timestep), expected, atol=1e-4)
 
 
-@needs_sb3
 def test_a_zip_without_a_setup_is_not_exported(saved):
     with pytest.raises(ValueError, match=r"PPO\.zip: does not hold the robot and task that it was trained for; "):
         policies.trained(str(saved[0] / "PPO.zip"))

@@ -1,5 +1,6 @@
 """What a zip of stable-baselines3 tells without its pickles: its setup, and which statistics belong to it."""
 
+import importlib.util
 import json
 import zipfile
 
@@ -70,6 +71,12 @@ def test_only_a_zip_that_was_trained_with_statistics_takes_them(tmp_path):
         zips.statistics(sac, tmp_path / "none.pkl")
     (tmp_path / "vecnormalize.pkl").unlink()
     assert zips.statistics(sac) is None
+
+
+@pytest.mark.skipif(importlib.util.find_spec("stable_baselines3") is not None, reason="stable-baselines3 is installed")
+def test_without_stable_baselines3_one_line_says_what_to_install(tmp_path):
+    with pytest.raises(ValueError, match=r"^policy .*\.zip: zips need stable-baselines3: pip install -e '.*\[sb3\]'"):
+        policies.policy(str(write(tmp_path / "sac.zip")), "tick")
 
 
 def test_what_is_no_zip_is_one_line(tmp_path):

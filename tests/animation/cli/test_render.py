@@ -151,7 +151,7 @@ def test_a_take_stays_at_its_end():
             ["--output=a.jpg"],
             "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .webp, .html)",
         ),
-        (["--steps=0", "--output=a.gif"], "--steps=0: expected 1 or more for a film or a page"),
+        (["--steps=0", "--output=a.html"], "--steps=0: expected 1 or more for a film or a page"),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
         ([], "no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html"),
     ],

@@ -52,13 +52,11 @@ def test_killed_and_run_again_it_ends_as_if_nothing_had_happened(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--robot=quen"], "unknown robot 'quen'; did you mean 'queen'?"),
         (["--generations=0"], "flag --generations=0: expected an integer in the range [1, 100000]"),
         (["--resets=100000000000000000000"], "flag --resets=100000000000000000000: "),
         (["--steps=1001"], "flag --steps=1001: "),
         (["--space=torqes"], "unknown space 'torqes'; did you mean 'torques'?"),
         (["--starts=7"], "flag --starts=7: expected 8 or more, or 0"),
-        (["queen"], "unexpected argument 'queen'; see --help"),
         (["--output=/dev/null/tune"], "cannot make folder /dev/null/tune: not a directory"),
     ],
 )
