@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from arc_suite import versions
-from arc_suite.envs.vector import usable_cores
 from arc_suite.simulation import opengl
+from arc_suite.simulation.cores import usable_cores
 
 _PATIENCE = 120  # s, for the first picture
 _PICTURE = "from arc_suite.cli import doctor; doctor.draw()"

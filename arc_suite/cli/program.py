@@ -5,7 +5,9 @@ import inspect
 import io
 import os
 import re
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -21,6 +23,8 @@ from arc_suite.simulation.opengl import RenderingUnavailable
 
 _MARKS = re.compile(r"(?<=<!-- table -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
+TERMINATED = 143  # exit status of a program that SIGTERM has ended, as shells count it
+
 VERSION = f"arc_suite {arc_suite.__version__}"
 
 _PAUSE = 30.0  # s between two lines of progress in a log
@@ -28,6 +32,10 @@ _CONTROL = re.compile("\\r|\x1b\\[A")  # with which bars overwrite themselves
 
 _HELP = flags.DEFINE_bool("help", False, "Print this text and exit.", short_name="h")
 _VERSION = flags.DEFINE_bool("version", False, "Print the version of the package and exit.")
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM has come, which clusters send before they take a machine away."""
 
 
 def progress(*args, **kwargs) -> tqdm:
@@ -46,11 +54,32 @@ def say(line: str) -> None:
 
 @contextlib.contextmanager
 def resumable(place) -> Iterator[None]:
-    """Say of an interruption that the same command resumes the work in a folder."""
+    """Say of an interruption, by Ctrl-C or SIGTERM, that the same command resumes the work in a folder."""
+
+    def terminate(*_):
+        raise Terminated
+
+    before = signal.signal(signal.SIGTERM, terminate)
     try:
         yield
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"interrupted; the same command resumes {place}") from None
+    except KeyboardInterrupt as interrupt:
+        raise type(interrupt)(f"interrupted; the same command resumes {place}") from None
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextlib.contextmanager
+def termination() -> Iterator[Callable[[], bool]]:
+    """Yield a function that returns whether SIGTERM has come.
+
+    The signal does not end the process meanwhile.
+    """
+    came = threading.Event()
+    before = signal.signal(signal.SIGTERM, lambda *_: came.set())
+    try:
+        yield came.is_set
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 # One thread a run: two runs on two cores learn twice as much, two threads in a run hardly more than one.
@@ -114,7 +143,8 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
     """Call `work` and exit the process with the status that it returns.
 
     A wrong flag, a ValueError, an OSError and a RenderingUnavailable become one line on standard
-    error and exit status 1, Ctrl-C one line and exit status 130; any other exception is a mistake of
+    error and exit status 1, Ctrl-C one line and exit status 130, SIGTERM in work that
+    can be resumed one line and 143; any other exception is a mistake of
     ours and keeps its traceback. A warning is one line on standard error, too. Where nobody reads the
     output any more, as in `program | head`, the work goes on without it, so that its files are written.
 
@@ -139,7 +169,8 @@ def guard(work: Callable[[], int | None], name: str) -> NoReturn:
         except (flags.Error, ValueError, OSError, RenderingUnavailable) as error:
             status = fail(error, 1)
         except KeyboardInterrupt as interrupt:
-            status = fail(str(interrupt) or "interrupted", 130)  # as shells count what SIGINT ends
+            status = TERMINATED if isinstance(interrupt, Terminated) else 130  # as shells count what SIGINT ends
+            fail(str(interrupt) or "interrupted", status)
         finally:
             output.flush()
     sys.exit(status)

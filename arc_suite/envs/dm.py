@@ -274,7 +274,13 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     @property
     def progress(self) -> dict[str, float]:
-        """How well the episode has gone so far, figures by name."""
+        """How well the episode has gone so far, figures by name.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        if self._memory is None:
+            raise RuntimeError("no episode has begun; call reset first")
         return self.definition.progress(self._memory)
 
     def set_command(self, name: str, value) -> None:

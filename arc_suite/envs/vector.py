@@ -28,6 +28,7 @@ from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
+from arc_suite.simulation.cores import usable_cores
 from arc_suite.simulation.model import checked_fields
 from arc_suite.tasks import Task, terms
 from arc_suite.tasks.contract import CURRICULUM
@@ -539,11 +540,6 @@ class VectorEnv(KnownAttributes, Together):
             if seeds[index] is not None:
                 self._randoms[index] = np.random.RandomState(seeds[index])
                 self._stream_seeds[index], self._streams_begin[index] = seeds[index], True
-
-
-def usable_cores() -> int:
-    """Return how many cores this process may use, where the system tells; else how many there are."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
 def _one(tasks: Sequence[Task]) -> Task:

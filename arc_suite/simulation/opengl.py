@@ -22,6 +22,7 @@ from arc_suite.simulation import forks
 
 _REMEDY = "on Debian, apt-get install libegl1 libgl1 libgl1-mesa-dri and set MUJOCO_GL=egl"
 _WINDOWED = ("darwin", "win32")  # platforms that always have a display, and no EGL
+_DEVICE = "MUJOCO_EGL_DEVICE_ID"
 _OFF = ("off", "disable", "disabled", "false", "0")  # values of MUJOCO_GL that both libraries take for no backend
 _BACKEND = "dm_control._render"  # dm_control's choice of a backend, made when this module is executed
 
@@ -296,12 +297,25 @@ def _explain(error: Exception) -> str:
     setting = os.environ.get("MUJOCO_GL")
     if setting in _OFF:
         return f"cannot render: MUJOCO_GL={setting} turns it off; unset it, or set MUJOCO_GL=egl"
-    if isinstance(error, AttributeError):  # PyOpenGL's way to say that a library is not there
-        reason = "the OpenGL library is missing"
-    else:
-        reason = checks.quoted(error.__cause__ or error).rstrip(".")
+    cause = error.__cause__ or error
+    if (isinstance(cause, ValueError) or _DEVICE in str(cause)) and (wrong := _wrong_device()):
+        return f"cannot render: {wrong}"
+    missing = isinstance(error, AttributeError)  # PyOpenGL's way to say that a library is not there
+    reason = "the OpenGL library is missing" if missing else checks.quoted(cause).rstrip(".")
     backend = f" with MUJOCO_GL={setting}" if setting else ""
     return f"cannot render{backend}: {reason}; {_remedy()}"
+
+
+def _wrong_device() -> str | None:
+    """What is wrong with `MUJOCO_EGL_DEVICE_ID`, where EGL has found its devices."""
+    device, egl = os.environ.get(_DEVICE), sys.modules.get(f"{_BACKEND}.pyopengl.egl_ext")
+    if device is None or egl is None:
+        return None
+    last = len(egl.eglQueryDevicesEXT()) - 1
+    if last < 0 or (device.strip().isdecimal() and int(device) <= last):
+        return None
+    expected = f"an integer from 0 to {last}" if last else "0, as there is one device"
+    return f"{_DEVICE}: expected {expected}, got {checks.quoted(device)!r}; unset it to take any device"
 
 
 def _remedy() -> str:

@@ -309,3 +309,17 @@ def test_more_steps_than_an_episode_has(make):
 def test_a_renderer_of_the_user_has_room():
     buffer = arc_suite.load("tick", "walk").physics.model.ptr.vis.global_
     assert buffer.offwidth >= 1920 and buffer.offheight >= 1080  # `mujoco.Renderer` refuses more than that
+
+
+def test_progress_before_a_reset():
+    with pytest.raises(RuntimeError) as caught:
+        _ = arc_suite.load("tick", "walk").task.progress
+    assert str(caught.value) == "no episode has begun; call reset first"
+
+
+def test_bodies_of_other_formats(tmp_path):
+    (tmp_path / "q.xml").write_text("<mujoco/>")
+    with pytest.raises(ValueError) as caught:
+        arc_suite.load(str(tmp_path / "q.xml"), "walk")
+    message = "expected a body in JSON, got XML: MJCF and URDF cannot be read; see docs/bodies.md"
+    assert str(caught.value) == f"{tmp_path / 'q.xml'}: {message}"

@@ -28,6 +28,7 @@ def train(
     threads: int = 1,
     progress: Callable = tqdm,
     on_metrics: Callable[[int, Mapping[str, float]], None] = lambda step, metrics: None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> bool:
     """Train, resume, or extend a run to more steps if its algorithm can.
 
@@ -39,6 +40,7 @@ def train(
         progress: makes a progress bar as `tqdm` does.
         on_metrics: called after each line of training.csv, and after each evaluation, with the environment step and
             metrics by name; the metric of an evaluation is `return`.
+        stop: returns whether to stop; the next checkpoint is still written.
 
     Returns:
         Whether the run is finished.
@@ -102,6 +104,8 @@ def train(
             is_written = found.metrics is not None or is_evaluated
             clocks = _write_times(run_files, state, clocks, found.step, is_written)
             run_files.save(found.checkpoint, state)
+            if stop():
+                return state["evaluated"] >= context.steps
     return True
 
 

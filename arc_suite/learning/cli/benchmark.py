@@ -19,9 +19,9 @@ from absl import flags
 
 from arc_suite import checks
 from arc_suite.cli.program import marked_page, progress, resumable
-from arc_suite.envs.vector import usable_cores
 from arc_suite.learning.studies import benchmark, leaderboard, publication, report, results, runner, tables
 from arc_suite.learning.studies.divisions import DIVISIONS, PLACES, SEEDS
+from arc_suite.simulation.cores import usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_string("algorithm", "ppo", "As in arc-suite train.")

@@ -17,8 +17,8 @@ from absl import flags
 
 from arc_suite import versions
 from arc_suite.cli.program import progress, resumable
-from arc_suite.envs.vector import usable_cores
 from arc_suite.learning.studies import publication, report, runner, tables
+from arc_suite.simulation.cores import usable_cores
 
 FLAGS = flags.FLAGS
 flags.DEFINE_integer("jobs", None, "Runs at a time. [default: as many as cores]", lower_bound=1)

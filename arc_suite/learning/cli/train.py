@@ -23,7 +23,7 @@ from absl import flags
 
 from arc_suite import evaluation, files, registry, versions
 from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_values, only_body, task
-from arc_suite.cli.program import progress, resumable, say, use_one_thread
+from arc_suite.cli.program import TERMINATED, progress, resumable, say, termination, use_one_thread
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
 from arc_suite.learning import onnx_file
@@ -58,8 +58,8 @@ flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TAS
 _OF_THE_RUN = ("robot", "spec", "legs", "links", "task", "set", "algorithm", "hp", "seed", "steps", "prior")
 
 
-def main() -> None:
-    """Train, and print the return at the end."""
+def main() -> int:
+    """Train, print the return at the end, and return the exit status."""
     use_one_thread()
     run = configured()
     folder = Path(FLAGS.output or Path("runs", run.name))
@@ -77,11 +77,12 @@ def main() -> None:
             return progress(*args, **kwargs)
 
         limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
-        with resumable(folder):
-            finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics)
+        with resumable(folder), termination() as terminated:
+            finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics, stop=terminated)
     if finished and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
+    return TERMINATED if not finished and terminated() else 0
 
 
 def configured() -> Configuration:
