@@ -181,12 +181,9 @@ def outcome(*uses: Callable[[], object], limit: float = LIMIT) -> str:
 def _tried(use: Callable[[], object]) -> str:
     try:
         use()
-    except (ValueError, OSError) as error:
-        if "\n" not in str(error) and 0 < len(str(error)) < 2000:
+    except BaseException as error:
+        if isinstance(error, ValueError | OSError) and "\n" not in str(error) and 0 < len(str(error)) < 2000:
             return REFUSED
-        traceback.print_exc()
-        return TRACEBACK
-    except BaseException:
         traceback.print_exc()
         return TRACEBACK
     return READ

@@ -5,9 +5,11 @@ import math
 import interpreters
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from synthetic import DT, synthetic
 
 import arc_suite
+from arc_suite.animation.style_plots import BLUE, OF_GAIT, PALE, PICTURES, VERMILION, gait
 from arc_suite.cpg import Demonstrator
 from arc_suite.style import record
 
@@ -15,8 +17,6 @@ from arc_suite.style import record
 @pytest.mark.long
 @pytest.mark.parametrize("count", [1, 2])
 def test_pictures(tmp_path, count):
-    from arc_suite.animation.style_plots import PICTURES
-
     tracks = {"left": synthetic(late=(0, 2, 0, 0)), "right": synthetic(course=math.pi / 2, dragged=0)}
     tracks = dict(list(tracks.items())[:count])
     assert list(PICTURES) == ["gait", "reward", "speed", "path"]
@@ -27,8 +27,6 @@ def test_pictures(tmp_path, count):
 
 @pytest.mark.slow
 def test_pictures_of_a_task_without_a_gait_or_a_way_to_go():
-    from arc_suite.animation.style_plots import OF_GAIT, PICTURES
-
     walk = synthetic()
     steer, stay = (
         walk._replace(target_velocity=math.nan, **changes) for changes in ({}, {"phases": None, "parameters": None})
@@ -44,10 +42,6 @@ def test_pictures_of_a_task_without_a_gait_or_a_way_to_go():
 
 
 def test_gait_diagram_shows_stance_and_schedule():
-    from matplotlib.colors import to_hex
-
-    from arc_suite.animation.style_plots import BLUE, PALE, VERMILION, gait
-
     track = synthetic(late=(0, 4, 0, 0))
     (axis,) = gait({"a": track}).axes
     seconds = dict.fromkeys((PALE, BLUE, VERMILION), 0.0)
@@ -65,8 +59,6 @@ def test_gait_diagram_shows_stance_and_schedule():
 
 @pytest.mark.slow
 def test_pictures_of_a_track_of_one_step():
-    from arc_suite.animation.style_plots import PICTURES
-
     track = record(arc_suite.load("tick", "walk"), Demonstrator("tick"), seed=0, max_steps=1)
     for draw in PICTURES.values():
         draw({"a": track})

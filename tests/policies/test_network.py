@@ -25,6 +25,15 @@ def saved(tmp_path):
     return tmp_path
 
 
+DAMAGED = r"policy\.npz: no policy, or a damaged one: "
+
+
+def assert_refused(path, line):
+    with pytest.raises(ValueError, match=line) as error:
+        policies.policy(str(path), "tick")
+    assert "\n" not in str(error.value)
+
+
 def rewritten(saved, name, change):
     """Change an array of the file, and return the file."""
     with np.load(saved / "policy.npz") as stored:
@@ -93,9 +102,9 @@ def test_an_environment_does_the_same_alone(num_envs):
     assert np.array_equal(policy.actions(observations), alone)
 
 
-@pytest.mark.parametrize("policy", [made(), legs.network()], ids=["one body", "many bodies"])
-def test_comes_back_from_a_file_to_the_bit(tmp_path, policy):
-    network.save(tmp_path / "policy.npz", policy)
+@pytest.mark.parametrize("make", [made, legs.network], ids=["one body", "many bodies"])
+def test_comes_back_from_a_file_to_the_bit(tmp_path, make):
+    network.save(tmp_path / "policy.npz", policy := make())
     again = network.load(tmp_path / "policy.npz")
     assert again[1:] == policy[1:]
     assert again.graph.nodes == policy.graph.nodes and again.graph.arrays.keys() == policy.graph.arrays.keys()
@@ -108,9 +117,8 @@ def test_is_a_policy_of_every_program(saved, name, monkeypatch):
     """By the folder of a run, or the file; in a batch and alone it does the same."""
     policy = policies.policy(str(saved / name), "tick")
     envs = VectorEnv("tick", "walk", 3, 1, "Disabled")
-    assert evaluation.episodes_in_batch(envs, policy, range(3)) == evaluation.episodes(
-        arc_suite.load("tick", "walk"), policy, range(3)
-    )
+    alone = evaluation.episodes(arc_suite.load("tick", "walk"), policy, range(3))
+    assert evaluation.episodes_in_batch(envs, policy, range(3)) == alone
     monkeypatch.chdir(saved.parent)
     assert policies.policy(saved.name, "tick").setup.robot == "tick"
 
@@ -121,8 +129,7 @@ def test_of_another_body(saved):
     body = generator.random_body(3)
     network.save(saved / "policy.npz", made(body))
     assert policies.policy(str(saved), body).joints == len(body.joint_names)
-    with pytest.raises(ValueError, match=f"^policy .*: made for {body.name}, and not for tick$"):
-        policies.policy(str(saved), "tick")
+    assert_refused(saved, f"^policy .*: made for {body.name}, and not for tick$")
 
 
 def test_blocks_that_its_task_excluded_are_left_out(saved):
@@ -154,9 +161,7 @@ def test_no_file_is_one_line(tmp_path):
 def test_damaged_files(saved, kept):
     file = saved / "policy.npz"
     file.write_bytes(file.read_bytes()[:kept])
-    with pytest.raises(ValueError, match=r"policy\.npz: no policy, or a damaged one: ") as caught:
-        policies.policy(str(file), "tick")
-    assert "\n" not in str(caught.value)
+    assert_refused(file, DAMAGED)
 
 
 @pytest.mark.parametrize(
@@ -186,8 +191,7 @@ def test_damaged_files(saved, kept):
 )
 def test_files_made_in_bad_faith(saved, change, line):
     described = lambda array: np.array(json.dumps(json.loads(str(array)) | change))  # noqa: E731
-    with pytest.raises(ValueError, match=line):
-        policies.policy(str(rewritten(saved, "policy", described)), "tick")
+    assert_refused(rewritten(saved, "policy", described), line)
 
 
 @pytest.mark.parametrize(
@@ -205,8 +209,7 @@ def test_files_made_in_bad_faith(saved, change, line):
     ],
 )
 def test_arrays_made_in_bad_faith(saved, name, change, line):
-    with pytest.raises(ValueError, match=rf"policy\.npz: no policy, or a damaged one: {line}"):
-        policies.policy(str(rewritten(saved, name, change)), "tick")
+    assert_refused(rewritten(saved, name, change), DAMAGED + line)
 
 
 def test_archives_made_in_bad_faith(saved):
@@ -214,16 +217,13 @@ def test_archives_made_in_bad_faith(saved):
     file = saved / "policy.npz"
     np.savez_compressed(file, policy=np.zeros(1 << 26))
     assert file.stat().st_size < 1 << 20
-    with pytest.raises(ValueError, match=r"policy\.npz: .* expected at most 268435456 bytes, got 536\d+$"):
-        policies.policy(str(file), "tick")
+    assert_refused(file, r"policy\.npz: .* expected at most 268435456 bytes, got 536\d+$")
     with zipfile.ZipFile(file, "w", zipfile.ZIP_LZMA) as archive:
         archive.writestr("policy.npy", b"")
-    with pytest.raises(ValueError, match=r"policy\.npz: .* policy\.npy: expected no compression, or deflate$"):
-        policies.policy(str(file), "tick")
+    assert_refused(file, r"policy\.npz: .* policy\.npy: expected no compression, or deflate$")
     file.unlink()
     os.mkfifo(file)
-    with pytest.raises(ValueError, match=r"policy\.npz: .* expected a file$"):
-        policies.policy(str(file), "tick")
+    assert_refused(file, r"policy\.npz: .* expected a file$")
 
 
 def test_a_policy_of_torques_is_refused_where_positions_are_taken(saved):

@@ -251,9 +251,11 @@ def test_clips_are_in_step(robot):
 
 
 @pytest.mark.parametrize("robot", EACH)
-def test_clips_connect(robot):
+def test_clips_connect_and_last_whole_frames(robot):
     """A stop begins with the walk's first pose and ends with idle's, a start the other way round."""
     clips = made(robot)
+    for clip in clips.values():
+        assert clip.motion.seconds * 30.0 == pytest.approx(round(clip.motion.seconds * 30.0), abs=1e-9)
     for before, after in (("walk", "stop"), ("stop", "idle"), ("idle", "start"), ("start", "walk")):
         for one, other in zip(clips[before].motion.pose(-1), clips[after].motion.pose(0), strict=True):
             np.testing.assert_allclose(one, other, atol=1e-6)
@@ -302,12 +304,6 @@ def test_what_is_too_far_from_the_walk_is_left_out(monkeypatch):
     with pytest.warns(UserWarning, match="^tick, clip stop is left out: its pose is 0 degrees from that of the walk"):
         (walk,) = export.clips(Setup.of("tick", "steer"), ["walk", "stop"])
     assert walk.name == "walk"
-
-
-@pytest.mark.parametrize("robot", EACH)
-def test_clips_last_whole_frames(robot):
-    for clip in made(robot).values():
-        assert clip.motion.seconds * 30.0 == pytest.approx(round(clip.motion.seconds * 30.0), abs=1e-9)
 
 
 @pytest.mark.parametrize("robot", EACH)

@@ -38,25 +38,19 @@ def test_logarithm_undoes_along(twist):
     np.testing.assert_allclose(root_motion.logarithm(place[1]), twist, atol=1e-12)
 
 
-def test_along_adds_small_steps():
+def test_along_adds_small_steps_and_relative_undoes_after():
     twist, place = np.array((0.4, -0.1, 0.8)), np.zeros(3)
     small = root_motion.along(twist, np.array([1e-3]))[0]
     for _ in range(1000):
         place = root_motion.after(place, small)
     np.testing.assert_allclose(root_motion.along(twist, np.array([1.0]))[0], place, atol=1e-12)
-
-
-def test_relative_undoes_after():
     first, second = np.array((1.0, 2.0, 0.7)), np.array((-0.5, 0.2, 2.0))
     np.testing.assert_allclose(root_motion.relative(first, root_motion.after(first, second)), second)
 
 
-def test_the_period_is_the_cycle():
-    assert loops.period(walk(TWISTS[0])) == pytest.approx(CYCLE, abs=STEP)
-
-
-def test_what_does_not_return_has_no_period():
+def test_the_period_is_the_cycle_if_the_pose_returns():
     recording = walk(TWISTS[0])
+    assert loops.period(recording) == pytest.approx(CYCLE, abs=STEP)
     random = np.random.default_rng(0).normal(size=(len(recording.qpos), 2)).cumsum(axis=0)
     assert loops.period(recording._replace(qpos=np.concatenate([recording.qpos[:, :7], random], axis=-1))) is None
 

@@ -146,21 +146,11 @@ def test_what_a_widget_offers_is_taken(studio):
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        ("policy", "file.py:make"),
-        ("policy", "os:system"),
-        ("policy", ["cpg"]),
-        ("task", "antigravity:walk"),
-        ("source", "antigravity:queen"),
-        ("ground", "antigravity:flat"),
-        ("speed", 2.0001),
-        ("speed", float("nan")),
-        ("speed", True),
-        ("speed", "1"),
-        ("seed", -1),
-        ("seed", 2**32),
-        ("kicks", 10**400),
-        ("settings", " " * (gate.LONGEST_TEXT + 1)),
-        ("settings", 5),
+        *(("policy", value) for value in ("file.py:make", "os:system", ["cpg"])),
+        *(("task", "antigravity:walk"), ("source", "antigravity:queen"), ("ground", "antigravity:flat")),
+        *(("speed", value) for value in (2.0001, float("nan"), True, "1")),
+        *(("seed", -1), ("seed", 2**32), ("kicks", 10**400)),
+        *(("settings", value) for value in (" " * (gate.LONGEST_TEXT + 1), 5)),
     ],
 )
 def test_no_other_value_is_taken(studio, name, value):

@@ -1,7 +1,6 @@
 """The program: what its flags say."""
 
-import subprocess
-import sys
+import interpreters
 
 from arc_suite.animation.studio.sketch import FILE, OWN, Sketch
 from arc_suite.robots import generator
@@ -37,6 +36,4 @@ def test_flags(tmp_path):
         ),
     }
     code = SKETCHES.format(arguments=[list(each) for each in arguments])
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert [eval(line) for line in done.stdout.splitlines()] == list(arguments.values())
+    assert [eval(line) for line in interpreters.printed(code, folder=tmp_path)] == list(arguments.values())

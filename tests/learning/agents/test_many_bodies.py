@@ -24,6 +24,13 @@ SMALL = {"num_envs": 4, "round": 8, "left_out": 2, "updates": 20, "last_updates"
 PPO = {"num_envs": 4, "horizon": 6, "minibatch": 8, "hidden": 8, "value_warm_up": 6}
 
 
+def trained(folder, setup=SETUP, algorithm="dagger_bodies"):
+    """Train a short run in a folder, and return its configuration."""
+    run = Configuration.of(setup, algorithm, SMALL, steps=64, evaluate_every=64)
+    assert train(run, folder)
+    return run
+
+
 @pytest.fixture(scope="module")
 def vectors():
     """Observations of two bodies."""
@@ -85,8 +92,7 @@ def test_it_resumes_bit_exactly(algorithm, tmp_path):
     """Episodes of ten steps begin and end meanwhile; demonstrators have a memory."""
     changes = SMALL
     if algorithm == "finetune_bodies":
-        start = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
-        assert train(start, tmp_path / "start")
+        trained(tmp_path / "start")
         changes = PPO | {"start": str(tmp_path / "start")}
 
     def begun(checkpoint=None):
@@ -103,9 +109,8 @@ def test_it_resumes_bit_exactly(algorithm, tmp_path):
 
 
 def test_a_run_makes_a_policy_of_any_body(tmp_path):
-    run = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
+    run = trained(tmp_path / "run")
     assert run.name == "random.0-1-steer-dagger_bodies-0"
-    assert train(run, tmp_path / "run")
     assert Configuration.from_dict(run.to_dict()) == run
     made = network.load(tmp_path / "run")
     assert made.setup == SETUP
@@ -127,17 +132,12 @@ def test_what_learns_with_one_body_alone_is_one_line():
         Configuration.of(SETUP, "sac")
 
 
-def test_a_start_of_other_layers_is_one_line(tmp_path):
-    run = Configuration.of(SETUP, "dagger_bodies", SMALL, steps=64, evaluate_every=64)
-    assert train(run, tmp_path / "start")
+def test_a_start_that_does_not_fit_is_one_line(tmp_path):
+    trained(tmp_path / "start")
     begun = learning("finetune_bodies", PPO | {"start": str(tmp_path / "start"), "hidden": 16}, tmp_path, SETUP)
     with pytest.raises(ValueError, match=r"start: expected 16 hidden units, got 8$"):
         begun.advance()
-
-
-def test_a_start_of_one_body_is_one_line(tmp_path):
-    run = Configuration.of(Setup.of("leaper", "steer"), "dagger", SMALL, steps=64, evaluate_every=64)
-    assert train(run, tmp_path / "one")
+    trained(tmp_path / "one", Setup.of("leaper", "steer"), "dagger")
     begun = learning("finetune_bodies", PPO | {"start": str(tmp_path / "one")}, tmp_path, SETUP)
     with pytest.raises(ValueError, match=r"one: expected one of many bodies, got one of leaper$"):
         begun.advance()
