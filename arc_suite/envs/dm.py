@@ -213,6 +213,20 @@ class Environment(KnownAttributes, control.Environment):
         return self.task.observation_spec(self.physics)
 
 
+class _Now:
+    """What every step sets, in an object of its own: setting an attribute of a `TaskRun` is checked, and slower.
+
+    Attributes:
+        memory: of the present episode; None before the first.
+        readings: of the latest step; None where they are to be taken anew.
+        terms: unweighted, of the latest reward by name.
+    """
+
+    def __init__(self):
+        """Start before the first episode."""
+        self.memory, self.readings, self.terms = None, None, {}
+
+
 class TaskRun(TaskView, KnownAttributes, control.Task):
     """A task in one simulation, episode after episode, as dm_control's `Task`: it keeps the memory.
 
@@ -221,7 +235,6 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         opened: the task before `Environment.change_settings`.
         next_changes: JSON of the settings that differ in the next episode.
         memory: of the present episode, as the next step will find it; None before the first.
-        terms: the unweighted terms of the latest reward by name; empty before the first step.
         visualize_reward: whether rendered pictures show the reward as a colour.
     """
 
@@ -242,14 +255,12 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             random = np.random.RandomState(None if random is None else checks.seed(random))
         self.definition = self.opened = self._next = task
         self._changes = self.next_changes = "{}"
-        self._memory, self._stream = None, None
+        self._now, self._stream = _Now(), None
         self._commands = LiveCommands()
-        self.terms = {}
         self.visualize_reward = False
         self.random = random
         self._on_divergence = checks.name(on_divergence, ("raise", "terminate"), "on_divergence")
         self._flat = flat
-        self._readings = None
         self._starting = False  # between a reset and its observation
         self._motors = (len(task.scene.body.joint_names),)
         self._made = __name__
@@ -264,13 +275,18 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._random, self._stream_begins = value, True
 
     @property
+    def terms(self) -> Mapping[str, Any]:
+        """The unweighted terms of the latest reward by name; empty before the first step."""
+        return self._now.terms
+
+    @property
     def memory(self) -> Any:
         """The memory of the present episode."""
-        return self._commands.seen(self.definition, self._memory)
+        return self._commands.seen(self.definition, self._now.memory)
 
     @memory.setter
     def memory(self, value: Any):
-        self._memory = value
+        self._now.memory = value
 
     @property
     def progress(self) -> dict[str, float]:
@@ -279,9 +295,9 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         Raises:
             RuntimeError: before the first reset.
         """
-        if self._memory is None:
+        if self._now.memory is None:
             raise RuntimeError("no episode has begun; call reset first")
-        return self.definition.progress(self._memory)
+        return self.definition.progress(self._now.memory)
 
     def set_command(self, name: str, value) -> None:
         """Set a live command; see `Environment.command`.
@@ -290,7 +306,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             ValueError: no such command, a value that does not fit, or no episode has begun.
         """
         value = checked_command(self.definition, name, value)
-        if self._memory is None:
+        if self._now.memory is None:
             raise ValueError(f"command {name!r}: no episode has begun; reset first")
         self._commands.put(name, value)
 
@@ -306,7 +322,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
     def initialize_episode(self, physics):
         """Draw how the episode starts, and write it."""
         self._take_commands()
-        self._stream = self._next.first() if self._stream_begins else self.definition.stream_state(self._memory)
+        self._stream = self._next.first() if self._stream_begins else self.definition.stream_state(self._now.memory)
         self._stream_begins = False
         self.definition, self._changes = self._next, self.next_changes
         start = self.definition.start(self._random, self._stream)
@@ -317,7 +333,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         if start.mocap_pos is not None:
             data.mocap_pos[:] = start.mocap_pos
         physics.shown_reward, physics.marker, physics.failed_legs = None, self.markers, self.failed_legs
-        self._memory, self._starting = start.memory, True
+        self._now.memory, self._starting = start.memory, True
 
     def before_step(self, action, physics):
         """Apply the action, clipped to [-1, 1].
@@ -326,7 +342,9 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             ValueError: the action has another shape or holds NaN; nothing has changed then.
         """
         action = checked_action(action, self._motors)
-        self._memory, inputs = self.definition.before(self._commands.taken(self.definition, self._memory), action)
+        self._now.memory, inputs = self.definition.before(
+            self._commands.taken(self.definition, self._now.memory), action
+        )
         data = physics.data.ptr
         physics.marker, physics.failed_legs = self.markers, self.failed_legs  # which a copy of the simulation has not
         data.ctrl[:] = inputs.ctrl
@@ -341,16 +359,16 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """
         if physics.divergence is not None and self._on_divergence == "raise":
             raise control.PhysicsError(f"{self.body.name}: {physics.divergence}")
-        self._readings = self.definition.read(physics.data.ptr)
-        self._memory = self.definition.after(self._memory, self._readings)
+        self._now.readings = self.definition.read(physics.data.ptr)
+        self._now.memory = self.definition.after(self._now.memory, self._now.readings)
 
     def get_reward(self, physics):
         """Return the reward of the latest step, whose terms stay in `terms`."""
         task, weights = self.definition, self.definition.settings.weights
-        raw = task.terms(self._memory, self._latest(physics))
+        raw = task.terms(self._now.memory, self._latest(physics))
         if physics.divergence is not None:
             raw = dict.fromkeys(raw, np.float64(0.0))
-        self.terms, reward = terms.reward(raw, weights, task.cost_limit)
+        self._now.terms, reward = terms.reward(raw, weights, task.cost_limit)
         if self.visualize_reward:
             physics.shown_reward = reward / (terms.greatest(weights) or 1.0)
         return reward
@@ -358,15 +376,15 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
     def get_observation(self, physics):
         """Return the observation's blocks by name; or one vector of them, as `observations`."""
         readings = self._begin(physics) if self._starting else self._latest(physics)
-        blocks = self.definition.observe(self._memory, readings)
+        blocks = self.definition.observe(self._now.memory, readings)
         return {_FLAT: self.definition.vector(blocks)} if self._flat else self.definition.named(blocks)
 
     def get_termination(self, physics):
         """Return 0 where the task is failed or the physics has diverged, 1 where it cuts the episode off, else None."""
         if physics.divergence is not None:
             return 0.0
-        terminated, truncated = self.definition.ended(self._memory, self._latest(physics))
-        self._readings = None  # stale as soon as the simulation moves
+        terminated, truncated = self.definition.ended(self._now.memory, self._latest(physics))
+        self._now.readings = None  # stale as soon as the simulation moves
         return 0.0 if terminated else 1.0 if truncated else None
 
     def markers(self, physics):
@@ -375,7 +393,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     def failed_legs(self) -> tuple[str, ...]:
         """Return the names of the legs whose motors have failed."""
-        return self.definition.failed_legs(self._memory)
+        return self.definition.failed_legs(self._now.memory)
 
     def put_changes(self, changes: str, task: Task, restart: bool) -> None:
         """Let a task with changed settings, and JSON of these, hold from the next episode on.
@@ -389,11 +407,11 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         """Return the state of an environment, with a leading axis, given that of its simulation."""
         self._take_commands()
         task = self.definition
-        observation = task.vector(task.observe(self._memory, task.read(physics.data.ptr)), np.float32)
+        observation = task.vector(task.observe(self._now.memory, task.read(physics.data.ptr)), np.float32)
         own = (-1, self._stream_begins, steps, ended, False, observation)
         return snapshots.State(
             simulations=simulations,
-            memory=trees.mapped(lambda leaf: np.asarray(leaf)[None], self._memory),
+            memory=trees.mapped(lambda leaf: np.asarray(leaf)[None], self._now.memory),
             streams=[self._stream],
             randoms=[self._random.get_state()],
             own={name: np.asarray(value)[None] for name, value in zip(snapshots.OWN, own, strict=True)},
@@ -402,28 +420,30 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
 
     def restore(self, state: snapshots.State, task: Task, next_task: Task) -> None:
         """Go on from a state, given the task of its episode and that of the next."""
-        self._memory = trees.mapped(lambda leaf, like: snapshots.number(leaf[0], like), state.memory, self._memory)
+        self._now.memory = trees.mapped(
+            lambda leaf, like: snapshots.number(leaf[0], like), state.memory, self._now.memory
+        )
         (self._stream,), (self._changes,), (self.next_changes,) = state.streams, *state.settings
-        self.definition, self._next, self._readings, self._starting = task, next_task, None, False
+        self.definition, self._next, self._now.readings, self._starting = task, next_task, None, False
         self._random.set_state(state.randoms[0])
         self._stream_begins = bool(state.own["streams_begin"][0])
 
     def _take_commands(self) -> None:
-        if self._memory is not None:
-            self._memory = self._commands.taken(self.definition, self._memory)
+        if self._now.memory is not None:
+            self._now.memory = self._commands.taken(self.definition, self._now.memory)
 
     def _latest(self, physics):
         """The readings of the latest step."""
-        return self._readings or self.definition.read(physics.data.ptr)
+        return self._now.readings or self.definition.read(physics.data.ptr)
 
     def _begin(self, physics):
         """Return the readings of the start, from which the memory keeps what the first step needs."""
         self._starting, data = False, physics.data.ptr
         readings = self.definition.read(data)
-        lifted = self.definition.clear_spawn(self._memory, readings)
+        lifted = self.definition.clear_spawn(self._now.memory, readings)
         if lifted is not None:
             data.qpos[:] = lifted
             physics.after_reset()
             readings = self.definition.read(data)
-        self._memory, self._readings = self.definition.begin(self._memory, readings), None
+        self._now.memory, self._now.readings = self.definition.begin(self._now.memory, readings), None
         return readings

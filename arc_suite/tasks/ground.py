@@ -280,7 +280,7 @@ class Lanes(Ground):
         position, heading, arena = readings.torso_position, place[..., 2], context.arena
         numpy = position.__array_namespace__()
         reach = numpy.asarray(context.reach)[..., None]
-        forward, left = (numpy.asarray(places) * reach for places in SCAN)
+        forward, left = numpy.asarray(SCAN[0]) * reach, numpy.asarray(SCAN[1]) * reach
         cosine, sine = numpy.cos(heading)[..., None], numpy.sin(heading)[..., None]
         x = position[..., 0:1] + cosine * forward - sine * left
         y = position[..., 1:2] + sine * forward + cosine * left

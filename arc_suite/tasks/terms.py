@@ -75,19 +75,24 @@ def _limited(terms: Mapping, weights: Mapping, limit) -> dict:
     Small costs count in full, and more always costs more. Random actions cost the most; within a limit it pays to
     stay alive while a learner explores.
     """
-    costs = {name: weight for name, weight in weights.items() if _differs(weight) or weight < 0.0}
+    if np.ndarray in map(type, weights.values()):
+        return _limited_each(terms, weights, limit)
+    costs = [name for name, weight in weights.items() if weight < 0.0]
     if not costs:
         return {}
-    parts = {name: weight.clip(max=0.0) if _differs(weight) else weight for name, weight in costs.items()}
-    excess = _total(terms, parts, parts) / limit
+    excess = _total(terms, weights, costs) / limit
     share = 1.0 / excess.__array_namespace__().sqrt(1.0 + excess * excess)
-    shares = {name: np.where(each < 0.0, share, 1.0) if _differs(each) else share for name, each in costs.items()}
-    return {name: terms[name] * shares[name] for name in costs}
+    return {name: terms[name] * share for name in costs}
 
 
-def _differs(weight) -> bool:
-    """Whether environments have different ones."""
-    return isinstance(weight, np.ndarray) and weight.ndim > 0
+def _limited_each(terms: Mapping, weights: Mapping, limit) -> dict:
+    """Return the costs limited where environments have different weights, a term's of either sign."""
+    parts = {name: np.minimum(weight, 0.0) for name, weight in weights.items() if np.any(np.less(weight, 0.0))}
+    if not parts:
+        return {}
+    excess = _total(terms, parts, parts) / limit
+    share = 1.0 / np.sqrt(1.0 + excess * excess)
+    return {name: terms[name] * np.where(part < 0.0, share, 1.0) for name, part in parts.items()}
 
 
 def _total(terms: Mapping, weights: Mapping, names: Iterable[str]):
