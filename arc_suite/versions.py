@@ -30,6 +30,23 @@ class MissingExtra(ImportError, ValueError):
         super().__init__(f"{need}: {remedy} ({error})")
 
 
+@contextlib.contextmanager
+def needing(need: str, extra: str):
+    """Name the extra that is missing where imports in this context fail.
+
+    Args:
+        need: what needs which package, such as "ONNX needs onnx".
+        extra: of setup.cfg.
+
+    Raises:
+        MissingExtra: in place of another ImportError.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise MissingExtra(need, extra, error) from None
+
+
 def installed(package: str) -> str | None:
     """Return the version of an installed package; None for one that is not installed."""
     from importlib import metadata  # slow to import, and seldom needed

@@ -35,12 +35,7 @@ class Inline:
 
 
 def show(
-    environment,
-    policy: str | Policy | Callable = "cpg",
-    *,
-    seed: int = 0,
-    steps: int | None = None,
-    film: bool = False,
+    environment, policy: str | Policy | Callable = "cpg", *, seed: int = 0, steps: int | None = None, film: bool = False
 ) -> Inline:
     """Return a walk that a notebook shows inline.
 
@@ -98,12 +93,8 @@ def _film(environment: Environment, policy: Policy, seed: int, steps: int) -> st
     body = environment.task.body.name
     footage, file = films.Footage(body, environment, policies.alone(policy, seed), "profile", _SIZE), io.BytesIO()
     with contextlib.closing(footage):
-        stride, frames = films.steps_per_frame(footage.control_timestep), [footage.view()]
-        while footage.steps < steps and not footage.ended:
-            for _ in range(min(stride, steps - footage.steps)):
-                footage.step()
-            frames.append(footage.view())
-        films.write_gif(file, frames, stride * footage.control_timestep)
+        seconds = films.steps_per_frame(footage.control_timestep) * footage.control_timestep
+        films.write_gif(file, [footage.view(), *films.frames(footage, steps)], seconds)
     source = f"data:image/gif;base64,{base64.b64encode(file.getvalue()).decode()}"
     return _element("img", src=source, width=str(_SIZE[0]), height=str(_SIZE[1]), alt=body)
 

@@ -19,6 +19,7 @@ from arc_suite.animation.colours import of_terms
 from arc_suite.animation.parts import parts as described
 from arc_suite.animation.scenery import scenery
 from arc_suite.models.outline import outline
+from arc_suite.robots.spec import Body
 from arc_suite.style.tracks import Track
 
 _DIGITS = 6  # behind the point: micrometres, microradians
@@ -66,17 +67,19 @@ def page(tracks: Mapping[str, Track]) -> str:
     )
 
 
+def drawn(body: Body) -> dict[str, Any]:
+    """Return what a page draws of a body, its parts and their materials, with its height and reach, m."""
+    parts, materials = described(body)
+    sizes = {"height": body.torso.standing_height, "reach": float(abs(outline(body)).max())}
+    return sizes | {"parts": plain(parts), "materials": plain(materials)}
+
+
 def _walk(label: str, track: Track) -> dict[str, Any]:
     """What the viewer takes of a track, in MuJoCo's axes."""
-    parts, materials = described(track.body)
     stance = track.parameters is not None
-    return {
+    return drawn(track.body) | {
         "label": label,
-        "height": track.body.torso.standing_height,
-        "reach": float(abs(outline(track.body)).max()),
         "step": track.time_step,
-        "parts": [plain(part._asdict() | {"shapes": [shape._asdict() for shape in part.shapes]}) for part in parts],
-        "materials": {name: plain(material._asdict()) for name, material in materials.items()},
         "scenery": plain(scenery(track)),
         "positions": plain(track.positions),
         "quaternions": plain(track.quaternions),
@@ -97,6 +100,8 @@ def plain(value, digits: int | None = _DIGITS):
         value: of finite numbers, text, None and truth values.
         digits: behind the point, to which numbers are rounded; None for all.
     """
+    if hasattr(value, "_asdict"):
+        value = value._asdict()
     if isinstance(value, dict):
         return {name: plain(item, digits) for name, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -93,19 +93,11 @@ def _part(model: mujoco.MjModel, index: int, ids: list[int]) -> Part:
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
-    return Shape(
-        kind=KINDS[int(model.geom_type[geom])],
-        size=model.geom_size[geom],
-        place=model.geom_pos[geom],
-        quaternion=model.geom_quat[geom],
-        material=model.material(model.geom_matid[geom]).name,
-    )
+    kind, material = KINDS[int(model.geom_type[geom])], model.material(model.geom_matid[geom]).name
+    return Shape(kind, model.geom_size[geom], model.geom_pos[geom], model.geom_quat[geom], material)
 
 
 def _material(model: mujoco.MjModel, name: str) -> Material:
     index = model.material(name).id
-    return Material(
-        colour=model.mat_rgba[index, :3],
-        emission=float(model.mat_emission[index]),
-        roughness=1.0 - float(model.mat_shininess[index]),
-    )
+    roughness = 1.0 - float(model.mat_shininess[index])
+    return Material(model.mat_rgba[index, :3], float(model.mat_emission[index]), roughness)

@@ -16,11 +16,9 @@ import numpy as np
 
 from arc_suite import models, policies
 from arc_suite.animation import pages
-from arc_suite.animation.parts import parts as described
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.steering import Steered
 from arc_suite.envs.setup import Setup
-from arc_suite.models.outline import outline
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import universal, zips
 from arc_suite.policies.network import Network
@@ -74,17 +72,10 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         task, driver = steer, _law(steer, preset or "steered")
     else:
         task, driver = _graph(body, policy, steer)
-    parts, materials = described(body)
-    return {
+    return pages.drawn(body) | {
         "name": body.name,
-        "height": body.torso.standing_height,
-        "reach": float(abs(outline(body)).max()),
         "timestep": steer.scene.control_timestep / SUBSTEPS,
         "substeps": SUBSTEPS,
-        "parts": [
-            pages.plain(part._asdict() | {"shapes": [shape._asdict() for shape in part.shapes]}) for part in parts
-        ],
-        "materials": {name: pages.plain(material._asdict()) for name, material in materials.items()},
         "grounds": {name: _ground(body, arena) for name, arena in GROUNDS.items()},
         "task": pages.plain(_task(task, steer), digits=None),
         "policy": pages.plain(driver, digits=None),

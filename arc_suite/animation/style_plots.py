@@ -38,6 +38,10 @@ _LOOK: dict[Any, Any] = {
 }
 _WIDTH = 9.5  # inches
 _BELOW: dict[str, Any] = {"loc": "outside lower center", "handlelength": 1.4, "borderpad": 0.2}  # a legend
+_ARROWS: dict[str, Any] = {"angles": "xy", "scale_units": "xy", "width": 0.003}
+_ARROWS |= {"headwidth": 5, "headlength": 5.5, "headaxislength": 5}
+_BESIDE: dict[str, Any] = {"alignment": "left", "loc": "center left", "bbox_to_anchor": (1.01, 0.5)}  # a legend
+_BESIDE |= {"fontsize": 8.5, "labelspacing": 0.3, "handlelength": 1.2}
 _WINDOW = 4.0  # s of foot contacts
 
 
@@ -94,11 +98,7 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
         "stance as prescribed": BLUE,
         "stance in place of swing": VERMILION,
     }
-    figure.legend(
-        handles=[Patch(color=colour, label=text) for text, colour in entries.items()],
-        ncols=3,
-        **_BELOW,
-    )
+    figure.legend(handles=[Patch(color=colour, label=text) for text, colour in entries.items()], ncols=3, **_BELOW)
     return figure
 
 
@@ -115,36 +115,18 @@ def reward(tracks: Mapping[str, Track]) -> Figure:
             floor = np.zeros(len(track.times))
             for name in names:
                 ceiling = floor + _over_a_cycle(track, weighted[name])
-                handles[name] = axis.fill_between(
-                    track.times,
-                    floor,
-                    ceiling,
-                    facecolor=of_terms(weighted)[name],
-                    linewidth=0,
-                    label=f"{weighted[name].mean():+.3f}  {name.replace('_', ' ')}",
-                )
+                look = {"facecolor": of_terms(weighted)[name], "linewidth": 0}
+                label = f"{weighted[name].mean():+.3f}  {name.replace('_', ' ')}"
+                handles[name] = axis.fill_between(track.times, floor, ceiling, label=label, **look)
                 floor = ceiling
-        (total,) = axis.plot(
-            track.times,
-            _over_a_cycle(track, track.rewards),
-            color="black",
-            linewidth=1.2,
-            label=f"{track.rewards.mean():+.3f}  reward",
-        )
+        means, label = _over_a_cycle(track, track.rewards), f"{track.rewards.mean():+.3f}  reward"
+        (total,) = axis.plot(track.times, means, color="black", linewidth=1.2, label=label)
         axis.axhline(0.0, color="white", linewidth=0.8)
         axis.set_title(f"{label}: return {track.rewards.sum():.0f}")
         axis.set_ylabel("reward a step")
         axis.set_xlim(0.0, track.times[-1])
-        axis.legend(
-            handles=[total, *(handles[name] for name in (*reversed(gains), *costs))],
-            title="mean a step",
-            alignment="left",
-            loc="center left",
-            bbox_to_anchor=(1.01, 0.5),
-            fontsize=8.5,
-            labelspacing=0.3,
-            handlelength=1.2,
-        )
+        entries = [total, *(handles[name] for name in (*reversed(gains), *costs))]
+        axis.legend(handles=entries, title="mean a step", **_BESIDE)
     axes[-1].set_xlabel("time (s)")
     return figure
 
@@ -190,19 +172,8 @@ def path(tracks: Mapping[str, Track]) -> Figure:
         axis.plot(x, y, color=colour, linewidth=1.6, label=f"{label}: {x[-1] - x[0]:.1f} m forward")
         path = np.concatenate([[0.0], np.hypot(np.diff(x), np.diff(y)).cumsum()])
         arrows = np.flatnonzero(np.diff(path // (0.08 * width))) + 1
-        axis.quiver(
-            x[arrows],
-            y[arrows],
-            *metrics.forward_axes(track)[arrows, :2].T,
-            color=colour,
-            angles="xy",
-            scale_units="xy",
-            scale=25.0 / width,
-            width=0.003,
-            headwidth=5,
-            headlength=5.5,
-            headaxislength=5,
-        )
+        facing = metrics.forward_axes(track)[arrows, :2].T
+        axis.quiver(x[arrows], y[arrows], *facing, color=colour, scale=25.0 / width, **_ARROWS)
     axis.plot(*points[0], "o", color=INK, markersize=5, zorder=5)
     axis.set_xlim(0.5 * (left + right - width), 0.5 * (left + right + width))
     axis.set_ylim(0.5 * (low + high - height), 0.5 * (low + high + height))

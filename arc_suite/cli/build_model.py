@@ -18,7 +18,7 @@ from absl import flags
 
 from arc_suite import checks, files, models, registry
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, task
+from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
 from arc_suite.envs.setup import Setup
 from arc_suite.robots import generator, spec_files
@@ -26,9 +26,8 @@ from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
 
 FLAGS = flags.FLAGS
-define_body()
+define_body(robot=None)
 define_task()
-flags.DEFINE_string("robot", None, f"{ROBOT_HELP}.")
 flags.DEFINE_integer("seed", None, "A random body; with --legs or --links, of that many.", lower_bound=0)
 flags.DEFINE_enum(
     "layout",

@@ -19,25 +19,15 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, policies, seed_ranges
-from arc_suite.cli.flags import (
-    MOST,
-    ROBOT_HELP,
-    define_body,
-    define_policy,
-    define_task,
-    made_body,
-    policy_name,
-    setups,
-)
+from arc_suite.cli.flags import MOST, define_body, define_policy, define_task, made_body, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
 from arc_suite.policies import checkpoints
 from arc_suite.tasks.contract import STEPS
 
 FLAGS = flags.FLAGS
-define_body()
+define_body(more=", or all in turn")
 define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all in turn.")
 define_policy()
 flags.DEFINE_integer("checkpoint", None, "Environment step of the checkpoint of the run that --policy names.", 0)
 flags.DEFINE_enum(
@@ -79,10 +69,10 @@ def main() -> None:
         from arc_suite import data
     except ImportError as error:
         raise ValueError(str(error)) from None
-    asked = setups(_ROBOT)
+    asked = setups()
     if FLAGS.verify is not None:
         setup = next(iter(asked.values()))
-        body = setup.body if _ROBOT.present or made_body() else None
+        body = setup.body if FLAGS["robot"].present or made_body() else None
         task = setup.task if FLAGS["task"].present else None
         count = data.verify(FLAGS.verify, body, FLAGS.num_envs, FLAGS.threads, progress, task)
         print(f"{FLAGS.verify}: {count} episodes replayed, all bit-equal")

@@ -17,26 +17,13 @@ from collections.abc import Mapping
 from absl import flags
 
 from arc_suite import checks, evaluation, files, policies, seed_ranges, versions
-from arc_suite.cli.flags import (
-    MOST,
-    ROBOT_HELP,
-    define_body,
-    define_policy,
-    define_preset,
-    define_task,
-    policy_name,
-    setups,
-)
+from arc_suite.cli.flags import MOST, define_walk, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.cpg import suited_preset
 from arc_suite.evaluation import anchors, provenance
 
 FLAGS = flags.FLAGS
-define_body()
-define_task()
-_ROBOT = flags.DEFINE_string("robot", "all", f"{ROBOT_HELP}, or all.")
-define_policy()
-define_preset()
+define_walk("all", ", or all")
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes for each robot.", 1, MOST)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON, with every episode.")
@@ -58,7 +45,7 @@ def line(first: str, metrics: Mapping[str, str], *cells: str) -> str:
 
 def main() -> None:
     """Print the table and write the JSON."""
-    asked = setups(_ROBOT)
+    asked = setups()
     checks.seed(FLAGS.seed + FLAGS.episodes - 1)
     chosen, players, presets = policy_name(FLAGS.policy), {}, {}
     training_seeds = provenance.training_seeds(chosen, range(FLAGS.seed, FLAGS.seed + FLAGS.episodes))

@@ -21,8 +21,14 @@ MOST = 100_000  # episodes, or bodies: more than anyone waits for
 ROBOT_HELP = f"{', '.join(registry.words())}; a JSON file; module:name of one that another package has"
 
 
-def define_body() -> None:
-    """Define --spec, --legs, --links, --length and --palette, for programs that take any body."""
+def define_body(robot: str | None = "queen", more: str = "") -> None:
+    """Define --robot, --spec, --legs, --links, --length and --palette, for programs that take any body.
+
+    Args:
+        robot: default of --robot.
+        more: end of its help.
+    """
+    flags.DEFINE_string("robot", robot, f"{ROBOT_HELP}{more}.")
     examples = ", ".join(spec_files.EXAMPLES)
     flags.DEFINE_string("spec", None, f"A body in place of a robot: a JSON file, or one of {examples}.")
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
@@ -111,21 +117,35 @@ def made_body() -> Body | None:
     return body if FLAGS.palette is None else body.replace(palette=palettes.parsed(FLAGS.palette))
 
 
-def bodies(robot: flags.FlagHolder, near: Iterable[str] = ("all",)) -> dict[str, Body]:
-    """Return bodies by name: the one made, or those that a program's flag --robot names, which may be "all".
+def define_walk(robot: str = "queen", more: str = "", task: str = "walk", policy: str = policies.HELP) -> None:
+    """Define the flags of a program in which a policy walks bodies: of bodies, task, policy and preset.
+
+    Args:
+        robot: default of --robot.
+        more: end of its help.
+        task: default of --task.
+        policy: help of --policy.
+    """
+    define_body(robot, more)
+    define_task(task)
+    define_policy(policy)
+    define_preset()
+
+
+def bodies(near: Iterable[str] = ("all",)) -> dict[str, Body]:
+    """Return bodies by name: the one made, or those that --robot names, which may be "all".
 
     For names see `registry.bodies_of`. Flaws of the body of --spec, such as feet in the floor, are warned of with the
     values that fit, as `arc-suite check` has them.
 
     Args:
-        robot: the flag.
-        near: other values of it that an unknown robot may mean.
+        near: other values of --robot that an unknown robot may mean.
 
     Raises:
         ValueError: as `made_body`, or an unknown robot, or a robot and a body.
         OSError: as `made_body`.
     """
-    body = made_body()
+    body, robot = made_body(), FLAGS["robot"]
     if body is None:
         return dict(ROBOTS) if robot.value == "all" else _named(robot.value, near)
     if robot.present:
@@ -143,27 +163,26 @@ def _named(robot: str, near: Iterable[str]) -> dict[str, Body]:
     return named
 
 
-def only_body(robot: flags.FlagHolder) -> Body:
+def only_body() -> Body:
     """Return the body of a program that takes one alone; see `bodies`.
 
     Raises:
         ValueError: as `bodies`, or several bodies.
         OSError: as `bodies`.
     """
-    body, *others = bodies(robot, near=()).values()
+    body, *others = bodies(near=()).values()
     if others:
-        raise ValueError(f"--robot={robot.value}: expected one robot")
+        raise ValueError(f"--robot={FLAGS.robot}: expected one robot")
     return body
 
 
-def setups(robot: flags.FlagHolder, stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
+def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
     """Return the setups that --robot, --spec, --legs, --task and --set ask for, by name of the body.
 
     A trained policy, or a file of tracks, brings what the flags leave open, and a line says what: its body; without
     --task its task and settings, which --set changes. A curriculum is for training, and is left out.
 
     Args:
-        robot: the flag.
         stored: the setup of tracks; None for that of --policy.
         near: see `bodies`.
 
@@ -171,10 +190,10 @@ def setups(robot: flags.FlagHolder, stored: Setup | None = None, near: Iterable[
         ValueError: as `bodies`, `task` and `policies.setup_of`.
         OSError: as `bodies` and `policies.setup_of`.
     """
-    named, (name, settings) = bodies(robot, near), task()  # first: this imports the modules that flags name
+    named, (name, settings) = bodies(near), task()  # first: this imports the modules that flags name
     own = stored or trained()
     name, settings = completed(own, name, settings)
-    found = {body.name: Setup.of(body, name, settings) for body in own_bodies(own, robot, named).values()}
+    found = {body.name: Setup.of(body, name, settings) for body in own_bodies(own, named).values()}
     fitting = [each for each in found.values() if own and (own.several or each.body == own.body)]
     if fitting and not stored:
         others = [each for each in fitting if (each.task, each.task_kwargs) != (own.task, own.task_kwargs)]
@@ -193,9 +212,9 @@ def trained() -> Setup | None:
     return own and own.judging()
 
 
-def own_bodies(own: Setup | None, robot: flags.FlagHolder, named: dict[str, Body]) -> dict[str, Body]:
+def own_bodies(own: Setup | None, named: dict[str, Body]) -> dict[str, Body]:
     """Return the body of a policy or of tracks by name where no flag names one, else those of the flags."""
-    if own is None or own.several or robot.present or made_body():
+    if own is None or own.several or FLAGS["robot"].present or made_body():
         return named
     return {own.body.name: own.body}
 
@@ -205,16 +224,16 @@ def completed(own: Setup | None, name: str, settings: dict[str, Any]) -> tuple[s
     return (name, settings) if own is None or FLAGS["task"].present else (own.task, own.task_kwargs | settings)
 
 
-def only_setup(robot: flags.FlagHolder) -> Setup:
+def only_setup() -> Setup:
     """Return the setup of a program that takes one body; see `setups`.
 
     Raises:
         ValueError: as `setups`, or several bodies.
         OSError: as `setups`.
     """
-    found, *others = setups(robot, near=()).values()
+    found, *others = setups(near=()).values()
     if others:
-        raise ValueError(f"--robot={robot.value}: expected one robot")
+        raise ValueError(f"--robot={FLAGS.robot}: expected one robot")
     return found
 
 

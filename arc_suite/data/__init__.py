@@ -9,11 +9,9 @@ A recorded episode, replayed::
 
 from arc_suite import versions
 
-try:
+with versions.needing("datasets need Minari", "data"):
     import h5py  # noqa: F401
     import minari  # noqa: F401
-except ImportError as error:
-    raise versions.MissingExtra("datasets need Minari", "data", error) from error
 
 from arc_suite.data.collection import collect
 from arc_suite.data.dataset import Dataset, open

@@ -63,11 +63,9 @@ def save(path: str | os.PathLike, network: Network) -> None:
         OSError: the file cannot be written.
     """
     known = metadata(network)
-    try:
+    with versions.needing("ONNX needs the package onnx", "learn"):
         import onnx
         from onnx import TensorProto, helper, numpy_helper
-    except ImportError as error:
-        raise versions.MissingExtra("ONNX needs the package onnx", "learn", error) from None
     nodes, arrays = _standard(network.graph)
     made = helper.make_graph(
         [helper.make_node(operator, names, [result], **attributes) for operator, names, result, attributes in nodes],

@@ -29,12 +29,10 @@ class Case(NamedTuple):
     Attributes:
         setup: a body in a kind of walk, whose settings have a `time_limit`.
         seed: of the initial pose.
-        froude: desired speed in units of sqrt(g h); None for the medium one, negative for backwards.
     """
 
     setup: Setup
     seed: int = 0
-    froude: float | None = None
 
 
 class Outcome(NamedTuple):
@@ -88,7 +86,7 @@ def play(case: Case) -> tuple[control.Environment, Trajectory]:
         The environment as the walk left it, and the walk.
     """
     environment = case.setup.load(case.seed)
-    demonstrator = Demonstrator(environment, "medium" if case.froude is None else case.froude)
+    demonstrator = Demonstrator(environment, "medium")
     data = environment.physics.data.ptr
     shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in case.setup.body.torso.solids]
     step, ending = environment.reset(), "time"
@@ -108,16 +106,11 @@ def play(case: Case) -> tuple[control.Environment, Trajectory]:
 def assess(case: Case, trajectory: Trajectory) -> Outcome:
     """Return whether a trajectory is a walk, and if not, why; see `failures`."""
     body, seconds = case.setup.body, case.setup.task_kwargs["time_limit"]
-    forward, sideways = apart = trajectory.positions[-1] - trajectory.positions[0]
-    touching = trajectory.touching.mean()
-    return Outcome(
-        case=case,
-        froude=float(_froude(body, forward, seconds)),
-        lengths=float(forward / _length(body)),
-        drift=float(abs(sideways) / max(abs(forward), 1e-9)),
-        touching=float(touching),
-        failures=failures(body, apart, seconds, touching, trajectory.ending),
-    )
+    apart, touching = trajectory.positions[-1] - trajectory.positions[0], float(trajectory.touching.mean())
+    forward, sideways = apart.tolist()
+    found = failures(body, apart, seconds, touching, trajectory.ending)
+    drift = abs(sideways) / max(abs(forward), 1e-9)
+    return Outcome(case, _froude(body, forward, seconds), forward / _length(body), drift, touching, found)
 
 
 def failures(body: Body, apart: np.ndarray, seconds: float, touching: float, ending: str = "time") -> tuple[str, ...]:
@@ -184,12 +177,9 @@ def table(outcomes: Sequence[Outcome]) -> str:
     """Return a table of the bodies that walked and their median speed, by legs and links."""
     links = sorted({outcome.links for outcome in outcomes})
     lines = ["legs " + "".join(f"{f'{k} link' + 's' * (k > 1):>18}" for k in links) + f"{'all':>18}"]
-    for legs in sorted({outcome.legs for outcome in outcomes}):
-        row = [o for o in outcomes if o.legs == legs]
-        cells = [_cell([o for o in row if o.links == k]) for k in links]
-        lines.append(f"{legs:>4} " + "".join(cells) + _cell(row))
-    columns = [_cell([o for o in outcomes if o.links == k]) for k in links]
-    lines.append(" all " + "".join(columns) + _cell(outcomes))
+    for legs in (*sorted({outcome.legs for outcome in outcomes}), "all"):
+        row = [o for o in outcomes if legs in (o.legs, "all")]
+        lines.append(f"{legs:>4} " + "".join(_cell([o for o in row if o.links == k]) for k in links) + _cell(row))
     return "\n".join(lines)
 
 
@@ -205,10 +195,8 @@ def summary(outcomes: Sequence[Outcome]) -> str:
     walked = sum(not outcome.failures for outcome in outcomes)
     reasons = collections.Counter(reason for outcome in outcomes for reason in outcome.failures)
     speed, drift = (np.median([getattr(outcome, name) for outcome in outcomes]) for name in ("froude", "drift"))
-    return "\n".join(
-        [
-            f"{walked} of {len(outcomes)} bodies walk ({100.0 * walked / len(outcomes):.1f} %)",
-            f"failures: {', '.join(f'{name} {count}' for name, count in reasons.items()) or 'none'}",
-            f"median speed {speed:.3f} sqrt(g h), median drift {drift:.3f}",
-        ]
+    return (
+        f"{walked} of {len(outcomes)} bodies walk ({100.0 * walked / len(outcomes):.1f} %)\n"
+        f"failures: {', '.join(f'{name} {count}' for name, count in reasons.items()) or 'none'}\n"
+        f"median speed {speed:.3f} sqrt(g h), median drift {drift:.3f}"
     )

@@ -5,6 +5,7 @@ return says nothing across bodies, as costs are sums over feet and joints: score
 still, 0, to the body's own demonstrator, 1.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
@@ -28,18 +29,6 @@ STEPS = 400  # control steps of an episode
 _WORST = 0.1  # share of the bodies whose mean is told too
 
 
-class Family(NamedTuple):
-    """Bodies that test a policy.
-
-    Attributes:
-        made: the body of an index from 0 on.
-        count: number of bodies.
-    """
-
-    made: Callable[[int], Body]
-    count: int  # type: ignore[assignment]  # hides the method of tuples
-
-
 def _robot(index: int) -> Body:
     """A robot of the suite with motors sized anew."""
     body = generator.scaled(tuple(ROBOTS.values())[index % len(ROBOTS)], 1.0)
@@ -51,15 +40,16 @@ def _mutant(index: int) -> Body:
     return body.replace(torso=body.torso.replace(standing_height=None))
 
 
-FAMILIES = {
-    "random": Family(lambda index: generator.random_body(TEST + index), 50),
-    "varied": Family(lambda index: varied_body(TEST + index), 50),
-    "robots": Family(_robot, 4),
-    "mutants": Family(_mutant, 20),
-    "many_legs": Family(lambda index: generator.random_body(TEST + index, legs=9 + index % 4), 20),
-    "four_links": Family(lambda index: generator.random_body(TEST + index, links=4), 20),
-    "small": Family(lambda index: generator.scaled(generator.random_body(TEST + index), 0.25), 10),
-    "large": Family(lambda index: generator.scaled(generator.random_body(TEST + index), 10.0), 10),
+# Bodies that test a policy: what makes one of an index from 0 on, and how many there are.
+FAMILIES: dict[str, tuple[Callable[[int], Body], int]] = {
+    "random": (lambda index: generator.random_body(TEST + index), 50),
+    "varied": (lambda index: varied_body(TEST + index), 50),
+    "robots": (_robot, 4),
+    "mutants": (_mutant, 20),
+    "many_legs": (lambda index: generator.random_body(TEST + index, legs=9 + index % 4), 20),
+    "four_links": (lambda index: generator.random_body(TEST + index, links=4), 20),
+    "small": (lambda index: generator.scaled(generator.random_body(TEST + index), 0.25), 10),
+    "large": (lambda index: generator.scaled(generator.random_body(TEST + index), 10.0), 10),
 }
 
 
@@ -109,7 +99,6 @@ class TransferResult(NamedTuple):
         demonstrated: share of the bodies that their demonstrators walk.
         score: gain of the policy over standing still, as a share of the demonstrators': sums over bodies.
         worst: the same of the tenth of the bodies with the lowest scores.
-        share: mean of the policy's return as a share of the demonstrator's.
         tracking: mean tracking as a share of the demonstrators' mean; NaN in tasks without this metric.
     """
 
@@ -118,7 +107,6 @@ class TransferResult(NamedTuple):
     demonstrated: float
     score: float
     worst: float
-    share: float
     tracking: float
 
 
@@ -135,28 +123,18 @@ def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mappi
         ValueError: a task or a body that does not fit.
     """
     bodies = list(bodies)
-    environment = BodiesEnv(
-        task,
-        len(bodies),
-        bodies,
-        num_threads=1,
-        autoreset_mode=AutoresetMode.DISABLED,
-        max_episode_steps=STEPS,
-        task_kwargs=settings,
-        flat=True,
-    )
-    try:
+    options = {"num_threads": 1, "autoreset_mode": AutoresetMode.DISABLED, "max_episode_steps": STEPS, "flat": True}
+    environment = BodiesEnv(task, len(bodies), bodies, task_kwargs=settings, **options)
+    with contextlib.closing(environment):
         zero = Script(lambda seed: (), *environment.action_space.shape)
         played = [_episodes(environment, policy) for policy in (network, Teacher(environment), zero)]
-    finally:
-        environment.close()
     return [Comparison(*each) for each in zip([body.name for body in bodies], *played, strict=True)]
 
 
 def of_family(name: str, network: Network, task: str, settings: Mapping | None = None) -> list[Comparison]:
     """Play the episodes of a family of `FAMILIES`; see `compare`."""
-    family = FAMILIES[name]
-    bodies = [family.made(index) for index in range(family.count)]
+    made, count = FAMILIES[name]
+    bodies = [made(index) for index in range(count)]
     return compare(network, tqdm(bodies, desc=name, unit="body", leave=False, disable=None), task, settings)
 
 
@@ -172,7 +150,6 @@ def result(played: list[Comparison]) -> TransferResult:
         demonstrated=float(np.mean([each.demonstrator.walked for each in played])),
         score=_gain(scored),
         worst=_gain(worst),
-        share=float(np.mean([each.policy.total / each.demonstrator.total for each in played])),
         tracking=float(policy / demonstrator),
     )
 

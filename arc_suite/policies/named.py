@@ -251,10 +251,8 @@ _UNKNOWN = "does not hold the robot and task that it was trained for; train in a
 
 
 def _saved(path: Path, statistics: Path | None):
-    try:
+    with versions.needing(f"policy {path}: zips need stable-baselines3", "sb3"):
         from arc_suite.policies import sb3_file
-    except ImportError as error:
-        raise versions.MissingExtra(f"policy {path}: zips need stable-baselines3", "sb3", error) from None
     return sb3_file.Saved(path, zips.statistics(path, statistics))
 
 

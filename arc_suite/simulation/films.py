@@ -98,6 +98,15 @@ def cycle(footage: Footage, count: int) -> Iterator[np.ndarray]:
         yield captioned(footage.view(), f"phase {footage.phase:.2f}")
 
 
+def frames(footage: Footage, steps: int) -> Iterator[np.ndarray]:
+    """Yield the view after every `steps_per_frame` control steps, up to a number of steps or the end of the episode."""
+    stride = steps_per_frame(footage.control_timestep)
+    while footage.steps < steps and not footage.ended:
+        for _ in range(min(stride, steps - footage.steps)):
+            footage.step()
+        yield footage.view()
+
+
 def steps_per_frame(control_timestep: float) -> int:
     """Return how many control steps a frame of a film shows, so that players keep its pace."""
     return math.ceil(_SHORTEST_FRAME / control_timestep)
@@ -136,10 +145,8 @@ def write_mp4(path: Path, frames: Iterable[np.ndarray], seconds: float) -> None:
     Raises:
         ValueError: imageio-ffmpeg is not installed.
     """
-    try:
+    with versions.needing("MP4 needs imageio-ffmpeg", "video"):
         import imageio_ffmpeg  # noqa: F401
-    except ImportError as error:
-        raise versions.MissingExtra("MP4 needs imageio-ffmpeg", "video", error) from None
     with imageio.get_writer(
         path,
         format="FFMPEG",

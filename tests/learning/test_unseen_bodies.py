@@ -26,11 +26,11 @@ def test_a_score_is_the_way_from_standing_to_the_demonstrator():
 
 
 def test_families_hold_bodies_that_nobody_trains_with():
-    named = {name: family.made(0).name for name, family in transfer.FAMILIES.items()}
+    named = {name: made(0).name for name, (made, _) in transfer.FAMILIES.items()}
     assert named["random"] == "random_200000" and named["varied"] == "varied_200000"
-    robots = [transfer.FAMILIES["robots"].made(index) for index in range(4)]
+    robots = [transfer.FAMILIES["robots"][0](index) for index in range(4)]
     assert all(body.name not in ROBOTS for body in robots)
-    small, large = (transfer.FAMILIES[name].made(0) for name in ("small", "large"))
+    small, large = (transfer.FAMILIES[name][0](0) for name in ("small", "large"))
     ratio = large.torso.solids[0].size[0] / small.torso.solids[0].size[0]
     assert ratio == pytest.approx(40.0)
 
@@ -39,7 +39,7 @@ def test_families_hold_bodies_that_nobody_trains_with():
 def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
     """Scale changes little: small and large bodies of a seed earn the same, up to the noise of starts."""
     monkeypatch.setattr(transfer, "STEPS", 120)
-    bodies = [transfer.FAMILIES[name].made(0) for name in ("small", "large")]
+    bodies = [transfer.FAMILIES[name][0](0) for name in ("small", "large")]
     small, large = transfer.compare(drawn(), bodies, "walk")
     assert small.demonstrator.walked and large.demonstrator.walked
     assert not small.policy.walked and not small.zero.walked
@@ -51,6 +51,6 @@ def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
 @pytest.mark.slow
 def test_tracking_of_tasks_with_a_command(monkeypatch):
     monkeypatch.setattr(transfer, "STEPS", 60)
-    played = transfer.compare(drawn(task="steer"), [transfer.FAMILIES["random"].made(1)], "steer")
+    played = transfer.compare(drawn(task="steer"), [transfer.FAMILIES["random"][0](1)], "steer")
     assert 0.0 < played[0].demonstrator.tracking <= 1.0
     assert np.isfinite(transfer.result(played).tracking)

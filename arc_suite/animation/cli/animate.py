@@ -10,6 +10,7 @@ number of cycles. start and stop connect idle and walk. tuned and refined are pr
 with a gait of their own. A clip that cannot be made is left out with a line.
 """
 
+import functools
 import math
 from pathlib import Path
 
@@ -17,34 +18,20 @@ from absl import flags
 
 from arc_suite import checks, files
 from arc_suite.animation import clips as export
-from arc_suite.cli.flags import (
-    ROBOT_HELP,
-    define_body,
-    define_policy,
-    define_preset,
-    define_task,
-    only_setup,
-    policy_name,
-)
+from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.cli.program import VERSION, progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
 
 FLAGS = flags.FLAGS
-define_body()
-define_task("steer")
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
-define_policy()
-define_preset()
+define_walk(task="steer")
 flags.DEFINE_list(
     "clips", list(export.DEFAULT), f"Which, with commas between them: {', '.join(export.CLIPS)}; or {export.ALL}."
 )
 flags.DEFINE_float("fps", export.FPS, "Frames a second.", 1.0, 1000.0)
 flags.DEFINE_string("rig", "skin", f"{' or '.join(export.RIGS)}: bones and one mesh, or rigid parts.")
 flags.DEFINE_string(
-    "root_motion",
-    "both",
-    "moving: the root goes as the body walks; in_place: it stays; both: each clip twice.",
+    "root_motion", "both", "moving: the root goes as the body walks; in_place: it stays; both: each clip twice."
 )
 flags.DEFINE_bool("straight", False, "Loops that do not turn go exactly where they are to, and do not veer.")
 flags.DEFINE_bool("plant", False, "Feet in stance stay where they are, by inverse kinematics, and do not slide.")
@@ -55,23 +42,16 @@ def main() -> None:
     """Record, write both files and print a row for each clip."""
     checks.name(FLAGS.rig, export.RIGS, "rig")
     checks.name(FLAGS.root_motion, export.ROOT_MOTIONS, "root_motion")
-    setup = only_setup(_ROBOT)
+    setup = only_setup()
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
     checks.extension(FLAGS.output, [".glb"])
     sidecar = Path(FLAGS.output).with_suffix(".clips.json")
     names = list(export.CLIPS) if FLAGS.clips == [export.ALL] else FLAGS.clips
     with files.writing(FLAGS.output) as temporary, files.writing_json(sidecar) as metrics:
-        clips = export.clips(
-            setup,
-            names,
-            policy_name(FLAGS.policy),
-            FLAGS.preset,
-            FLAGS.fps,
-            lambda recordings: progress(recordings, "recording", unit="clip", leave=False),
-            straight=FLAGS.straight,
-            plant=FLAGS.plant,
-        )
+        recording = functools.partial(progress, desc="recording", unit="clip", leave=False)
+        policy = policy_name(FLAGS.policy), FLAGS.preset
+        clips = export.clips(setup, names, *policy, FLAGS.fps, recording, FLAGS.straight, FLAGS.plant)
         temporary.write_bytes(export.glb(setup.body, clips, FLAGS.rig, FLAGS.root_motion, VERSION))
         metrics |= export.sidecar(setup.body, clips, FLAGS.root_motion)
     print_table(clips)

@@ -14,10 +14,8 @@ import itertools
 import json
 import math
 import multiprocessing
-import os
 import pathlib
 import signal
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
@@ -72,9 +70,8 @@ def budget(around: Body | None) -> Budget:
     Raises:
         ValueError: a number out of range.
     """
-    usual = (
-        {"mass": standing(around).mass, "span": float(extent(around).max())} if around else {"mass": MASS, "span": SPAN}
-    )
+    mass, span = (standing(around).mass, float(extent(around).max())) if around else (MASS, SPAN)
+    usual = {"mass": mass, "span": span}
     given = {name: FLAGS[name].value for name in Budget._fields if FLAGS[name].value is not None}
     return Budget(**{name: checks.number(name, value, *_BOUNDS[name]) for name, value in (usual | given).items()})
 
@@ -88,36 +85,18 @@ def evaluators(processes: int | None) -> Iterator[Callable[[Iterable[tuple]], li
     # Processes inherit that they ignore Ctrl-C, which the parent answers. Spawned, not forked: a fork would share
     # whatever OpenGL or threads the caller has open.
     answer = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    pool = multiprocessing.get_context("spawn").Pool(processes, _begin)
+    pool = multiprocessing.get_context("spawn").Pool(processes)
     signal.signal(signal.SIGINT, answer)
     with pool:
         yield lambda jobs: pool.starmap(evaluate, jobs, chunksize=1)
 
 
-def _begin() -> None:
-    """End this process when its parent ends."""
-
-    def follow() -> None:
-        multiprocessing.parent_process().join()
-        os._exit(1)
-
-    threading.Thread(target=follow, daemon=True).start()
-
-
 def settled(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
     """Return what determines a search, as JSON holds it: lists in place of tuples."""
-    values = {
-        "task": trial.task,
-        "goal": trial.goal,
-        "budget": trial.budget._asdict(),
-        "first": trial.first._asdict(),
-        "second": trial.second._asdict(),
-        "map": cells._asdict(),
-        "around": around and body_to_json(around),
-        "amount": around and FLAGS.amount,
-        "seed": FLAGS.seed,
-        "versions": versions.recorded(),
-    }
+    values = {"task": trial.task, "goal": trial.goal}
+    values |= {name: getattr(trial, name)._asdict() for name in ("budget", "first", "second")}
+    values |= {"map": cells._asdict(), "around": around and body_to_json(around), "amount": around and FLAGS.amount}
+    values |= {"seed": FLAGS.seed, "versions": versions.recorded()}
     return json.loads(json.dumps(values))
 
 

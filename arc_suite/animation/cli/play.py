@@ -16,21 +16,11 @@ from absl import flags
 
 from arc_suite import checks, files
 from arc_suite.animation import play
-from arc_suite.cli.flags import (
-    ROBOT_HELP,
-    bodies,
-    define_body,
-    define_policy,
-    define_preset,
-    own_bodies,
-    policy_name,
-    trained,
-)
+from arc_suite.cli.flags import bodies, define_body, define_policy, define_preset, own_bodies, policy_name, trained
 from arc_suite.cli.program import progress
 
 FLAGS = flags.FLAGS
-define_body()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all of them to choose from.")
+define_body(more=", or all of them to choose from")
 define_policy()
 define_preset()
 flags.DEFINE_string("output", None, "File to write, .html. Required.", short_name="o")
@@ -41,8 +31,8 @@ def main() -> None:
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.html")
     checks.extension(FLAGS.output, [".html"])
-    named = bodies(_ROBOT)  # first: this imports the modules that flags name
-    walkers = progress(own_bodies(trained(), _ROBOT, named).values(), "fitting", leave=False)
+    named = bodies()  # first: this imports the modules that flags name
+    walkers = progress(own_bodies(trained(), named).values(), "fitting", leave=False)
     with files.writing(FLAGS.output) as temporary:
         page = play.page([play.creature(body, policy_name(FLAGS.policy), FLAGS.preset) for body in walkers])
         temporary.write_text(page, encoding="utf-8")

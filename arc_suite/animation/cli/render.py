@@ -21,15 +21,7 @@ from absl import flags
 
 from arc_suite import checks, files, style
 from arc_suite.animation import pages
-from arc_suite.cli.flags import (
-    ROBOT_HELP,
-    define_body,
-    define_policy,
-    define_preset,
-    define_task,
-    policy_name,
-    setups,
-)
+from arc_suite.cli.flags import define_walk, policy_name, setups
 from arc_suite.cli.program import progress
 from arc_suite.models.builder import CAMERAS
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
@@ -41,11 +33,7 @@ _SIZES = {".png": (640, 480), ".mp4": (640, 480), ".gif": (240, 180), ".webp": (
 _CYCLE_VIEWS, _CYCLE_COLUMNS = 6, 3
 
 FLAGS = flags.FLAGS
-define_body()
-define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all of them side by side.")
-define_policy()
-define_preset()
+define_walk(more=", or all of them side by side")
 flags.DEFINE_integer("seed", 0, "Seed of the start of the episode and of the random policy.", 0, 2**32 - 1)
 flags.DEFINE_string("camera", None, f"{', '.join(CAMERAS)}. [default: profile, of several robots portrait]")
 flags.DEFINE_integer("width", None, "Of a view, in pixels. [default: 640, in a GIF 240, in a WebP 480]", 16, MAX_WIDTH)
@@ -64,7 +52,7 @@ flags.DEFINE_string("output", None, "File to write: .png, .mp4, .gif, .webp or .
 
 def main() -> None:
     """Play the episodes, write the file and print the returns."""
-    walkers = setups(_ROBOT)
+    walkers = setups()
     usual = "profile" if len(walkers) == 1 else "portrait"
     camera = checks.name(usual if FLAGS.camera is None else FLAGS.camera, CAMERAS, "camera")
     environments = {name: setup.load(FLAGS.seed) for name, setup in walkers.items()}

@@ -19,52 +19,31 @@ from absl import flags
 from arc_suite import versions
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import OWN, Sketch, cured, sources
-from arc_suite.cli.flags import (
-    ROBOT_HELP,
-    define_body,
-    define_policy,
-    define_preset,
-    define_task,
-    named_values,
-    only_setup,
-    policy_name,
-)
+from arc_suite.cli.flags import define_walk, named_values, only_setup, policy_name
 
 FLAGS = flags.FLAGS
-define_body()
-define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
-define_policy()
-define_preset()
+define_walk()
 flags.DEFINE_string("host", "127.0.0.1", "Address to listen on; 0.0.0.0 lets in everyone who can reach this machine.")
 flags.DEFINE_integer("port", 8080, "Port to listen on; the next free one if it is taken.", 1, 65535)
 
 
 def main() -> None:
     """Open the page and step until Ctrl-C."""
-    try:
+    with versions.needing("the studio needs viser", "animate"):
         from arc_suite.animation.studio.page import serve
-    except ImportError as error:
-        raise versions.MissingExtra("the studio needs viser", "animate", error) from None
     serve(Session(_sketch()), FLAGS.host, FLAGS.port, lambda url: print(f"the studio is at {url}", flush=True))
 
 
 def _sketch() -> Sketch:
     """Return what the flags say."""
-    setup = only_setup(_ROBOT)
+    setup = only_setup()
     settings = setup.task_kwargs
     ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
-    doing = Sketch(
-        task=setup.task,
-        ground=ground,
-        kicks=kicks,
-        settings=json.dumps(settings),
-        policy=policy_name(FLAGS.policy),
-        preset=FLAGS.preset or OWN,
-    )
+    player = {"policy": policy_name(FLAGS.policy), "preset": FLAGS.preset or OWN}
+    doing = Sketch(task=setup.task, ground=ground, kicks=kicks, settings=json.dumps(settings), **player)
     shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
     if FLAGS.legs is not None:
         return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)
-    if (source := FLAGS.spec or (_ROBOT.value if _ROBOT.present else setup.robot)) in sources():
+    if (source := FLAGS.spec or (FLAGS.robot if FLAGS["robot"].present else setup.robot)) in sources():
         return dataclasses.replace(doing, source=source, **shape)
     return cured(doing, setup.body)

@@ -14,43 +14,24 @@ browser. What every metric means is written in arc_suite/style/metrics.py.
 import contextlib
 import math
 import pathlib
+from collections.abc import Callable
 
 from absl import flags
 
 from arc_suite import evaluation, files, style, versions
 from arc_suite.animation import pages
-from arc_suite.cli.flags import (
-    MOST,
-    ROBOT_HELP,
-    bodies,
-    define_body,
-    define_policy,
-    define_preset,
-    define_task,
-    policy_name,
-    setups,
-    task,
-)
+from arc_suite.cli.flags import MOST, bodies, define_walk, policy_name, setups, task
 from arc_suite.cli.program import progress
 from arc_suite.style import sources
 
 FLAGS = flags.FLAGS
-define_body()
-define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}, or all. [default: the one of stored tracks, else queen]")
-define_policy(sources.HELP)
-define_preset()
+define_walk(more=", or all; without it, the one of stored tracks", policy=sources.HELP)
 flags.DEFINE_string("compare", None, "A second policy, file or dataset to compare with.")
 flags.DEFINE_string("compare_preset", None, "Preset of --compare, if that is the cpg. [default: as of --preset]")
 flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many episodes; of stored ones, at most.", 1, MOST)
 flags.DEFINE_integer("seed", 0, "Seed of the first episode; the others count on from it.", lower_bound=0)
 flags.DEFINE_string("json", None, "File to write the metrics to, as JSON.")
-flags.DEFINE_string(
-    "output",
-    None,
-    "Folder to write pictures to, made if need be; of several robots, a folder in it for each.",
-    short_name="o",
-)
+flags.DEFINE_string("output", None, "Folder of pictures; of several robots, a folder in it for each.", short_name="o")
 flags.DEFINE_string("page", None, "File to write a page to that plays the first episodes side by side (.html).")
 flags.DEFINE_string("save", None, "File to save the tracks of --policy to (.npz).")
 
@@ -114,97 +95,73 @@ def print_report(robot: str, reports: dict) -> None:
         print_table(f"{robot}, {label}", list(first["metrics"]["foot_slip"]["legs"]), rows)
 
 
-@contextlib.contextmanager
-def pictures(robots: list[str]):
-    """Yields a function that writes the pictures of a robot's tracks by label; does nothing without `--output`."""
-    if FLAGS.output is None:
-        yield lambda robot, tracks: None
-        return
-    try:
+def pictures() -> Callable[[pathlib.Path, dict], None]:
+    """Return a function that draws tracks by label into a folder.
+
+    Raises:
+        ValueError: matplotlib is not installed.
+    """
+    with versions.needing("pictures need matplotlib", "animate"):
         from arc_suite.animation.style_plots import OF_GAIT, PICTURES
-    except ImportError as error:
-        raise versions.MissingExtra("pictures need matplotlib", "animate", error) from None
-    with contextlib.ExitStack() as stack:
-        targets = {}
-        for robot in robots:
-            folder = files.folder(pathlib.Path(FLAGS.output, robot if len(robots) > 1 else ""))
-            targets[robot] = {name: stack.enter_context(files.writing(folder / f"{name}.png")) for name in PICTURES}
 
-        def draw(robot, tracks):
-            gaits = all(track.parameters is not None for track in tracks.values())
-            for name, file in targets[robot].items():
-                if name in OF_GAIT and not gaits:
-                    file.unlink()  # so that nothing is written
-                else:
-                    PICTURES[name](tracks).savefig(file)
+    def draw(folder, tracks):
+        gaits = all(track.parameters is not None for track in tracks.values())
+        for name in PICTURES if gaits else PICTURES.keys() - OF_GAIT:
+            with files.writing(files.folder(folder) / f"{name}.png") as file:
+                PICTURES[name](tracks).savefig(file)
 
-        yield draw
+    return draw
 
 
-@contextlib.contextmanager
-def playing():
-    """Yields a dictionary to fill with tracks by label, which the page plays side by side; ignored without `--page`."""
-    if FLAGS.page is None:
-        yield {}
-        return
-    if not FLAGS.page.endswith(".html"):
-        raise ValueError(f"--page={FLAGS.page}: expected a file that ends in .html")
-    pages.viewer()  # finds out at once whether there is one
-    with files.writing(FLAGS.page) as file:
-        tracks = {}
-        yield tracks
-        file.write_text(pages.page(tracks), encoding="utf-8")
+def check_files(robots: list[str]) -> None:
+    """Find out at once whether the files of flags can be made.
 
-
-@contextlib.contextmanager
-def saving(robots: list[str]):
-    """Yields a function that saves tracks; does nothing without `--save`."""
-    if FLAGS.save is None:
-        yield lambda tracks: None
-        return
-    if not FLAGS.save.endswith(".npz"):
-        raise ValueError(f"--save={FLAGS.save}: expected a file that ends in .npz")
-    if len(robots) > 1:
+    Raises:
+        ValueError: another extension, several robots to save, or no viewer of pages.
+        OSError: the folder of pictures cannot be made.
+    """
+    for flag, extension in (("page", ".html"), ("save", ".npz")):
+        if (path := FLAGS[flag].value) is not None and not path.endswith(extension):
+            raise ValueError(f"--{flag}={path}: expected a file that ends in {extension}")
+    if FLAGS.save is not None and len(robots) > 1:
         raise ValueError(f"--save={FLAGS.save}: expected one robot, got {', '.join(robots)}")
-    with files.writing(FLAGS.save) as file:
-        yield lambda tracks: style.save(file, tracks)
+    if FLAGS.page is not None:
+        pages.viewer()
+    if FLAGS.output is not None:
+        files.folder(FLAGS.output)
 
 
 def main() -> None:
     """Record, measure, print and write."""
-    bodies(_ROBOT), task()  # first: this imports the modules that flags name, which files cannot import
+    bodies(), task()  # first: this imports the modules that flags name, which files cannot import
     chosen = chosen_sources()
-    chosen_for = setups(_ROBOT, next((source.setup for source in chosen.values() if source.setup), None))
+    chosen_for = setups(next((source.setup for source in chosen.values() if source.setup), None))
     seeds = range(FLAGS.seed, FLAGS.seed + FLAGS.episodes)
     recorders = {
         robot: {label: source.recorders(setup, seeds) for label, source in chosen.items()}
         for robot, setup in chosen_for.items()
     }
-    robots = list(recorders)
-    with (
-        files.writing_json(FLAGS.json) as file,
-        pictures(robots) as draw,
-        playing() as played,
-        saving(robots) as save,
-    ):
-        reports = {}
+    draw = FLAGS.output and pictures()
+    check_files(list(recorders))
+    reports, played = {}, {}
+    with contextlib.ExitStack() as stack:
+        file = stack.enter_context(files.writing_json(FLAGS.json))
+        page, saved = (path and stack.enter_context(files.writing(path)) for path in (FLAGS.page, FLAGS.save))
         for robot, by_label in recorders.items():
             tracks = {}
             for label, several in by_label.items():
                 with progress(several, desc=f"{robot}, {label}", unit="episode", leave=False) as bar:
                     tracks[label] = [recorder() for recorder in bar]
-            save(next(iter(tracks.values())))
             reports[robot] = {label: style.report(recorded) for label, recorded in tracks.items()}
             print_report(robot, reports[robot])
             firsts = {f"{robot}, {label}": recorded[0] for label, recorded in tracks.items()}
-            draw(robot, firsts)
-            played.update(firsts)
+            played |= firsts
+            if saved:
+                style.save(saved, next(iter(tracks.values())))
+            if draw:
+                draw(pathlib.Path(FLAGS.output, robot if len(recorders) > 1 else ""), firsts)
+        if page:
+            page.write_text(pages.page(played), encoding="utf-8")
         setup = next(iter(chosen_for.values()))
-        file.update(
-            task=setup.task,
-            task_kwargs=setup.task_kwargs,
-            episodes=FLAGS.episodes,
-            seed=FLAGS.seed,
-            robots=reports,
-            versions=versions.recorded(),
-        )
+        named = {"task": setup.task, "task_kwargs": setup.task_kwargs, "episodes": FLAGS.episodes, "seed": FLAGS.seed}
+        file.update(named, robots=reports, versions=versions.recorded())

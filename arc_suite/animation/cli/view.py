@@ -18,30 +18,18 @@ from absl import flags
 import arc_suite
 from arc_suite import policies
 from arc_suite.animation.cli.live import Live, play
-from arc_suite.cli.flags import (
-    ROBOT_HELP,
-    define_body,
-    define_policy,
-    define_preset,
-    define_task,
-    only_setup,
-    policy_name,
-)
+from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.envs.window import Window
 
 _INSTEAD = "`arc-suite render -o walk.html` writes a page that plays in any browser"
 
 FLAGS = flags.FLAGS
-define_body()
-define_task()
-_ROBOT = flags.DEFINE_string("robot", "queen", f"{ROBOT_HELP}.")
-define_policy()
-define_preset()
+define_walk()
 
 
 def main() -> None:
     """Open the window and play until it is closed."""
-    setup = only_setup(_ROBOT)
+    setup = only_setup()
     environment = arc_suite.load(setup.body, setup.task, {"time_limit": math.inf} | setup.task_kwargs)
     definition = environment.task.definition
     policy = policies.policy(policy_name(FLAGS.policy), setup.body, FLAGS.preset, task=definition)

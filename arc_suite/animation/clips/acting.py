@@ -1,4 +1,4 @@
-"""Motions in which nobody walks, simulated from the pose at rest: a blow, a rise from the belly, a death."""
+"""Motions in which nobody walks, from the pose at rest: a breath, a blow, a rise from the belly, a death."""
 
 import copy
 import math
@@ -6,9 +6,10 @@ import math
 import mujoco
 import numpy as np
 
-from arc_suite.animation.clips.in_place import sunk
+from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import Motion, Pose, standing
+from arc_suite.cpg.kinematics import Legs
 from arc_suite.cpg.law import torques
 from arc_suite.models import sizing
 from arc_suite.models.outline import solid_corners
@@ -22,6 +23,37 @@ _STAGGER, _SINK, _HOLD, _GIVE, _FALL = 8.0, 6.0, 2.0, 1.5, 6.0
 _FLACCID = 0.05  # of the damping of joints without life
 _LIES = 0.6  # of the height at rest, below which a torso lies
 _NEAR = 0.1  # of the height at rest, within which a torso lies on the ground
+_BREATH = 0.012  # of the standing height, by which the torso sinks and rises
+_ASTRAY = 0.01  # of the standing height: a breath is shallower where a sole would be further from its place
+_PERIOD = 12.0  # sqrt(h / g): about a breath, which takes longer the larger the animal
+_ROUNDS = 50  # of the search for joint angles
+_WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a sole's place: legs of two joints slide rather than sink
+_DAMPING = 0.02  # of the standing height
+
+
+def idle(body: Body, rest: Pose) -> Motion:
+    """Return a breath of a standing body, as a loop that begins with the pose at rest.
+
+    The torso sinks and rises like a sine, while joints bend so that the soles stay where they are; less where legs
+    have too few joints for that.
+    """
+    height, step = body.torso.standing_height, sizing.control_timestep(body)
+    samples = max(2, round(_PERIOD * math.sqrt(height / sizing.GRAVITY) / step))
+    breath = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(samples + 1) / samples)
+    depth = _BREATH * height
+    _, astray = sunk(body, rest, depth * breath)
+    depth *= min(1.0, _ASTRAY * height / max(astray, 1e-9))
+    joints, _ = sunk(body, rest, depth * breath)
+    joints[-1] = joints[0]
+    return held(rest, samples, step)._replace(
+        positions=rest.position - (depth * breath)[:, None] * (0.0, 0.0, 1.0), joints=joints
+    )
+
+
+def held(pose: Pose, samples: int, step: float) -> Motion:
+    """Return a pose held for a number of samples after the first one, with a root that stays."""
+    still = (np.tile(values, (samples + 1, 1)) for values in pose)
+    return Motion(step, np.zeros((samples + 1, 3)), *still, np.zeros(3))
 
 
 def hit(body: Body, rest: Pose) -> Motion:
@@ -121,3 +153,22 @@ def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damp
             mujoco.mj_step(model, data)
             poses.append(data.qpos.copy())
     return Recording(model.opt.timestep, np.stack(poses))
+
+
+def sunk(body: Body, rest: Pose, depths: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return joint angles (samples, joints), rad, that keep soles in place while the torso sinks, and their error, m.
+
+    Args:
+        body: the spec.
+        rest: pose from which it sinks.
+        depths: (samples,) m.
+    """
+    legs = Legs.of(body, used=1.0)
+    angles = legs.by_leg(rest.joints)
+    # A joint at rest may be a little beyond its range, as limits are soft.
+    legs = legs._replace(low=np.minimum(legs.low, angles), high=np.maximum(legs.high, angles))
+    up = rotations.matrix(rest.quaternion)[2]  # the world's, as the torso sees it
+    goals = legs.soles(angles)[0] + depths[:, None, None] * up
+    angles = np.tile(angles, (len(depths), 1, 1))
+    angles = legs.reached(angles, goals, _WEIGHTS, _DAMPING * body.torso.standing_height, _ROUNDS)
+    return legs.by_joint(angles), float(abs(legs.soles(angles)[0] - goals).max())

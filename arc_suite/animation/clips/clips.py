@@ -116,11 +116,5 @@ def _framed(name: str, body: Body, draft: Draft, fps: float) -> Clip:
     cycle = draft.cycle * seconds / draft.motion.seconds
     draft = draft._replace(motion=draft.motion.stretched(seconds), cycle=cycle)
     frames = max(1, round(seconds * fps))
-    return Clip(
-        name=name,
-        motion=draft.motion.at(np.linspace(0.0, seconds, frames + 1)),
-        loops=draft.loops,
-        cycles=draft.cycles,
-        foot_contacts=tuple(draft.contacts(body)[1]),
-        feet=body.foot_names,
-    )
+    motion, contacts = draft.motion.at(np.linspace(0.0, seconds, frames + 1)), tuple(draft.contacts(body)[1])
+    return Clip(name, motion, draft.loops, draft.cycles, contacts, body.foot_names)

@@ -74,14 +74,8 @@ def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
 
 def _material(name: str, material: Material) -> dict:
     colour = _linear(material.colour)
-    properties = {
-        "name": name,
-        "pbrMetallicRoughness": {
-            "baseColorFactor": [*colour.tolist(), 1.0],
-            "metallicFactor": 0.0,
-            "roughnessFactor": material.roughness,
-        },
-    }
+    look = {"baseColorFactor": [*colour.tolist(), 1.0], "metallicFactor": 0.0, "roughnessFactor": material.roughness}
+    properties = {"name": name, "pbrMetallicRoughness": look}
     if material.emission > 0.0:
         properties["emissiveFactor"] = (material.emission * colour).tolist()
     return properties
@@ -129,12 +123,8 @@ def _skinned(document: Document, name: str, parts, meshes, joints: list[int], ma
     for inverse, place, turn in zip(inverses, places, turns, strict=True):
         own = turn[np.ix_(_AXES, _AXES)].T
         inverse[:3, :3], inverse[:3, 3] = own, -own @ place[list(_AXES)]
-    skin = {
-        "name": name,
-        "joints": joints,
-        "skeleton": joints[0],
-        "inverseBindMatrices": document.accessor(_float32(inverses)),
-    }
+    binding = document.accessor(_float32(inverses))
+    skin = {"name": name, "joints": joints, "skeleton": joints[0], "inverseBindMatrices": binding}
     mesh = document.add("meshes", {"name": name, "primitives": primitives})
     return document.add("nodes", {"name": name, "mesh": mesh, "skin": document.add("skins", skin)})
 
@@ -174,18 +164,10 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
             (root, "rotation", own, document.accessor(_turn(heading))),
             *shared,
         ]
-        document.add(
-            "animations",
-            {
-                "name": name,
-                "samplers": [{"input": keys, "output": output} for _, _, keys, output in channels],
-                "channels": [
-                    {"sampler": index, "target": {"node": node, "path": target}}
-                    for index, (node, target, _, _) in enumerate(channels)
-                ],
-                "extras": metadata(clip),
-            },
-        )
+        samplers = [{"input": keys, "output": output} for _, _, keys, output in channels]
+        targets = [{"node": node, "path": target} for node, target, _, _ in channels]
+        own = {"channels": [{"sampler": index, "target": target} for index, target in enumerate(targets)]}
+        document.add("animations", own | {"name": name, "samplers": samplers, "extras": metadata(clip)})
 
 
 def _hinged(part: Part, angles: np.ndarray) -> np.ndarray:

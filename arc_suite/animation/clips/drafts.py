@@ -7,7 +7,7 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import in_place, loops, planting, root_motion
+from arc_suite.animation.clips import acting, loops, planting, root_motion
 from arc_suite.animation.clips.catalogue import CLIPS, FASTER, REST, WALK, Acted, Passage, Showcase, WalkLoop, sources
 from arc_suite.animation.clips.foot_contacts import TOUCH_DOWN, FootContact, foot_contacts, sole_heights
 from arc_suite.animation.clips.recorder import Recorded, Recorder, Transition
@@ -85,8 +85,9 @@ def drafts(
     found = _in_step(body, clocked, _MOST_CYCLES, loops.OPEN, left_out) if clocked else {}
     for name in gaits.keys() - clocked.keys():
         found |= _in_step(body, {name: gaits[name]}, _MOST_ALONE, loops.CLOSED, left_out)
-    _check_commands(found, recorder.units, left_out)
-    _check_speeds(found, left_out)
+    reasons = {name: _unfit(name, draft, recorder.units, found.get("walk")) for name, draft in found.items()}
+    left_out |= {name: reason for name, reason in reasons.items() if reason}
+    found = {name: draft for name, draft in found.items() if not reasons[name]}
     if straight:
         found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}
     if plant:
@@ -150,28 +151,18 @@ def _first_touchdown(body: Body, draft: Draft) -> int:
     return min(downs, key=lambda contact: (body.foot_names.index(contact.foot), contact.sample)).sample if downs else 0
 
 
-def _check_commands(found: dict[str, Draft], units: np.ndarray | None, left_out) -> None:
-    """Leave out loops that do not follow their commands."""
-    for name, draft in list(found.items()):
-        if units is not None and isinstance(spec := CLIPS[name], WalkLoop):
-            command = np.array(spec.command)
-            share = command @ (draft.motion.twist / units) / (command @ command)
-            if share < _FOLLOWS:
-                left_out[name] = f"the policy moves at {round(100.0 * share)} % of its command"
-                del found[name]
-
-
-def _check_speeds(found: dict[str, Draft], left_out) -> None:
-    """Leave out loops whose speed is not what their names say, given that of the walk."""
-    if "walk" not in found:
-        return
-    usual = np.hypot(*found["walk"].motion.twist[:2])
-    for name, sign in FASTER.items():
-        if name in found:
-            speed = np.hypot(*found[name].motion.twist[:2])
-            if (speed / usual) ** sign < _APART:
-                left_out[name] = f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}"
-                del found[name]
+def _unfit(name: str, draft: Draft, units: np.ndarray | None, walk: Draft | None) -> str:
+    """Return why a loop is not what its name says: it does not follow its command, or is as fast as the walk; or ""."""
+    if units is not None and isinstance(spec := CLIPS[name], WalkLoop):
+        command = np.array(spec.command)
+        share = command @ (draft.motion.twist / units) / (command @ command)
+        if share < _FOLLOWS:
+            return f"the policy moves at {round(100.0 * share)} % of its command"
+    if name in FASTER and walk is not None:
+        speed, usual = (np.hypot(*each.motion.twist[:2]) for each in (draft, walk))
+        if (speed / usual) ** FASTER[name] < _APART:
+            return f"its speed is {speed:.3f} m/s, and that of the walk {usual:.3f}"
+    return ""
 
 
 def _connected(
@@ -179,7 +170,7 @@ def _connected(
 ) -> dict[str, Draft]:
     """Return the draft of idle, and of the clips that connect to it where they are asked for."""
     rest = root_motion.standing(transition.recorded.recording, transition.start, 1).pose(0)
-    idle = Draft(in_place.idle(body, rest), stands=True).grounded(body)
+    idle = Draft(acting.idle(body, rest), stands=True).grounded(body)
     found = {"idle": idle}
     for name in names:
         try:

@@ -96,16 +96,12 @@ def foot_contacts(
     end = len(heights) - 1 if loops else len(heights)
     found, swing = [], np.zeros(heights.shape, bool)
 
-    def mark(foot, event, at):
-        found.extend(
-            FootContact(foot, event, int(sample), float(sample * motion.step)) for sample in np.flatnonzero(at)
-        )
-
     for leg, foot in enumerate(body.foot_names):
         up = swings(heights[:end, leg], least, bounce, loops)
         before = np.roll(up, 1) if loops else np.concatenate([up[:1], up[:-1]])
-        mark(foot, LIFT_OFF, up & ~before)
-        mark(foot, TOUCH_DOWN, ~up & before)
+        for event, at in ((LIFT_OFF, up & ~before), (TOUCH_DOWN, ~up & before)):
+            samples = np.flatnonzero(at).tolist()
+            found += [FootContact(foot, event, sample, sample * motion.step) for sample in samples]
         swing[:end, leg] = up
     swing[end:] = swing[:1]
     return sorted(found, key=lambda contact: (contact.sample, contact.foot, contact.event)), ~swing

@@ -56,12 +56,8 @@ class Document:
             view["target"] = target
         self._buffer += data.tobytes()
         self._buffer += bytes(-len(self._buffer) % _ALIGNED)
-        accessor = {
-            "bufferView": self.add("bufferViews", view),
-            "componentType": _COMPONENTS[values.dtype],
-            "count": len(values),
-            "type": _TYPES[values.shape[1:]],
-        }
+        accessor = {"bufferView": self.add("bufferViews", view), "componentType": _COMPONENTS[values.dtype]}
+        accessor |= {"count": len(values), "type": _TYPES[values.shape[1:]]}
         if normalized:
             accessor["normalized"] = True
         if bounds:

@@ -39,20 +39,12 @@ def metadata(clip: Clip) -> dict[str, Any]:
     `missing_steps` has the feet of a loop that touch down less often than once a cycle, and how many times less.
     `additive_to` is the animation whose first frame is the reference of an additive clip.
     """
-    forward, left, turning = (round(float(value), 6) for value in clip.motion.twist)
-    found = {
-        "seconds": clip.motion.seconds,
-        "frames": len(clip.times),
-        "loops": clip.loops,
-        "cycles": clip.cycles,
-        "forward_speed": forward,
-        "left_speed": left,
-        "turn_rate": turning,
-        "foot_contacts": [
-            {"foot": contact.foot, "event": contact.event, "time": round(contact.time, 6)}
-            for contact in clip.foot_contacts
-        ],
-    }
+    found: dict[str, Any] = {"seconds": clip.motion.seconds, "frames": len(clip.times)}
+    found |= {"loops": clip.loops, "cycles": clip.cycles}
+    speeds = zip(("forward_speed", "left_speed", "turn_rate"), clip.motion.twist.tolist(), strict=True)
+    found |= {name: round(speed, 6) for name, speed in speeds}
+    contacts = ({"foot": each.foot, "event": each.event, "time": round(each.time, 6)} for each in clip.foot_contacts)
+    found["foot_contacts"] = list(contacts)
     if clip.name in ADDITIVE:
         return found | {"additive_to": "idle_loop"}
     return found | ({"missing_steps": missing_steps(clip)} if clip.loops else {})

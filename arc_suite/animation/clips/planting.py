@@ -102,16 +102,8 @@ def _paces(angles: np.ndarray) -> np.ndarray:
 def _repeated(motion: Motion) -> Motion:
     """Return a loop three times over, on one path of the root."""
     count = len(motion.joints) - 1
-
-    def tiled(values):
-        return np.concatenate([np.tile(values[:-1], (3, 1)), values[:1]])
-
-    return motion._replace(
-        root=along(motion.twist, motion.step * np.arange(3 * count + 1)),
-        positions=tiled(motion.positions),
-        quaternions=tiled(motion.quaternions),
-        joints=tiled(motion.joints),
-    )
+    root = along(motion.twist, motion.step * np.arange(3 * count + 1))
+    return motion.mapped(lambda values: values[np.arange(3 * count + 1) % count])._replace(root=root)
 
 
 def _stances(low: np.ndarray, least: int, longest: int | None) -> list[tuple[int, int]]:

@@ -99,7 +99,6 @@ class Recorder:
         Raises:
             ValueError: the episode ends, or the task has no command.
         """
-        self._need_command()
         setup = self._setup if failing is None else _changed(self._setup, actuator_failure=failing)
         cycle, offset, step = self._gait()
         recording = self._recorded(setup, _SETTLE, round(_CYCLES * cycle / step), [(0, command)])
@@ -131,7 +130,6 @@ class Recorder:
         Raises:
             ValueError: the episode ends, or the task has no command.
         """
-        self._need_command()
         cycle, offset, step = self._gait()
         steps = cycle / step
 
@@ -148,19 +146,16 @@ class Recorder:
         return Transition(Recorded(recording, cycle, phase(_SETTLE)), stop - late, start, late)
 
     def _gait(self) -> tuple[float, float, float]:
-        """The cycle, s, the offset of the first foot, cycles, and the control step, s."""
-        task = self._setup.definition
-        gait = task.parameters
+        """The cycle, s, the offset of the first foot, cycles, and the control step, s; ValueError without a command."""
+        if not self.follows:
+            raise ValueError(f"the task {self._setup.kind.name} has no command")
+        task, gait = self._setup.definition, self._setup.definition.parameters
         return 1.0 / gait.gait_frequency, gait.phase_offsets[0] / (2.0 * np.pi), task.scene.control_timestep
 
     def _recorded(self, setup: Setup, settle: int, steps: int, commands=()) -> Recording:
         environment = setup.load(seed=0)
         actor = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
         return record(environment, actor, settle, steps, commands)
-
-    def _need_command(self) -> None:
-        if not self.follows:
-            raise ValueError(f"the task {self._setup.kind.name} has no command")
 
 
 def _periodic(recording: Recording) -> Recorded:

@@ -1,5 +1,6 @@
 """Motions: a root that moves over the ground, and a body that moves relative to it."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ class Pose(NamedTuple):
 
     def relative(self, origin: "Pose") -> "Pose":
         """Return the difference that leads from another pose to this one."""
-        turn = rotations.product(self.quaternion, _inverse(origin.quaternion))
+        turn = rotations.product(self.quaternion, origin.quaternion * (1.0, -1.0, -1.0, -1.0))
         return Pose(self.position - origin.position, turn, self.joints - origin.joints)
 
 
@@ -65,16 +66,14 @@ class Motion(NamedTuple):
         """Return the motion with the torso lower by a height, m."""
         return self._replace(positions=self.positions - (0.0, 0.0, height))
 
+    def mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> "Motion":
+        """Return the motion with positions, quaternions and joints, (samples, ...) each, that a function changes."""
+        return self._replace(**{name: change(getattr(self, name)) for name in ("positions", "quaternions", "joints")})
+
     def begun(self, sample: int) -> "Motion":
         """Return the loop with another of its samples first."""
-
-        def rolled(values):
-            turned = np.roll(values[:-1], -sample, axis=0)
-            return np.concatenate([turned, turned[:1]])
-
-        return self._replace(
-            positions=rolled(self.positions), quaternions=rolled(self.quaternions), joints=rolled(self.joints)
-        )
+        order = np.roll(np.arange(len(self.joints) - 1), -sample)
+        return self.mapped(lambda values: values[[*order, order[0]]])
 
     def pose(self, sample: int) -> Pose:
         """Return the pose of a sample."""
@@ -114,12 +113,11 @@ class Motion(NamedTuple):
             end: 0 or -1.
             samples: over which the difference of the poses fades.
         """
-        count, place = len(self.joints), places(self.qpos()[[end]])[0]
+        place = places(self.qpos()[[end]])[0]
         wanted = after(place, relative(_place(pose), np.zeros(3)))
-        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
         error = relative(self.root[end], wanted) * (1.0, 1.0, 0.0)
         error[2] = rotations.wrapped(wanted[2] - self.root[end, 2])
-        root = after(self.root, fading(from_end / (count - 1))[:, None] * error)
+        root = after(self.root, self._fading(end, len(self.joints) - 1)[:, None] * error)
         motion = self.on_root(root)
         root = relative(root[0], root)
         return motion._replace(root=root, twist=logarithm(root[-1]) / motion.seconds).ending(pose, end, samples)
@@ -132,17 +130,13 @@ class Motion(NamedTuple):
             end: 0 or -1.
             samples: next to the end, over which the difference of the poses fades.
         """
-        count, difference = len(self.joints), pose.relative(self.pose(end))
-        from_end = np.arange(count) if end == 0 else np.arange(count)[::-1]
-        met = self.moved(difference, fading(from_end / samples))
-        return met._replace(seam=max(self.seam, seam(difference)))
+        difference = pose.relative(self.pose(end))
+        return self.moved(difference, self._fading(end, samples))._replace(seam=max(self.seam, seam(difference)))
 
-    def part(self, first: int, samples: int) -> "Motion":
-        """Return a part of the motion, `samples` after the first one, whose root starts at 0."""
-        rows = slice(first, first + samples + 1)
-        fields = {name: getattr(self, name)[rows] for name in ("positions", "quaternions", "joints")}
-        root = relative(self.root[first], self.root[rows])
-        return self._replace(root=root, **fields, twist=logarithm(root[-1]) / (self.step * (len(root) - 1)))
+    def _fading(self, end: int, samples: int) -> np.ndarray:
+        """Return weights (samples,) that fall from 1 at an end, 0 or -1, to 0 over a number of samples."""
+        weights = fading(np.arange(len(self.joints)) / samples)
+        return weights if end == 0 else weights[::-1]
 
     def at(self, times: np.ndarray) -> "Motion":
         """Return the motion at even times (frames,), s, interpolated between samples."""
@@ -153,15 +147,9 @@ class Motion(NamedTuple):
         def between(values):
             return (1.0 - share) * values[before] + share * values[before + 1]
 
-        quaternions = between(self.quaternions)  # 2 ms apart, where a straight line is as good as an arc
-        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
-        return self._replace(
-            step=float(times[1] - times[0]),
-            root=between(self.root),
-            positions=between(self.positions),
-            quaternions=quaternions,
-            joints=between(self.joints),
-        )
+        motion = self.mapped(between)  # 2 ms apart, where a straight line is as good as an arc
+        quaternions = motion.quaternions / np.linalg.norm(motion.quaternions, axis=-1, keepdims=True)
+        return motion._replace(step=float(times[1] - times[0]), root=between(self.root), quaternions=quaternions)
 
 
 def seam(difference: Pose) -> float:
@@ -190,14 +178,12 @@ def passage(recording: Recording, first: int, samples: int, window: int) -> Moti
         samples: of it, without the last.
         window: samples that the mean is taken over, a gait cycle.
     """
-    qpos = recording.qpos
-    place = places(qpos)
+    place = places(recording.qpos)
     low, sums = first - window // 2, np.cumsum(np.concatenate([np.zeros((1, 3)), place]), axis=0)
     path = (sums[low + window : low + window + samples + 1] - sums[low : low + samples + 1]) / window
     rows = slice(first, first + samples + 1)
-    motion = on_root(recording.step, qpos[rows], relative(path[0], path), relative(path, place[rows]))
-    path = motion.root
-    return motion._replace(twist=logarithm(path[-1]) / motion.seconds)
+    motion = on_root(recording.step, recording.qpos[rows], relative(path[0], path), relative(path, place[rows]))
+    return motion._replace(twist=logarithm(motion.root[-1]) / motion.seconds)
 
 
 def standing(recording: Recording, first: int, samples: int) -> Motion:
@@ -210,23 +196,14 @@ def standing(recording: Recording, first: int, samples: int) -> Motion:
 def on_root(step: float, qpos, root, local) -> Motion:
     """Put poses onto a root, given where the torso is (samples, 3) in the root's frame, seen from above."""
     turn = local[:, 2] - rotations.yaw(qpos[:, 3:7])
-    return Motion(
-        step=step,
-        root=root,
-        positions=np.concatenate([local[:, :2], qpos[:, 2:3]], axis=-1),
-        quaternions=_continuous(rotations.turned(qpos[:, 3:7], turn)),
-        joints=qpos[:, 7:].copy(),
-        twist=np.zeros(3),
-    )
+    positions = np.concatenate([local[:, :2], qpos[:, 2:3]], axis=-1)
+    quaternions = _continuous(rotations.turned(qpos[:, 3:7], turn))
+    return Motion(step, root, positions, quaternions, qpos[:, 7:].copy(), np.zeros(3))
 
 
 def _place(pose: Pose) -> np.ndarray:
     """Return where the torso is in the root's frame, seen from above, (3,)."""
     return np.append(pose.position[:2], rotations.yaw(pose.quaternion))
-
-
-def _inverse(quaternion) -> np.ndarray:
-    return quaternion * (1.0, -1.0, -1.0, -1.0)
 
 
 def _continuous(quaternions) -> np.ndarray:

@@ -7,9 +7,7 @@ import base64
 import csv
 import html
 import io
-import string
 from collections.abc import Iterable, Mapping
-from importlib import resources
 from pathlib import Path
 from typing import NamedTuple, cast
 from xml.etree import ElementTree
@@ -100,9 +98,8 @@ def pictures(best: Iterable[Elite], cells: Map, trial: Trial) -> dict[tuple[int,
     views = {}
     for elite in best:
         environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
-        footage = films.Footage(
-            elite.label, environment, policies.alone(policy, trial.first.seeds[0]), "portrait", _SIZE
-        )
+        act = policies.alone(policy, trial.first.seeds[0])
+        footage = films.Footage(elite.label, environment, act, "portrait", _SIZE)
         for _ in range(_BEFORE_PICTURE):
             footage.step()
         views[elite.cell] = films.captioned(footage.view(), caption(elite, cells, trial.goal))
@@ -136,11 +133,8 @@ def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -
 def write_page(path: Path, views: Mapping[tuple[int, ...], np.ndarray], cells: Map, title: str) -> None:
     """Write a page of all pictures, each a link to the page on which the body walks, with a link to its spec."""
     shown, columns = _arranged(views)
-    frame = string.Template(
-        resources.files("arc_suite.animation.design").joinpath("gallery.html").read_text(encoding="utf-8")
-    )
     items = "\n".join(_item(cells.label(cell), views.get(cell)) for cell in shown)
-    text = frame.substitute(title=html.escape(title), columns=columns, items=items)
+    text = pages.template("design/gallery.html").substitute(title=html.escape(title), columns=columns, items=items)
     with files.writing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

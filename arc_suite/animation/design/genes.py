@@ -5,7 +5,7 @@ bounds its extent. Shapes come first and sizes last: a shape is scaled until it 
 """
 
 import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,26 +34,6 @@ class Budget(NamedTuple):
     power: float = math.inf
 
 
-class Genes(Protocol):
-    """A space of bodies.
-
-    Attributes:
-        names: of the genes.
-    """
-
-    names: tuple[str, ...]
-
-    def shape(self, genes: np.ndarray) -> Body:
-        """Return the body of genes (n,) from 0 to 1, of any size.
-
-        Raises:
-            ValueError: a length out of range.
-        """
-
-    def size(self, genes: np.ndarray) -> float | None:
-        """Return the share of the greatest size within a budget; None for the size of the shape, if it keeps one."""
-
-
 # Ranges of proportions, those of `generator.random_body`; lengths of half of the torso's length where not said.
 _RANGES = {
     "legs": (4.0, 13.0),  # rounded down, as are links
@@ -78,7 +58,11 @@ class Made:
     names = tuple(_RANGES)
 
     def shape(self, genes: np.ndarray) -> Body:
-        """Return the body with a torso of 1 m half-length."""
+        """Return the body of genes (n,) from 0 to 1, with a torso of 1 m half-length.
+
+        Raises:
+            ValueError: a length out of range.
+        """
         gene = self._numbers(genes)
         legs, links = (int(min(gene[name], _RANGES[name][1] - 1.0)) for name in ("legs", "links"))
         layout = "radial" if legs % 2 or gene["layout"] >= _RADIAL else "pairs"
@@ -100,7 +84,7 @@ class Made:
         return generator.proportioned("design", legs, layout, proportions)
 
     def size(self, genes: np.ndarray) -> float:
-        """Return the gene of the size."""
+        """Return the share of the greatest size within a budget."""
         return self._numbers(genes)["size"]
 
     def _numbers(self, genes: np.ndarray) -> dict[str, float]:
@@ -122,6 +106,9 @@ class Around:
 
     def size(self, genes: np.ndarray) -> None:
         """Return None: variants have the size of the body."""
+
+
+Genes = Made | Around
 
 
 def extent(body: Body) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The last seconds of a walk as arrays: rewards by term, foot contacts, speed and cost of transport."""
+"""The last seconds of a walk as arrays: rewards by term, foot contacts and speed."""
 
 import collections
 from typing import NamedTuple
@@ -9,7 +9,6 @@ from arc_suite.animation.episodes import Episodes
 from arc_suite.tasks.clock import desired_contacts
 
 _STEPS = 120  # control steps that are kept
-_NOWHERE = 0.05  # standing heights a second; at lower speeds the cost of transport says nothing
 
 
 class Moment(NamedTuple):
@@ -21,7 +20,6 @@ class Moment(NamedTuple):
         schedule: (feet,) whether the gait wants it there, all feet at a stop; None in a task without a gait.
         place: (2,) of the torso, m.
         desired: m/s that the command asks for; NaN where there is none.
-        work: positive work of the motors by weight, m.
     """
 
     terms: dict[str, float]
@@ -29,7 +27,6 @@ class Moment(NamedTuple):
     schedule: np.ndarray | None
     place: np.ndarray
     desired: float
-    work: float
 
 
 class History:
@@ -38,10 +35,7 @@ class History:
     def __init__(self, episodes: Episodes):
         """Begin without a step."""
         self._episodes = episodes
-        self._model = episodes.environment.physics.model.ptr
-        self._weight = float(self._model.body_mass.sum() * -self._model.opt.gravity[2])
         self._moments: collections.deque[Moment] = collections.deque(maxlen=_STEPS)
-        self._angles: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self._moments)
@@ -50,14 +44,9 @@ class History:
         """Remember the control step that the episodes have just taken; a new episode begins anew."""
         environment, steps = self._episodes.environment, self._episodes.steps
         task, data = environment.task.definition, environment.physics.data
-        angles = data.qpos[task.scene.layout.joint_angles].copy()
         if steps == 0:
             self._moments.clear()
-            self._angles = angles
             return
-        turned = angles - (angles if self._angles is None else self._angles)
-        torques = data.qfrc_actuator[task.scene.layout.joint_velocities]
-        work = float((torques * turned).clip(0.0).sum()) / self._weight
         weights, run = task.settings.weights, environment.task
         stance = schedule = None
         if task.parameters is not None:
@@ -66,9 +55,7 @@ class History:
             phase = np.asarray(task.phase(run.memory))
             schedule = desired_contacts(phase, p.duty_factor, p.phase_offsets) | self._stops()
         terms = {name: weights[name] * float(value) for name, value in run.terms.items()}
-        place = data.qpos[:2].copy()
-        self._moments.append(Moment(terms, stance, schedule, place, self._desired(), work))
-        self._angles = angles
+        self._moments.append(Moment(terms, stance, schedule, data.qpos[:2].copy(), self._desired()))
 
     @property
     def times(self) -> np.ndarray:
@@ -98,15 +85,6 @@ class History:
     def desired(self) -> np.ndarray:
         """Return the speeds (steps,) that the command asks for, m/s; NaN where there is no command."""
         return np.array([moment.desired for moment in self._moments])
-
-    def cost_of_transport(self) -> float:
-        """Return the positive work of the motors by weight and path over the steps; NaN where the body gets nowhere."""
-        places = np.array([moment.place for moment in self._moments])
-        path = np.linalg.norm(np.diff(places, axis=0), axis=1).sum() if len(places) > 1 else 0.0
-        height = self._episodes.environment.task.body.torso.standing_height
-        if path <= _NOWHERE * height * len(places) * self._episodes.control_timestep:
-            return np.nan
-        return sum(moment.work for moment in list(self._moments)[1:]) / path
 
     def _stops(self) -> bool:
         """Whether the clock of the gait rests, as at a stop."""

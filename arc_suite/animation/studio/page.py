@@ -124,9 +124,8 @@ class Page:
     def _add_body(self, first: Sketch) -> None:
         gui, widgets = self._gui, self._widgets
         self._check = gui.add_folder("Check")
-        widgets["source"] = gui.add_dropdown(
-            "Body", _listed(first.source, sketches.sources()), initial_value=first.source
-        )
+        sources = _listed(first.source, sketches.sources())
+        widgets["source"] = gui.add_dropdown("Body", sources, initial_value=first.source)
         widgets["legs"] = gui.add_slider("Legs", *generator.LEGS, 1, first.legs)
         widgets["links"] = gui.add_slider("Links", *generator.LINKS, 1, first.links)
         widgets["layout"] = gui.add_dropdown("Layout", [OWN, *generator.LAYOUTS], initial_value=first.layout)
@@ -146,9 +145,8 @@ class Page:
         widgets["ground"] = gui.add_dropdown("Ground", _listed(first.ground, ARENAS), initial_value=first.ground)
         widgets["gait"] = gui.add_dropdown("Gait", [OWN, *gaits.NAMES], initial_value=first.gait)
         widgets["speed"] = gui.add_slider("Speed", 0.2, 2.0, 0.05, first.speed, hint="Multiple of the body's own")
-        widgets["kicks"] = gui.add_slider(
-            "Kicks", 0.0, max(3.0, first.kicks), 0.1, first.kicks, hint="At most, sqrt(g h)"
-        )
+        most = max(3.0, first.kicks)
+        widgets["kicks"] = gui.add_slider("Kicks", 0.0, most, 0.1, first.kicks, hint="At most, sqrt(g h)")
         widgets["settings"] = gui.add_text("Settings", first.settings, hint="Of the task, as a JSON object")
         widgets["policy"] = gui.add_dropdown("Policy", _listed(first.policy, POLICIES), initial_value=first.policy)
         presets = _listed(first.preset, (OWN, *preset_names()))

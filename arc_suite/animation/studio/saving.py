@@ -115,17 +115,10 @@ def film(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> by
     environment = load(creature.setup)
     act = _commanded(environment, creature.sketch, desired)
     footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
-    stride = films.steps_per_frame(footage.control_timestep)
-
-    def frames():
-        while footage.steps < _FILM_STEPS and not footage.ended:
-            for _ in range(stride):
-                footage.step()
-            yield footage.view()
-
+    seconds = films.steps_per_frame(footage.control_timestep) * footage.control_timestep
     with contextlib.closing(footage), tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.mp4"
-        films.write_mp4(path, frames(), stride * footage.control_timestep)
+        films.write_mp4(path, films.frames(footage, _FILM_STEPS), seconds)
         return path.read_bytes()
 
 

@@ -32,7 +32,6 @@ class Session:
         desired: (3,) command that visitors have set; None for that of the task.
         paused: whether time stands still.
         pace: simulated seconds a second, of late.
-        states: shown a second, of late.
         open: whether `run` goes on.
     """
 
@@ -42,7 +41,7 @@ class Session:
         self._maker = concurrent.futures.ThreadPoolExecutor(1, "creature")
         self._asked = self._tried = sketch
         self.error, self.paused, self.open = "", False, True
-        self.pace, self.states = 1.0, 0.0
+        self.pace = 1.0
         self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
         self._replace(opened(sketch))
 
@@ -95,7 +94,7 @@ class Session:
                 of the latest control step that has passed.
         """
         begun = last = due = time.monotonic()
-        ahead, simulated, shown = 0.0, 0.0, 0
+        ahead = simulated = 0.0
         while self.open:
             while not self._calls.empty():
                 self._calls.get()()
@@ -107,10 +106,8 @@ class Session:
                 self.history.observe()
                 ahead, simulated = ahead - step, simulated + step
             show(self, ahead / step)
-            shown += 1
             if now - begun > _WINDOW:
-                self.pace, self.states = simulated / (now - begun), shown / (now - begun)
-                begun, simulated, shown = now, 0.0, 0
+                self.pace, begun, simulated = simulated / (now - begun), now, 0.0
             due = max(due + 1.0 / STATES, now := time.monotonic())
             time.sleep(due - now)
         self._maker.shutdown(cancel_futures=True)

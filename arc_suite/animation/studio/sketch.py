@@ -106,15 +106,13 @@ def settings(sketch: Sketch, made: Body) -> dict[str, Any]:
         field = checks.mapping("settings", json.loads(sketch.settings.strip() or "{}"))
     except (json.JSONDecodeError, RecursionError) as error:
         raise ValueError(f'settings: expected a JSON object, such as {{"friction": 0.5}}: {error}') from None
-    kind, found = registry.task_of(sketch.task), dict[str, Any]()
-    if sketch.gait != OWN:
-        found["gait"] = sketch.gait
+    kind = registry.task_of(sketch.task)
+    found: dict[str, Any] = {} if sketch.gait == OWN else {"gait": sketch.gait}
     if sketch.speed != 1.0:
         own = getattr(kind.settings_for(made, found), "parameters", None)
         if own is None:
-            raise ValueError(
-                f"speed: expected 1 for the task {sketch.task}, which prescribes none, got {sketch.speed:g}"
-            )
+            expected = f"expected 1 for the task {sketch.task}, which prescribes none"
+            raise ValueError(f"speed: {expected}, got {sketch.speed:g}")
         found["target_velocity"] = float(f"{sketch.speed * own.target_velocity:.4g}")
     if sketch.ground != "flat" and not kind.own_arena:
         found["arena"] = sketch.ground

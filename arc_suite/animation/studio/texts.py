@@ -1,6 +1,5 @@
 """Texts of the page, as HTML: the walk, what `check` says, lines to copy."""
 
-import math
 from xml.etree import ElementTree
 
 from arc_suite.animation.studio import sketch as sketches
@@ -21,13 +20,11 @@ def status(session: Session) -> str:
     """Return lines about the walk and the machine, as HTML; the first is the error, if there is one."""
     creature, episodes, history = session.creature, session.episodes, session.history
     speed = history.speeds()[-1] if len(history) else 0.0
-    cost = history.cost_of_transport()
     pace = "paused" if session.paused else "real time" if session.pace > _REAL else f"{session.pace:.2f} of real time"
     told = {
         "walks": f"{creature.setup.body.name}, {creature.setup.kind.name}, {speed:.2f} m/s",
-        "cost of transport": "-" if math.isnan(cost) else f"{cost:.2f}",
         "return": f"{episodes.earned:.0f} in {episodes.steps * episodes.control_timestep:.1f} s",
-        "pace": f"{pace}, {session.states:.0f} states a second",
+        "pace": pace,
     }
     lines = [_element("tr", _element("td", name), _element("td", value)) for name, value in told.items()]
     error = [_element("p", session.error, role="alert", style="color:#b3261e")] if session.error else []

@@ -20,6 +20,9 @@ _NEAR = 6.0  # units from the edge of that ground, at which it is drawn anew
 _FOLLOW = 0.1  # of the difference, by which the camera follows the height of the ground in a picture
 _SAME = 0.02  # units, by which an arrow may be off
 _GROUND, _LINES, _STEPS = (214, 219, 226), (176, 184, 194), (196, 203, 212)
+_GRID: dict = {"infinite_grid": True, "cell_size": 1.0, "section_size": 5.0, "fade_distance": 40.0}
+_GRID |= {"cell_color": _LINES, "section_color": _LINES, "plane_color": _GROUND}
+_GRID |= {"plane_opacity": 1.0, "shadow_opacity": 0.3}
 
 
 class View:
@@ -101,19 +104,8 @@ class View:
         self._server.scene.remove_by_name("/world/ground")
         self._server.scene.add_frame("/world/ground", show_axes=False)
         for index, height in enumerate(found["planes"]):
-            self._server.scene.add_grid(
-                f"/world/ground/plane{index}",
-                infinite_grid=True,
-                cell_size=1.0,
-                section_size=5.0,
-                cell_color=_LINES,
-                section_color=_LINES,
-                fade_distance=40.0,
-                plane_color=_GROUND,
-                plane_opacity=1.0,
-                shadow_opacity=0.3,
-                position=(0.0, 0.0, height / self._unit),
-            )
+            place = (0.0, 0.0, height / self._unit)
+            self._server.scene.add_grid(f"/world/ground/plane{index}", position=place, **_GRID)
         for index, field in enumerate(found["fields"]):
             self._add(f"/world/ground/field{index}", _surface(field), _GROUND)
         solids: dict[tuple[int, int, int], list[Mesh]] = {}
@@ -138,14 +130,9 @@ class View:
             self._arrows = None
             if arrows:
                 radius = arrows[0].radius / self._unit
-                self._arrows = self._server.scene.add_arrows(
-                    "/world/markers/arrows",
-                    points,
-                    np.array([_rgb(marker.colour[:3]) for marker in arrows]),
-                    shaft_radius=radius,
-                    head_radius=2.0 * radius,
-                    head_length=3.0 * radius,
-                )
+                colours = np.array([_rgb(marker.colour[:3]) for marker in arrows])
+                sizes = {"shaft_radius": radius, "head_radius": 2.0 * radius, "head_length": 3.0 * radius}
+                self._arrows = self._server.scene.add_arrows("/world/markers/arrows", points, colours, **sizes)
         elif arrows and abs(self._arrows.points - points).max() > _SAME:
             self._arrows.points = points
         cylinders = [marker for marker in markers if marker.shape == "cylinder"]

@@ -1,8 +1,8 @@
 """Agents: training of policies, one command from nothing to a policy that every program takes.
 
-An algorithm is an entry of `algorithms.ALGORITHMS`: a module that learns, and hyperparameters. Hyperparameters are a
-frozen dataclass, whose fields `arc-suite train --hp name=value` overrides. The module is imported when it is used,
-as it needs JAX, and has one function, a training script that reads from top to bottom:
+An algorithm is an entry of `algorithms.ALGORITHMS`: a learner, and hyperparameters. Hyperparameters are a frozen
+dataclass, whose fields `arc-suite train --hp name=value` overrides. Those of this package are imported when they are
+used, as they need JAX. A learner is a function, a training script that reads from top to bottom:
 
     learn(hp, context) -> Iterator[Slice]
 

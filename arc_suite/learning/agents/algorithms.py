@@ -1,9 +1,8 @@
 """Algorithms by name: hyperparameters of learners. Nothing here needs JAX."""
 
 import dataclasses
-import importlib
-from collections.abc import Mapping
-from types import ModuleType
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from arc_suite import checks, versions
@@ -18,7 +17,7 @@ class Algorithm(NamedTuple):
     """An algorithm.
 
     Attributes:
-        learner: full name of the module that learns; see `arc_suite.learning.agents`.
+        learn: the learner, a function of hyperparameters and context; see `arc_suite.learning.agents`.
         hyperparameters: a frozen dataclass.
         summary: a line for people.
         evaluate_every: environment steps between evaluations, by default.
@@ -29,7 +28,7 @@ class Algorithm(NamedTuple):
         several: whether it can learn with several bodies.
     """
 
-    learner: str
+    learn: Callable[[Any, Any], Iterator[Any]]
     hyperparameters: Any
     summary: str
     evaluate_every: int = 10_000
@@ -38,20 +37,6 @@ class Algorithm(NamedTuple):
     extends: bool = False
     source: str = "nothing"
     several: bool = False
-
-    @property
-    def module(self) -> ModuleType:
-        """The module that learns.
-
-        Raises:
-            ValueError: a package is not installed.
-        """
-        try:
-            return importlib.import_module(self.learner)
-        except ImportError as error:
-            if not self.learner.startswith("arc_suite."):
-                raise ValueError(f"learner {self.learner}: {error}") from None
-            raise versions.MissingExtra("training needs JAX", "learn", error) from None
 
     def steps_of(self, setup: Setup) -> int:
         """Return the environment steps of a run, by default.
@@ -85,27 +70,37 @@ _SAC = SoftActorCritic()
 _SPEQ = SoftActorCritic(dropout=0.01, phase_updates=75_000)
 
 
-def _off_policy(hyperparameters: SoftActorCritic, summary: str, **defaults) -> Algorithm:
-    source = "nothing" if hyperparameters.prior == "none" else "prior data"
-    return Algorithm(
-        "arc_suite.learning.agents.off_policy", hyperparameters, summary, extends=True, source=source, **defaults
-    )
+def _learn(hp, context) -> Iterator[Any]:
+    """Learn by the learner of this package that has such hyperparameters.
 
+    Raises:
+        ValueError: JAX is not installed.
+    """
+    with versions.needing("training needs JAX", "learn"):
+        from arc_suite.learning.agents import bc, dagger, off_policy, on_policy
+    learners = {SoftActorCritic: off_policy, ProximalPolicy: on_policy, DAgger: dagger, BehaviourCloning: bc}
+    return learners[type(hp)].learn(hp, context)
+
+
+_off_policy = functools.partial(Algorithm, _learn, extends=True)
+_with_prior = functools.partial(_off_policy, source="prior data")
+_on_policy = functools.partial(Algorithm, _learn, several=True)
+_finetune = functools.partial(_on_policy, source="a policy")
+_dagger = functools.partial(Algorithm, _learn, source="a demonstrator", several=True)
 
 # The paper's six, as in its published code, and others: docs/agents.md.
 ALGORITHMS = {
     "sac": _off_policy(_SAC, "soft actor-critic"),
     "speq": _off_policy(_SPEQ, "SAC with phases in which the critics alone learn"),
     "sope_eo": _off_policy(dataclasses.replace(_SPEQ, early_stop="published"), "SPEQ with phases that stop early"),
-    "sacfd": _off_policy(
-        dataclasses.replace(_SAC, prior="protected"),
-        "SAC with prior data in its buffer, never overwritten",
+    "sacfd": _with_prior(
+        dataclasses.replace(_SAC, prior="protected"), "SAC with prior data in its buffer, never overwritten"
     ),
-    "speq_o2o": _off_policy(
+    "speq_o2o": _with_prior(
         dataclasses.replace(_SPEQ, prior="symmetric_sampling"),
         "SPEQ with a batch of prior data in every update",
     ),
-    "sope": _off_policy(
+    "sope": _with_prior(
         dataclasses.replace(_SPEQ, prior="symmetric_sampling", early_stop="published"),
         "SPEQ-O2O with phases that stop early",
     ),
@@ -138,17 +133,9 @@ ALGORITHMS = {
         steps=100_000,
     ),
     # Noise falls over the length of a run: uneven ground takes a longer one.
-    "ppo": Algorithm(
-        "arc_suite.learning.agents.on_policy",
-        ProximalPolicy(),
-        "proximal policy optimisation",
-        evaluate_every=100_000,
-        terrain_steps=3_000_000,
-        several=True,
-    ),
+    "ppo": _on_policy(ProximalPolicy(), "proximal policy optimisation", 100_000, terrain_steps=3_000_000),
     # Small steps around a good policy: the noise of `ppo` would undo it.
-    "finetune": Algorithm(
-        "arc_suite.learning.agents.on_policy",
+    "finetune": _finetune(
         ProximalPolicy(
             initial_std=0.1,
             final_std=0.04,
@@ -160,30 +147,16 @@ ALGORITHMS = {
         "proximal policy optimisation from the policy of another run, --hp start=FOLDER",
         evaluate_every=100_000,
         steps=500_000,
-        source="a policy",
-        several=True,
     ),
-    "dagger": Algorithm(
-        "arc_suite.learning.agents.dagger",
-        DAgger(),
-        "imitation of a demonstrator",
-        evaluate_every=25_600,
-        steps=25_600,
-        source="a demonstrator",
-        several=True,
-    ),
+    "dagger": _dagger(DAgger(), "imitation of a demonstrator", evaluate_every=25_600, steps=25_600),
     # One policy for many bodies: two environments of each of 128, small batches as a network of legs is large.
-    "dagger_bodies": Algorithm(
-        "arc_suite.learning.agents.dagger",
+    "dagger_bodies": _dagger(
         DAgger(num_envs=256, round=60, updates=500, last_updates=1100, batch=128, hidden=128),
         "imitation of the demonstrators of many bodies, by one policy",
         evaluate_every=46_080,
         steps=46_080,
-        source="a demonstrator",
-        several=True,
     ),
-    "finetune_bodies": Algorithm(
-        "arc_suite.learning.agents.on_policy",
+    "finetune_bodies": _finetune(
         ProximalPolicy(
             num_envs=256,
             horizon=24,
@@ -202,18 +175,9 @@ ALGORITHMS = {
         "proximal policy optimisation with many bodies from the policy of another run, --hp start=FOLDER",
         evaluate_every=122_880,
         steps=270_336,
-        source="a policy",
-        several=True,
     ),
     # Its steps are updates.
-    "bc": Algorithm(
-        "arc_suite.learning.agents.bc",
-        BehaviourCloning(),
-        "behaviour cloning of a dataset",
-        evaluate_every=2500,
-        steps=5000,
-        source="prior data",
-    ),
+    "bc": Algorithm(_learn, BehaviourCloning(), "behaviour cloning of a dataset", 2500, 5000, source="prior data"),
 }
 
 

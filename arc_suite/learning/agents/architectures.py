@@ -1,10 +1,10 @@
 """Architectures of networks: what maps vectors of observations to actions and to values.
 
-An architecture is a frozen value. Learners draw its parameters, normalise its observations and apply it.
+An architecture is a frozen value with the methods of `Perceptron`: how networks see observations (..., size), and how
+they give actions (..., joints) and values (...). Learners draw its parameters, normalise its observations and apply it.
 """
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,63 +14,24 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.learning.agents import networks
 from arc_suite.learning.agents.normaliser import Moments, Normalizer
 from arc_suite.policies.graph import Graph
-from arc_suite.policies.tracing import Traced, perceptron, traced
+from arc_suite.policies.tracing import perceptron, traced
 from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import JOINTS, LEGS
 
 ACTIVATION = "elu"
 
 
-class Architecture(Protocol):
-    """How networks see observations (..., size), and how they give actions (..., joints) and values (...).
-
-    Attributes:
-        size: of an observation.
-        joints: of an action.
-        inputs: numbers whose moments normalise observations.
-    """
-
-    size: int
-    joints: int
-    inputs: int
-
-    def drawn(self, random: np.random.Generator, hidden: int, last_gain: float = 1.0) -> Any:
-        """Draw the parameters of a network of actions."""
-
-    def drawn_values(self, random: np.random.Generator, hidden: int) -> Any:
-        """Draw the parameters of a network of values."""
-
-    def actions(self, parameters, observations):
-        """Return the actions (..., joints) for normalised observations (..., size)."""
-
-    def values(self, parameters, observations):
-        """Return the values (...) of normalised observations (..., size)."""
-
-    def seen(self, observations):
-        """Return the vectors (n, inputs) whose moments normalise observations (..., size)."""
-
-    def normalise(self, moments: Moments) -> Normalizer:
-        """Return what normalizes observations, from the moments of what was seen."""
-
-    def exported(self, parameters, x: Traced) -> Traced:
-        """Write the nodes of the actions (1, joints) for a normalized observation (1, size)."""
-
-    def imported(self, weights: Sequence[np.ndarray]) -> Any:
-        """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order.
-
-        Raises:
-            ValueError: others.
-        """
-
-
 class Perceptron(NamedTuple):
-    """Multilayer perceptrons of two hidden layers, for one body; see `Architecture`.
+    """Multilayer perceptrons of two hidden layers, for one body.
 
     Normalised numbers of a block are scaled, so that the variances of every block have the same sum. Otherwise 150
     contact forces would outweigh a clock of two numbers.
 
     Attributes:
         blocks: sizes of the observation's blocks, in order.
+        joints: of an action.
+        size: of an observation.
+        inputs: numbers whose moments normalise observations.
     """
 
     blocks: tuple[int, ...]
@@ -94,11 +55,11 @@ class Perceptron(NamedTuple):
         return networks.mlp(random, (self.size, hidden, hidden, 1), "orthogonal", gain=2**0.5)
 
     def actions(self, parameters, observations):
-        """Return the actions (..., joints)."""
+        """Return the actions (..., joints) for normalised observations (..., size)."""
         return networks.forward(parameters, observations * self.scale, ACTIVATION)
 
     def values(self, parameters, observations):
-        """Return the values (...)."""
+        """Return the values (...) of normalised observations (..., size)."""
         return networks.forward(parameters, observations * self.scale, ACTIVATION)[..., 0]
 
     @property
@@ -109,20 +70,24 @@ class Perceptron(NamedTuple):
         return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
 
     def seen(self, observations):
-        """Return the observations."""
+        """Return the vectors (n, inputs) whose moments normalise observations (..., size)."""
         return observations
 
     def normalise(self, moments: Moments) -> Normalizer:
-        """Return what normalizes observations by the moments."""
+        """Return what normalizes observations, from the moments of what was seen."""
         return moments.normalizer()
 
     def exported(self, parameters, x):
-        """Write the nodes of a network of actions, its first weights scaled."""
+        """Write the nodes of the actions (1, joints) for a normalized observation (1, size)."""
         first, *others = parameters
         return perceptron(x, ({**first, "weight": first["weight"] * self.scale[:, None]}, *others), ACTIVATION)
 
     def imported(self, weights):
-        """Return the parameters."""
+        """Return the parameters from the weights and biases of the nodes that `exported` wrote, in order.
+
+        Raises:
+            ValueError: others.
+        """
         first, *others = map(_layer, weights[::2], weights[1::2])
         return {**first, "weight": first["weight"] / self.scale[:, None]}, *others
 
@@ -193,6 +158,9 @@ class PerLeg(NamedTuple):
         features = networks.mlp(random, (self.inputs, hidden, hidden), "orthogonal", gain=gain, last_gain=gain)
         head = networks.mlp(random, (2 * hidden, hidden, outputs), "orthogonal", gain=gain, last_gain=last_gain)
         return features, head
+
+
+Architecture = Perceptron | PerLeg
 
 
 def of(environment: VectorEnv | BodiesEnv) -> Architecture:

@@ -50,14 +50,9 @@ def learn(hp: BehaviourCloning, context: RunContext) -> Iterator[Slice]:
             random = generator(context.seed, "update", step)
             batch = data.at(random.integers(len(data), size=updates * hp.batch))
             rates = hp.learning_rate * (1.0 - (step + np.arange(updates)) / context.steps)
-            state, error = dagger.fit(
-                architecture,
-                state,
-                normalise(batch.observations),
-                batch.actions,
-                np.arange(updates * hp.batch).reshape(updates, hp.batch),
-                rates.astype(np.float32),
-            )
+            known, orders = (normalise(batch.observations), batch.actions), np.arange(updates * hp.batch)
+            orders = orders.reshape(updates, hp.batch)
+            state, error = dagger.fit(architecture, state, *known, orders, rates.astype(np.float32))
             errors.append(float(error))
             step += updates
         checkpoint = {**networks.named("state", state), "step": np.array(step)}

@@ -1,58 +1,18 @@
-"""Rollouts of a policy: the interface that learning needs, and rollouts in a vector environment."""
+"""Rollouts of a policy in a vector environment."""
 
 import math
 from collections.abc import Mapping
-from typing import Any, Protocol
 
 import numpy as np
 
 from arc_suite.learning.agents import architectures, learner
 from arc_suite.learning.agents import proximal_policy as ppo
-from arc_suite.learning.agents.architectures import Architecture
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import Diverged, RunContext, generator
 from arc_suite.learning.agents.normaliser import Normalizer
-from arc_suite.tasks import Task
 
 # Names of the arrays of a rollout.
 TRANSITIONS = ("observations", "actions", "means", "rewards", "terminated", "ended", "next_observations")
-
-
-class Collector(Protocol):
-    """Environments in which a policy acts; they go on from horizon to horizon.
-
-    Attributes:
-        task: of the environments.
-        architecture: of networks for it.
-    """
-
-    task: Task
-    architecture: Architecture
-
-    def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, Any]:
-        """Act in all environments for a horizon.
-
-        Args:
-            policy: network of normalised observations to mean actions.
-            normalise: what normalizes observations.
-            std: standard deviation of actions.
-            iteration: number of the horizon, from which the noise follows.
-            step: environment steps before it.
-
-        Returns:
-            Arrays (horizon, num_envs, ...) of NumPy or JAX by the names of `TRANSITIONS`. A step that begins
-            another command counts as `ended`, and the observation before it as the next one; see
-            `VectorEnv.resampled`.
-
-        Raises:
-            Diverged: an action is not finite.
-        """
-
-    def arrays(self) -> dict[str, np.ndarray]:
-        """Return the state of the environments as part of a checkpoint."""
-
-    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from the arrays of a checkpoint."""
 
 
 def ages(num_envs: int, step_limit: float) -> np.ndarray:
@@ -61,7 +21,14 @@ def ages(num_envs: int, step_limit: float) -> np.ndarray:
 
 
 class Environments:
-    """Collects in a vector environment; see `Collector`."""
+    """Environments in which a policy acts; they go on from horizon to horizon.
+
+    Attributes:
+        environment: the vector environment.
+        task: of the environments.
+        architecture: of networks for it.
+        observation: (num_envs, size) before the next step.
+    """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
         """Begin the first episodes."""
@@ -72,7 +39,22 @@ class Environments:
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
 
     def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, np.ndarray]:
-        """Act in all environments for a horizon."""
+        """Act in all environments for a horizon.
+
+        Args:
+            policy: network of normalised observations to mean actions.
+            normalise: what normalizes observations.
+            std: standard deviation of actions.
+            iteration: number of the horizon, from which the noise follows.
+            step: environment steps before it.
+
+        Returns:
+            Arrays (horizon, num_envs, ...) by the names of `TRANSITIONS`. A step that begins another command counts as
+            `ended`, and the observation before it as the next one; see `VectorEnv.resampled`.
+
+        Raises:
+            Diverged: an action is not finite.
+        """
         random = generator(self._seed, "noise", iteration)
         rollout = {name: [] for name in TRANSITIONS}
         for _ in range(self._hp.horizon):
@@ -95,9 +77,9 @@ class Environments:
         return {name: np.stack(arrays) for name, arrays in rollout.items()}
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return the snapshot of the environments."""
+        """Return the state of the environments as part of a checkpoint."""
         return learner.environment_arrays(self.environment)
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Go on from a snapshot."""
+        """Go on from the arrays of a checkpoint."""
         self.observation = learner.restore_environment(self.environment, arrays)

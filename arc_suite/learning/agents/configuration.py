@@ -15,7 +15,8 @@ from arc_suite.learning.agents.learner import MOST_SEEDS
 # Names in the file of a configuration.
 _OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior")
 CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
-# Names in the record of a run that follow from its configuration, the data and the installed packages.
+# Names in the record of a run that follow from its configuration, the data and the installed packages; `learner` is in
+# records of earlier versions.
 PRIOR_SHA256, TRAINING_SEEDS = "prior_sha256", "training_seeds"
 OF_DATA = (PRIOR_SHA256, TRAINING_SEEDS)
 PROVENANCE = ("task_version", "body_sha256", "model_sha256", "learner", "episodes", *OF_DATA, "versions")
@@ -131,8 +132,8 @@ class Configuration:
         """
         provenance = self.setup.provenance()
         packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
-        own = {"learner": self.definition.learner, "episodes": evaluation.EPISODES}
-        return self.to_dict() | provenance | own | {"versions": provenance["versions"] | packages}
+        own = {"episodes": evaluation.EPISODES, "versions": provenance["versions"] | packages}
+        return self.to_dict() | provenance | own
 
 
 def read(path: Path) -> Configuration:

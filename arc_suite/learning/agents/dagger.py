@@ -91,19 +91,15 @@ def learn(hp: DAgger, context: RunContext) -> Iterator[Slice]:
 
         # Fit the network to all labels so far; the last fit is longer, with a learning rate that falls to 0.
         known = dataset["ages"][:done].ravel() >= hp.left_out
-        observations, labels = (
-            dataset[name][:done].reshape(known.size, -1)[known] for name in ("observations", "labels")
-        )
+        observations, labels, _ = (array[:done].reshape(known.size, -1)[known] for array in dataset.values())
         error = 0.0
         if len(labels):
             normalise = architecture.normalise(moments.after(architecture.seen(observations)))
-            if done < length:
-                rates = hp.learning_rate * np.ones(hp.updates)
-            else:
+            rates = hp.learning_rate * np.ones(hp.updates)
+            if done == length:
                 rates = hp.learning_rate * np.linspace(1.0, 0.0, hp.last_updates, endpoint=False)
-            inputs, outputs = (
-                np.zeros((length * hp.num_envs, array.shape[-1]), np.float32) for array in (observations, labels)
-            )  # of one shape in every round, so compiled once
+            most = length * hp.num_envs  # of one shape in every round, so compiled once
+            inputs, outputs = (np.zeros((most, array.shape[-1]), np.float32) for array in (observations, labels))
             inputs[: len(labels)], outputs[: len(labels)] = normalise(observations), labels
             inputs, outputs = jnp.asarray(inputs), jnp.asarray(outputs)
             for first in range(0, len(rates), CHUNK):

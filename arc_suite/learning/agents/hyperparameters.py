@@ -5,6 +5,8 @@ from collections.abc import Mapping
 
 from arc_suite import checks
 
+_POSITIVE = (1e-6, 1e3)
+
 
 @dataclasses.dataclass(frozen=True)
 class SoftActorCritic:
@@ -77,17 +79,10 @@ class SoftActorCritic:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        least = {"hidden": 1, "batch": 1, "buffer_size": 1, "num_envs": 1, "n_step": 1, "start_steps": 0}
-        least |= {"phase_every": 1, "phase_updates": 0, "scored_batches": 1, "check_every": 1, "patience": 1}
-        _check(self, least)
-        _check_shares(self, "learning_rate", "discount", "held_out", "improvement")
-        checks.number("tau", self.tau, 1e-6, 1.0)
-        checks.number("dropout", self.dropout, 0.0, 0.9)
-        for name in ("reward_scale", "initial_std", "initial_temperature"):
-            checks.number(name, getattr(self, name), 1e-6, 1e3)
-        checks.number("last_gain", self.last_gain, 0.0, 1e3)
-        checks.number("target_entropy", self.target_entropy, -100.0, 100.0)
-        checks.number("utd_ratio", self.utd_ratio, 0.0, 1e3)
+        positive = dict.fromkeys(("reward_scale", "initial_std", "initial_temperature"), _POSITIVE)
+        ranges = {"start_steps": (0,), "phase_updates": (0,), "tau": (1e-6, 1.0), "dropout": (0.0, 0.9)}
+        ranges |= {"last_gain": (0.0, 1e3), "target_entropy": (-100.0, 100.0), "utd_ratio": (0.0, 1e3)}
+        _check(self, ranges | positive)
         whole = self.utd_ratio if self.utd_ratio > 1.0 else self.num_envs * self.utd_ratio
         if not whole or whole != round(whole):
             raise ValueError(
@@ -141,10 +136,7 @@ class DAgger:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        least = {"num_envs": 2, "left_out": 0, "round": 1, "updates": 1, "last_updates": 1, "batch": 1, "hidden": 1}
-        _check(self, least)
-        checks.number("noise", self.noise, 0.0, 10.0)
-        _check_shares(self, "learning_rate")
+        _check(self, {"num_envs": (2,), "left_out": (0,), "noise": (0.0, 10.0)})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,8 +155,7 @@ class BehaviourCloning:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        _check(self, {"batch": 1, "hidden": 1})
-        _check_shares(self, "learning_rate")
+        _check(self, {})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -220,25 +211,21 @@ class ProximalPolicy:
 
     def __post_init__(self):
         """Raise ValueError for a value out of its range."""
-        _check(self, {"num_envs": 1, "horizon": 1, "epochs": 1, "minibatch": 1, "hidden": 1, "value_warm_up": 0})
+        names = ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm")
+        ranges = {"value_warm_up": (0,), "gae_lambda": (0.0, 1.0), "normalize_until": (0.0, 1.0)}
+        _check(self, ranges | dict.fromkeys(names, _POSITIVE))
         checks.name(self.simulation, ("mujoco", "mjx", "warp"), "simulation")
-        _check_shares(self, "discount", "clip", "policy_rate", "value_rate")
-        for name in ("gae_lambda", "normalize_until"):
-            checks.number(name, getattr(self, name), 0.0, 1.0)
-        for name in ("initial_std", "final_std", "initial_desired_kl", "final_desired_kl", "gradient_norm"):
-            checks.number(name, getattr(self, name), 1e-6, 1e3)
         if self.minibatch > self.num_envs * self.horizon * (2 if self.symmetry_augmentation else 1):
             raise ValueError(f"minibatch: expected at most the transitions of a horizon, got {self.minibatch}")
 
 
-def _check(hp, least: Mapping[str, int]) -> None:
-    for name, low in least.items():
-        checks.integer(name, getattr(hp, name), low)
-
-
-def _check_shares(hp, *names: str) -> None:
-    """Check that 0 and 1 are no values, as with them nothing is learned or nothing else counts."""
-    for name in names:
-        value = getattr(hp, name)
-        if not 0.0 < checks.number(name, value) < 1.0:
-            raise ValueError(f"{name}: expected a number between 0 and 1, got {value!r}")
+def _check(hp, ranges: Mapping[str, tuple]) -> None:
+    """Check numbers by their ranges; others are integers from 1, or shares, of which 0 and 1 would learn nothing."""
+    for field in dataclasses.fields(hp):
+        name, value = field.name, getattr(hp, field.name)
+        if field.type is int:
+            checks.integer(name, value, *ranges.get(name, (1,)))
+        elif field.type is float:
+            checks.number(name, value, *ranges.get(name, ()))
+            if name not in ranges and not 0.0 < value < 1.0:
+                raise ValueError(f"{name}: expected a number between 0 and 1, got {value!r}")

@@ -72,17 +72,12 @@ class Inputs(NamedTuple):
 
     def of_batch(self, batch: Transitions) -> Transitions:
         """Return a batch of transitions with inputs in place of observations, every other transition mirrored."""
-        observations, actions, next_observations = batch.observations, batch.actions, batch.next_observations
+        seen = {name: getattr(batch, name) for name in ("observations", "next_observations")}
         if self.symmetry is not None:
             mirror, mirror_action = self.symmetry
-            observations, next_observations = (
-                _every_other(mirror, observations),
-                _every_other(mirror, next_observations),
-            )
-            actions = _every_other(mirror_action, actions)
-        return batch._replace(
-            observations=self(observations), actions=actions, next_observations=self(next_observations)
-        )
+            seen = {name: _every_other(mirror, observations) for name, observations in seen.items()}
+            batch = batch._replace(actions=_every_other(mirror_action, batch.actions))
+        return batch._replace(**{name: self(observations) for name, observations in seen.items()})
 
     def exported(self, layers: Sequence[Mapping]) -> Graph:
         """Return the policy of whole observations, from the layers of an actor that takes inputs."""

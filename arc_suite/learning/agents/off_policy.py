@@ -183,7 +183,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
 
 act = jax.jit(lambda policy, observation, noise: sac.sample(*sac.distribution(policy, observation), noise)[0])
 _distribution = jax.jit(sac.distribution)
-_held_out_loss = jax.jit(sac.held_out_loss, static_argnums=0)
+_policy_loss = jax.jit(sac.policy_loss, static_argnums=0)
 
 
 @functools.partial(jax.jit, static_argnums=0, donate_argnums=(1, 2))
@@ -255,7 +255,7 @@ def validation_loss(
     joints = state.policy["mean"]["bias"].shape[-1]
     noise = sac.noise(hp, generator(seed, "look", updates), len(observations), joints, with_policy=True)
     kept = None if noise.kept is None else noise.kept[2]
-    return float(_held_out_loss(sac.core(hp), state, observations, noise.action, kept))
+    return float(_policy_loss(sac.core(hp), state.policy, state, observations, noise.action, kept)[0])
 
 
 def _joined(several: list) -> list[np.ndarray]:

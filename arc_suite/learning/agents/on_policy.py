@@ -18,7 +18,6 @@ from arc_suite import policies
 from arc_suite.learning.agents import architectures, collecting, inputs, learner, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Architecture
-from arc_suite.learning.agents.collecting import Collector
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import RunContext, Slice, generator
 from arc_suite.learning.agents.normaliser import Moments, Normalizer
@@ -37,7 +36,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
     """
     if hp.value_warm_up and not hp.start:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
-    seed, collector = context.seed, _collector(hp, context)
+    seed, collector = context.seed, _environments(hp, context)
     task, architecture = collector.task, collector.architecture
     symmetry = inputs.symmetry(task) if hp.symmetry_augmentation else None
     moments, policy = Moments.none(architecture.inputs), None
@@ -83,14 +82,9 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
                 moments = moments.after(architecture.seen(symmetry.observation(rollout["observations"])))
             normalise = architecture.normalise(moments)
 
-        metrics = {
-            "reward": float(rollout["rewards"].mean()),
-            "falls": float(rollout["terminated"].sum()),
-            "std": std,
-            "kl": float(kl),
-            "policy_rate": float(state.rate),
-            "value_loss": float(value_loss),
-        }
+        metrics = {"reward": rollout["rewards"].mean(), "falls": rollout["terminated"].sum(), "std": std}
+        metrics |= {"kl": kl, "policy_rate": state.rate, "value_loss": value_loss}
+        metrics = {name: float(metric) for name, metric in metrics.items()}
         graph = architectures.policy(architecture, normalise, state.policy)
         checkpoint = {
             **networks.named("state", state),
@@ -102,7 +96,7 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         yield Slice(iterations * hp.num_envs * hp.horizon, metrics, graph, checkpoint)
 
 
-def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
+def _environments(hp: ProximalPolicy, context: RunContext):
     if hp.simulation == "mujoco":
         return collecting.Environments(hp, context)
     from arc_suite.learning.agents import worlds  # needs the extra `gpu`
@@ -111,12 +105,7 @@ def _collector(hp: ProximalPolicy, context: RunContext) -> Collector:
 
 
 def batch_of(
-    hp: ProximalPolicy,
-    architecture: Architecture,
-    rollout: Mapping[str, Any],
-    values,
-    normalise: Normalizer,
-    symmetry,
+    hp: ProximalPolicy, architecture: Architecture, rollout: Mapping[str, Any], values, normalise: Normalizer, symmetry
 ) -> ppo.Horizon:
     """Return the batch of a rollout: with advantages and returns, and mirrored transitions at its end."""
     size, numpy = rollout["observations"].shape[-1], rollout["observations"].__array_namespace__()
@@ -144,7 +133,8 @@ def batch_of(
 
 def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architecture) -> tuple[Normalizer, tuple]:
     """The normaliser and the network of the policy that learning starts from."""
-    found = _start(hp, context, task)
+    several, path = context.setup.several, hp.start
+    found = universal.load(path) if several else policies.policy(Path(path), context.setup.body, task=task)
     if not isinstance(found, Network):
         raise ValueError(f"{hp.start}: expected a policy of dagger, bc or ppo")
     for name in {**found.blocks, **task.sizes}:
@@ -160,10 +150,3 @@ def _read(hp: ProximalPolicy, context: RunContext, task, architecture: Architect
     if shapes != [leaf.shape for leaf in jax.tree.leaves(architecture.drawn(np.random.default_rng(0), hp.hidden))]:
         raise ValueError(f"{hp.start}: expected {hp.hidden} hidden units, got {shapes[0][0]}")  # of the first bias
     return normalise, policy
-
-
-def _start(hp: ProximalPolicy, context: RunContext, task):
-    """The policy that learning starts from."""
-    if context.setup.several:
-        return universal.load(hp.start)
-    return policies.policy(Path(hp.start), context.setup.body, task=task)

@@ -34,6 +34,7 @@ _VARIANTS = (("--", "o"), (":", "s"), ("-.", "^"), ((0, (8, 2)), "D"), ((0, (1, 
 _MARKERS = 15  # of a curve, at most
 _GREY = "#6E6E6E"
 _ENTRY, _CHARACTER = 0.8, 0.08  # inches of a legend's entry without a text, and of a letter of the text
+_BESIDE = ("axes fraction", "data")  # coordinates of a label to the right of an axis
 _GAP = 0.052  # between the labels of two levels, as a share of the axis
 
 
@@ -152,17 +153,9 @@ def _finish(axis, title: str, lines: Mapping[str, float], finals: Mapping[str, f
     gap, levels = _GAP * (high - low), sorted(levels)
     heights = _apart([value for value, *_ in levels], gap, high)
     for (value, name, colour, _), height in zip(levels, heights, strict=True):
-        axis.annotate(
-            f"{name} {value:.0f}",
-            xy=(1.0, value),
-            xytext=(1.04, height),
-            xycoords=("axes fraction", "data"),
-            textcoords=("axes fraction", "data"),
-            va="center",
-            fontsize=8,
-            color=colour,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0},
-        )
+        arrow = {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "relpos": (0.0, 0.5), "shrinkB": 0.0}
+        text, places = f"{name} {value:.0f}", ((1.0, value), (1.04, height))
+        axis.annotate(text, *places, *[_BESIDE] * 2, arrow, va="center", fontsize=8, color=colour)
     axis.set_xlabel("environment steps")
     axis.set_title(title, loc="left", fontweight="bold")
     axis.xaxis.set_major_formatter(EngFormatter(sep=""))

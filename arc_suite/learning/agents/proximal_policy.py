@@ -61,9 +61,8 @@ def begin(
     policy = drawn if policy is None else policy
     values = architecture.drawn_values(random, hp.hidden)
     adam = optax.scale_by_adam()
-    return jax.tree.map(
-        jnp.asarray, PpoState(policy, values, (adam.init(policy), adam.init(values)), np.float32(hp.policy_rate))
-    )
+    moments = adam.init(policy), adam.init(values)
+    return jax.tree.map(jnp.asarray, PpoState(policy, values, moments, np.float32(hp.policy_rate)))
 
 
 mean_action = jax.jit(lambda architecture, policy, x: architecture.actions(policy, x), static_argnums=0)

@@ -54,14 +54,7 @@ class Replay:
     """
 
     def __init__(
-        self,
-        folder: Path,
-        capacity: int,
-        size: int,
-        joints: int,
-        slack: int = 0,
-        mode: str = "w+",
-        num_envs: int = 1,
+        self, folder: Path, capacity: int, size: int, joints: int, slack: int = 0, mode: str = "w+", num_envs: int = 1
     ):
         """Map the files.
 
@@ -136,9 +129,8 @@ class Replay:
         nexts, ends = self._observations[(last + self._num_envs) % self._slots], self._end[last]
         final = ends >= 0
         nexts[final] = self._final[ends[final]]
-        return Transitions(
-            self._observations[first], self._actions[first], rewards, factor * self._goes_on[last], nexts
-        )
+        factor = factor * self._goes_on[last]
+        return Transitions(self._observations[first], self._actions[first], rewards, factor, nexts)
 
     def restore(self, total: int, ends: int, checksum: int) -> None:
         """Resume with the given counters; at most `slack` later transitions may be on disk.
@@ -163,11 +155,9 @@ class Replay:
             number += 1
 
     def _make_room(self, ends: int) -> None:
-        rows = len(self._final)
-        while rows < ends:
-            rows *= 2
-        if rows > len(self._final):
-            self._final = self._mapped("final_observations", np.float32, (rows, self._size), make=self._mode != "r")
+        while len(self._final) < ends:
+            shape = 2 * len(self._final), self._size
+            self._final = self._mapped("final_observations", np.float32, shape, make=self._mode != "r")
 
     def _mapped(self, name: str, dtype, shape: tuple[int, ...], make: bool) -> np.ndarray:
         path, size = self._folder / name, int(np.prod(shape)) * np.dtype(dtype).itemsize
@@ -215,9 +205,7 @@ class Protected:
         """
         count = len(self._first)
         of_first = indices < count
-        parts = (
-            self._first.at(indices[of_first], n_step, discount),
-            self._second.at(indices[~of_first] - count, n_step, discount),
-        )
+        steps = n_step, discount
+        parts = self._first.at(indices[of_first], *steps), self._second.at(indices[~of_first] - count, *steps)
         places = np.argsort(np.concatenate([np.flatnonzero(of_first), np.flatnonzero(~of_first)]))
         return Transitions(*(np.concatenate(pair)[places] for pair in zip(*parts, strict=True)))

@@ -27,6 +27,7 @@ TABLES = ("evaluations", "training", "times")
 
 _PROGRESS = "progress"  # name of the text in a checkpoint that is not the learner's
 _NUMBERS = {"evaluated", "wall", "cpu", "return"}  # of the progress, once they are known
+_FORMER = ("learner",)  # names in configurations of earlier versions that say nothing
 _MAX_BYTES = 1 << 34  # of a checkpoint, unpacked: the labels of imitation are the most
 
 
@@ -155,7 +156,7 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
         ValueError: the folder is of another run, or of none.
     """
     for name, there, here in _differences(config_of(path), json.loads(json.dumps(config))):
-        if name.partition(".")[0] not in left_out:
+        if name.partition(".")[0] not in (*left_out, *_FORMER):
             raise ValueError(
                 f"{path}: of another run, whose {name} is {there!r}, and not {here!r}; write to another folder"
             )

@@ -76,14 +76,9 @@ def begin(hp: SoftActorCritic, random: np.random.Generator, size: int, joints: i
     log_std["bias"] += np.float32(math.log(hp.initial_std))
     policy = {"trunk": tuple(trunk), "mean": mean, "log_std": log_std}
     critics = tuple(networks.mlp(random, (size + joints, *hidden, 1), layer_norm=True) for _ in range(CRITICS))
-    adam, log_alpha = optimiser(hp), np.array(math.log(hp.initial_temperature), np.float32)
+    adam, log_alpha = optax.adam(hp.learning_rate), np.array(math.log(hp.initial_temperature), np.float32)
     moments = {"policy": adam.init(policy), "critics": adam.init(critics), "log_alpha": adam.init(log_alpha)}
     return jax.tree.map(jnp.array, SacState(policy, critics, critics, log_alpha, moments))
-
-
-def optimiser(hp: SoftActorCritic) -> optax.GradientTransformation:
-    """Return Adam, (0.9, 0.999), 1e-8."""
-    return optax.adam(hp.learning_rate)
 
 
 def noise(hp: SoftActorCritic, random: np.random.Generator, batch: int, joints: int, with_policy: bool) -> Noise:
@@ -196,11 +191,6 @@ def update(
     return state._replace(critics=critics, targets=averaged, moments=moments), metrics
 
 
-def held_out_loss(hp: SoftActorCritic, state: SacState, observations, noise, kept):
-    """Return the policy's loss on observations (batch, size), which ends phases."""
-    return policy_loss(hp, state.policy, state, observations, noise, kept)[0]
-
-
 def actor(state: SacState) -> tuple[Mapping, ...]:
     """Return the layers of the deterministic policy, whose tanh is the action."""
     return *state.policy["trunk"], state.policy["mean"]
@@ -208,5 +198,5 @@ def actor(state: SacState) -> tuple[Mapping, ...]:
 
 def _stepped(hp: SoftActorCritic, name: str, parameters, gradient, moments):
     """Parameters after a step of Adam, and all moments."""
-    steps, moved = optimiser(hp).update(gradient, moments[name])
+    steps, moved = optax.adam(hp.learning_rate).update(gradient, moments[name])
     return optax.apply_updates(parameters, steps), {**moments, name: moved}

@@ -59,27 +59,19 @@ def train(
     training_seeds = _training_seeds(configuration)
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(setup.definition.step_limit)
-    module = definition.module
     growing = ("steps",) if definition.extends else ()
     with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
-        context = RunContext(
-            setup=setup,
-            seed=configuration.seed,
-            steps=configuration.steps,
-            evaluate_every=configuration.evaluate_every,
-            folder=Path(folder),
-            prior=configuration.prior,
-            threads=threads,
-            checkpoint=run_files.arrays,
-        )
-        slices = stack.enter_context(contextlib.closing(module.learn(definition.hyperparameters, context)))
-        vector = configuration.validation.make_vec(
-            evaluation.EPISODES, num_threads=threads, autoreset_mode=AutoresetMode.DISABLED
-        )
+        own = {name: getattr(configuration, name) for name in ("setup", "seed", "steps", "evaluate_every", "prior")}
+        context = RunContext(**own, folder=Path(folder), threads=threads, checkpoint=run_files.arrays)
+        slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
+        options = {"num_threads": threads, "autoreset_mode": AutoresetMode.DISABLED}
+        vector = configuration.validation.make_vec(evaluation.EPISODES, **options)
         environment = stack.enter_context(contextlib.closing(vector))
-        clocks, step = (time.monotonic(), time.process_time()), state["evaluated"]
-        bar = progress(total=context.steps, initial=step, desc=Path(folder).name, unit="step", unit_scale=True)
+        wall, cpu = time.monotonic() - state["wall"], time.process_time() - state["cpu"]
+        bar = progress(
+            total=context.steps, initial=state["evaluated"], desc=Path(folder).name, unit="step", unit_scale=True
+        )
         stack.enter_context(bar)
         while state["evaluated"] < context.steps:
             if minutes is not None and time.monotonic() - began > 60.0 * minutes:
@@ -101,8 +93,10 @@ def train(
                 state["return"] = _evaluate(configuration, environment, run_files, found.step, policy)
                 state["evaluated"] = found.step
                 on_metrics(found.step, {"return": state["return"]})
-            is_written = found.metrics is not None or is_evaluated
-            clocks = _write_times(run_files, state, clocks, found.step, is_written)
+            state |= {"wall": time.monotonic() - wall, "cpu": time.process_time() - cpu}  # s of all processes of a run
+            if found.metrics is not None or is_evaluated:
+                seconds = {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
+                run_files.append("times", {"step": found.step, **seconds})
             run_files.save(found.checkpoint, state)
             if stop():
                 return state["evaluated"] >= context.steps
@@ -124,18 +118,6 @@ def _postfix(metrics: Mapping[str, float], state: Mapping[str, Any]) -> str:
     shown = {"return": state["return"]} if "return" in state else {}
     shown |= dict(list(metrics.items())[:2])
     return ", ".join(f"{name} {value:.4g}" for name, value in shown.items())
-
-
-def _write_times(run_files: RunFolder, state: dict[str, Any], latest: tuple, step: int, write: bool) -> tuple:
-    """Add up the seconds of all processes of a run, write a line of them, and return the clocks."""
-    now = time.monotonic(), time.process_time()
-    for name, was, is_now in zip(("wall", "cpu"), latest, now, strict=True):
-        state[name] += is_now - was
-    if write:
-        run_files.append(
-            "times", {"step": step} | {f"{name}_seconds": round(state[name], 3) for name in ("wall", "cpu")}
-        )
-    return now
 
 
 def _training_seeds(configuration: Configuration) -> seed_ranges.Ranges | None:

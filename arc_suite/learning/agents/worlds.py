@@ -20,7 +20,7 @@ _IMPLEMENTATIONS = {"mjx": "jax", "warp": "warp"}
 
 
 class Worlds:
-    """Collects in worlds that step together; see `collecting.Collector`.
+    """Worlds that step together, in which a policy acts as in `collecting.Environments`.
 
     A world whose episode has ended starts another one in the same step, one of the table of starts.
     """

@@ -18,23 +18,14 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import (
-    ROBOT_HELP,
-    define_body,
-    define_task,
-    define_vecnormalize,
-    made_body,
-    only_setup,
-    policy_name,
-)
+from arc_suite.cli.flags import define_body, define_task, define_vecnormalize, made_body, only_setup, policy_name
 from arc_suite.learning import onnx_file
 from arc_suite.policies import universal
 
 FLAGS = flags.FLAGS
+define_body(None, "; for a policy of many bodies")
 define_vecnormalize()
-define_body()
 define_task()
-_ROBOT = flags.DEFINE_string("robot", None, f"Body of a policy of many bodies: {ROBOT_HELP}.")
 flags.DEFINE_string("output", None, "File to write (.onnx). [default: policy.onnx next to the policy]", short_name="o")
 
 
@@ -45,8 +36,8 @@ def main(run: str | None = None) -> None:
     source, name = Path(run), policy_name(run)
     output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
     checks.extension(output, [".onnx"])
-    if _ROBOT.present or made_body() is not None:
-        setup = only_setup(_ROBOT)
+    if FLAGS["robot"].present or made_body() is not None:
+        setup = only_setup()
         policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")

@@ -66,10 +66,8 @@ def submit(name: str, jobs: int, folder: Path, results: Path) -> int:
     Raises:
         ValueError: submitit is not installed.
     """
-    try:
+    with versions.needing("--submit needs submitit", "learn"):
         from arc_suite.learning.studies import cluster
-    except ImportError as error:
-        raise versions.MissingExtra("--submit needs submitit", "learn", error) from None
     arguments = ("study", name, f"--runs={folder.absolute()}", f"--results={results.absolute()}")
     parameters = {"slurm_partition": FLAGS.partition} if FLAGS.partition else {}
     for job in cluster.submit(arguments, jobs, FLAGS.hours, folder / "jobs", **parameters):

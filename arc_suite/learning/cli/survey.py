@@ -37,12 +37,6 @@ flags.DEFINE_integer(
     "links", None, "Actuated links of each leg, of the family random. [default: random, 2 to 4]", *generator.LINKS
 )
 flags.DEFINE_float("seconds", 20.0, "How long each body walks.", lower_bound=1.0)
-flags.DEFINE_float(
-    "froude",
-    None,
-    "Desired speed in units of sqrt(g h), h being the standing height; negative for backwards. [default: 0.25]",
-)
-flags.DEFINE_bool("in_phase", False, "Move all legs at once: a check that the survey tells bad from good.")
 flags.DEFINE_integer("processes", None, "Bodies at a time, each in a process. [default: one per core]", lower_bound=1)
 flags.DEFINE_string("picture", None, "File to write a picture of up to twelve failures to.")
 
@@ -56,9 +50,7 @@ def picture(outcomes: list[survey.Outcome]) -> np.ndarray:
         view = environment.physics.render(300, 400, "portrait", quality="still")
         views.append(films.captioned(view, caption))
         environment.close()
-    columns = min(4, len(views))
-    views += [np.zeros_like(views[0])] * (-len(views) % columns)
-    return films.grid(views, columns)
+    return films.grid(views, min(4, len(views)))
 
 
 def member(seed: int) -> Body:
@@ -79,11 +71,8 @@ def main() -> None:
     """Run the survey and print it."""
     name, settings = task()
     settings = {"time_limit": FLAGS.seconds} | settings
-    settings |= {"duty_factor": 0.6, "phase_offsets": 0.0} if FLAGS.in_phase else {}
-    cases = []
-    for seed in range(FLAGS.first, FLAGS.first + FLAGS.count):
-        setup = Setup.of(member(seed), name, settings)
-        cases.append(survey.Case(setup, seed, FLAGS.froude))
+    seeds = range(FLAGS.first, FLAGS.first + FLAGS.count)
+    cases = [survey.Case(Setup.of(member(seed), name, settings), seed) for seed in seeds]
     with contextlib.ExitStack() as stack:
         if FLAGS.picture:
             checks.extension(FLAGS.picture, [".png"])
@@ -92,9 +81,7 @@ def main() -> None:
         print(survey.table(outcomes))
         print(survey.summary(outcomes))
         failed = [outcome for outcome in outcomes if outcome.failures]
-        for outcome in failed:
-            print(
-                f"seed {outcome.case.seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}"
-            )
+        for seed, outcome in ((each.case.seed, each) for each in failed):
+            print(f"seed {seed}: {outcome.legs} legs, {outcome.links} links: {', '.join(outcome.failures)}")
         if path:
             imageio.imwrite(path, picture(failed or outcomes))

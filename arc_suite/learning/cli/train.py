@@ -15,14 +15,14 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
 """
 
 import contextlib
-import importlib.util
-from collections.abc import Callable, Iterator
+import functools
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from absl import flags
 
 from arc_suite import evaluation, files, registry, versions
-from arc_suite.cli.flags import ROBOT_HELP, define_body, define_task, made_body, named_values, only_body, task
+from arc_suite.cli.flags import define_body, define_task, made_body, named_values, only_body, task
 from arc_suite.cli.program import TERMINATED, progress, resumable, say, termination, use_one_thread
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import anchors
@@ -33,11 +33,8 @@ from arc_suite.learning.agents.training import train
 from arc_suite.policies import network
 
 FLAGS = flags.FLAGS
-define_body()
+define_body(more="; or several with commas, such as varied:0-127,queen, for a policy of any body")
 define_task()
-_ROBOT = flags.DEFINE_string(
-    "robot", "queen", f"{ROBOT_HELP}; or several with commas, such as varied:0-127,queen, for a policy of any body."
-)
 flags.DEFINE_string(
     "algorithm",
     "ppo",
@@ -64,7 +61,9 @@ def main() -> int:
     run = configured()
     folder = Path(FLAGS.output or Path("runs", run.name))
     with contextlib.ExitStack() as stack:
-        listeners = [picture(run, folder), *([stack.enter_context(events(folder))] if FLAGS.tensorboard else [])]
+        listeners = [functools.partial(draw, run, folder)]
+        if FLAGS.tensorboard:
+            listeners.append(stack.enter_context(events(folder)))
 
         def on_metrics(step, metrics):
             if "return" in metrics:
@@ -79,7 +78,7 @@ def main() -> int:
         limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
         with resumable(folder), termination() as terminated:
             finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics, stop=terminated)
-    if finished and importlib.util.find_spec("onnx") and not run.setup.several:
+    if finished and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
     return TERMINATED if not finished and terminated() else 0
@@ -99,8 +98,8 @@ def configured() -> Configuration:
         return configuration.read(Path(FLAGS.config))
     hyperparameters = named_values("hp", FLAGS.hp)
     run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior
-    several = registry.names_several(_ROBOT.value) and made_body() is None
-    setup = Setup.of(_ROBOT.value if several else only_body(_ROBOT), *task())
+    several = registry.names_several(FLAGS.robot) and made_body() is None
+    setup = Setup.of(FLAGS.robot if several else only_body(), *task())
     return Configuration.of(setup, FLAGS.algorithm, hyperparameters, *run)
 
 
@@ -114,24 +113,19 @@ def earned(run: Configuration, folder: Path) -> str:
     return f"finished, return {result:.1f} +- {returns.std():.1f}, {levels}"
 
 
-def picture(run: Configuration, folder: Path) -> Callable:
-    """Return a listener that draws the returns anew after each evaluation, if matplotlib is installed."""
-    if not importlib.util.find_spec("matplotlib"):
-        return lambda step, metrics: None
-    from arc_suite.learning.agents import plots
+def draw(run: Configuration, folder: Path, step: int, metrics: Mapping[str, float]) -> None:
+    """Draw the returns anew after an evaluation."""
+    from arc_suite.learning.agents import plots  # needs matplotlib
 
-    def draw(step, metrics):
-        if "return" in metrics:
-            scale = anchors.anchors(run.validation)
-            lines = {"standing still": scale.zero}
-            if scale.demonstrator is not None:
-                lines[f"demonstrator {scale.preset}"] = scale.demonstrator
-            finals = evaluation.published_returns(run.setup, [run.algorithm], run.steps)
-            figure = plots.returns(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
-            with files.writing(folder / "curve.png") as temporary:
-                figure.savefig(temporary)
-
-    return draw
+    if "return" in metrics:
+        scale = anchors.anchors(run.validation)
+        lines = {"standing still": scale.zero}
+        if scale.demonstrator is not None:
+            lines[f"demonstrator {scale.preset}"] = scale.demonstrator
+        finals = evaluation.published_returns(run.setup, [run.algorithm], run.steps)
+        figure = plots.returns(run_folder.table(folder, "evaluations"), run.algorithm, folder.name, lines, finals)
+        with files.writing(folder / "curve.png") as temporary:
+            figure.savefig(temporary)
 
 
 @contextlib.contextmanager
@@ -141,10 +135,8 @@ def events(folder: Path) -> Iterator[Callable]:
     Raises:
         ValueError: tensorboardX is not installed.
     """
-    try:
+    with versions.needing("--tensorboard needs tensorboardX", "learn"):
         from tensorboardX import SummaryWriter
-    except ImportError as error:
-        raise versions.MissingExtra("--tensorboard needs tensorboardX", "learn", error) from None
     writers = []
 
     def write(step, metrics):

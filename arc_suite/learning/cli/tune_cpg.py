@@ -59,10 +59,7 @@ def search(setup: Setup, folder: pathlib.Path) -> tuple[Search, Journal]:
     settings |= {name: given(name) for name in ("episodes", "steps", "starts")}
     known = setup.to_dict() | settings | {"versions": versions.recorded()}
     with contextlib.closing(Journal(folder / "journal.jsonl", known, Generation)) as journal:
-        try:
-            course = Search(setup, **settings)
-        except ImportError as error:
-            raise versions.MissingExtra("a search needs cma", "learn", error) from None
+        course = Search(setup, **settings)
         for generation in journal.generations:
             course.step(generation.fitness)
         done = len(journal.generations)
@@ -102,10 +99,10 @@ def main() -> None:
     checks.name(FLAGS.space, SPACES, "space")
     if 0 < (FLAGS.starts or 0) < HARD:
         raise ValueError(f"flag --starts={FLAGS.starts}: expected {HARD} or more, or 0")
-    try:
+    with versions.needing("a search needs cma and matplotlib", "learn"):
+        import cma  # noqa: F401
+
         from arc_suite.learning.tuning import plots
-    except ImportError as error:
-        raise versions.MissingExtra("the plot needs matplotlib", "learn", error) from None
     folder = files.folder(FLAGS.output)
     with files.writing_json(folder / "result.json") as file, files.writing(folder / "course.png") as picture:
         with resumable(folder):
@@ -113,16 +110,9 @@ def main() -> None:
         preset = course.result()
         plots.course(setup.name, course.reward, journal.generations, STEPS).savefig(picture)
         metrics = evaluate(setup, preset)
-        file.update(
-            **setup.to_dict(),
-            space=FLAGS.space,
-            seed=FLAGS.seed,
-            generations=len(journal.generations),
-            resets=FLAGS.resets,
-            preset=preset,
-            metrics=metrics,
-            versions=versions.recorded(),
-        )
+        counts = {"generations": len(journal.generations), "resets": FLAGS.resets}
+        file.update(setup.to_dict() | {"space": FLAGS.space, "seed": FLAGS.seed} | counts)
+        file.update(preset=preset, metrics=metrics, versions=versions.recorded())
     columns = "{:<8} {:>18}" + " {:>12}" * (1 + len(STYLE))
     header = columns.format("preset", "return", f"falls of {FLAGS.resets}", *STYLE)
     print(header, "-" * len(header), sep="\n")

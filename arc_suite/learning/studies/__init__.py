@@ -7,8 +7,6 @@ it, and `report` writes the report from it.
 
 from arc_suite import versions
 
-try:
+with versions.needing("studies need JAX, Minari and matplotlib", "learn"):
     import matplotlib  # noqa: F401
     import minari  # noqa: F401
-except ImportError as error:
-    raise versions.MissingExtra("studies need JAX, Minari and matplotlib", "learn", error) from error

@@ -46,19 +46,14 @@ def write(studies: Path, study: str, lines: Iterable[dict[str, str]]) -> None:
         ValueError: a damaged table.
         OSError: a file cannot be written.
     """
-    _write(studies, [*(line for line in _lines(studies) if line["study"] != study), *lines])
-
-
-def _lines(studies: Path) -> list[dict[str, str]]:
-    return csv_files.read(studies / TABLE, HEADS)
+    _write(studies, [*(line for line in csv_files.read(studies / TABLE, HEADS) if line["study"] != study), *lines])
 
 
 def _write(studies: Path, lines: Iterable[dict[str, str]]) -> None:
     lines = sorted(lines, key=lambda line: line["study"].partition("/")[0])
     csv_files.write(studies / TABLE, HEADS, lines)
-    linked = [line | {"study": link(line)} for line in ranked(lines)]
     heads = HEADS[:-1]  # the configuration only tells lines apart
-    page = table(heads, [[line[head] for head in heads] for line in linked])
+    page = table(heads, [[(line | {"study": link(line)})[head] for head in heads] for line in ranked(lines)])
     with files.writing(studies / PAGE) as temporary:
         temporary.write_text(f"# Leaderboard\n\n{_TEXT}\n\n{page}\n", encoding="utf-8")
 
@@ -98,7 +93,6 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
     folder = files.folder(studies / ENTRIES)
     lines: dict[str, dict[str, str]] = {}
     for entry in entries:
-        place = str(entry.setup)
         copied = folder / f"{entry.setup.body.name}-{entry.setup.kind.name}-{name}.json"
         with files.writing(copied) as temporary:
             temporary.write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
@@ -106,21 +100,20 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
         score = float(anchors.anchors(entry.setup).score(totals.mean()))
         figures = {key: np.mean([each.progress[key] for each in entry.episodes]) for key in entry.episodes[0].progress}
         figure = next(iter(figures))
-        compliance = f"{figures['gait_compliance']:.3f}" if "gait_compliance" in figures else "-"
         lines[copied.name] = dict.fromkeys(HEADS, "-") | {
-            "robot, task": place,
+            "robot, task": str(entry.setup),
             "algorithm": name,
             "seeds": "1",
             "return": f"{totals.mean():.1f}",
             "score": f"{score:z.2f}" if np.isfinite(score) else "-",
             "metric": f"{figure} {figures[figure]:.3f}",
-            STYLE[0]: compliance,
+            STYLE[0]: f"{figures['gait_compliance']:.3f}" if "gait_compliance" in figures else "-",
             "notes": "-" if entry.training_seeds is not None else provenance.UNKNOWN,
             "study": f"{ENTRIES}/{copied.name}",
             "command of seed 0": _command(entry),
             "configuration": copied.name,
         }
-    others = [line for line in _lines(studies) if line["configuration"] not in lines]
+    others = [line for line in csv_files.read(studies / TABLE, HEADS) if line["configuration"] not in lines]
     _write(studies, [*others, *lines.values()])
     return studies / PAGE
 

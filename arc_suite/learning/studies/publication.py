@@ -98,16 +98,13 @@ def _with_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict
     latest = rows[-1]["step"]
     measured = run_folder.lines(folder, "style")
     if not measured or measured[-1]["step"] != latest:
-        _measure(run, folder, latest)
-        measured = run_folder.lines(folder, "style")
-    metrics = {
-        row["seed"]: {STYLE + name: row[name] for name in row if name not in ("step", "seed")} for row in measured
-    }
+        measured = _measured(run, folder, latest)
+    metrics = {row.pop("seed"): {STYLE + name: row[name] for name in row if name != "step"} for row in measured}
     return [row | metrics[row["seed"]] if row["step"] == latest else row for row in rows]
 
 
-def _measure(run: Run, folder: Path, step: str) -> None:
-    """Write a table of the style of the policy at a step, as a later one may exist already; slow."""
+def _measured(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
+    """Measure the style of the policy at a step, as a later one may exist already, and write its table; slow."""
     path, setup = folder / checkpoints.FOLDER / step / network.FILE, run.configuration.validation
     lines = []
     with contextlib.closing(setup.load()) as environment:
@@ -115,8 +112,9 @@ def _measure(run: Run, folder: Path, step: str) -> None:
         for seed in range(evaluation.EPISODES):
             measured = style.measure(style.record(environment, policy, seed))
             metrics = {name: repr(measured[name].value) for name in METRICS if name in measured}
-            lines.append({"step": step, "seed": seed} | metrics)
+            lines.append({"step": step, "seed": str(seed)} | metrics)
     csv_files.write(folder / "style.csv", list(lines[0]), lines)
+    return lines
 
 
 def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:

@@ -1,9 +1,8 @@
 """Reports of studies: Markdown and curves, of published tables alone."""
 
 import hashlib
-import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -42,7 +41,6 @@ def write(name: str, study: Study, published: Path) -> Path:
         "Curves": [_CURVES, f"![Returns over environment steps]({CURVES})"],
         "Final returns": [_FINALS, _finals(groups, demonstrators)],
         "Sample efficiency": [_EFFICIENCY, _efficiency(groups, demonstrators)],
-        **({"Probability of improvement": [_IMPROVEMENT, compared]} if (compared := _improvements(groups)) else {}),
         **({"Phases": [_PHASES, _phases(groups)]} if any(len(each.phases) for each in found) else {}),
         "Style": [_STYLE, _style(groups)],
         **({"Claims of the paper": [claims.TEXT, claims.checked(found)]} if any(map(claims.is_papers, found)) else {}),
@@ -69,10 +67,6 @@ _EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "
     "it has not. Area is the mean return over all evaluations so far."
 )
-_IMPROVEMENT = (
-    "Probability that an algorithm has a higher return than that of the column, with 95 % bootstrap interval, over "
-    "the places in which both have several seeds, at the latest step that both have reached."
-)
 _PHASES = (
     "Updates of the critics alone in a stabilisation phase, for runs with published phases: those of `speq` and "
     "`speq_o2o` have the full length, the others may end early."
@@ -84,9 +78,8 @@ _STYLE = (
 
 
 def _page(sections: Mapping[str, Sequence[str]]) -> str:
-    texts = [("#" if not place else "##") + f" {title}" for place, title in enumerate(sections)]
-    parts = itertools.chain.from_iterable(zip(texts, ("\n\n".join(body) for body in sections.values()), strict=True))
-    return "\n\n".join(parts) + "\n"
+    text = "\n\n".join("\n\n".join([f"## {title}", *body]) for title, body in sections.items())
+    return text[1:] + "\n"  # the first heading is that of the page
 
 
 def _title(study: Study, found: Sequence[RunResult]) -> str:
@@ -109,19 +102,22 @@ def _curves(groups: Groups, demonstrators):
 
     drawn, finals = {}, {}
     for place, kinds in groups.items():
-        drawn[place] = {}
-        for kind, seeds in kinds.items():
-            count = min(len(each.steps) for each in seeds)
-            returns = np.array([each.returns.mean(axis=1)[:count] for each in seeds])
-            drawn[place][kind] = plots.Curve(_algorithm(seeds[0].run), seeds[0].steps[:count], returns)
-        names, ends = zip(*((each.algorithm, each.steps[-1]) for each in drawn[place].values()), strict=True)
-        finals[place] = evaluation.published_returns(seeds[0].run.configuration.setup, names, max(ends))
+        algorithms = {kind: seeds[0].run.configuration.algorithm for kind, seeds in kinds.items()}
+        curves = {kind: plots.Curve(algorithms[kind], *results.curve(seeds)) for kind, seeds in kinds.items()}
+        setup, end = (
+            next(iter(kinds.values()))[0].run.configuration.setup,
+            max(each.steps[-1] for each in curves.values()),
+        )
+        drawn[place], finals[place] = curves, evaluation.published_returns(setup, [*algorithms.values()], end)
     lines = {p: {_policy(n): v.mean() for n, v in every.items()} for p, every in demonstrators.items()}
     return plots.study(drawn, lines, finals)
 
 
-def _algorithm(run: Run) -> str:
-    return run.configuration.algorithm
+def _kinds(groups: Groups) -> Iterator[tuple[str, str, Sequence[RunResult]]]:
+    """Yield place, kind and results of each kind of run."""
+    for place, kinds in groups.items():
+        for kind, seeds in kinds.items():
+            yield place, kind, seeds
 
 
 def _policy(name: str) -> str:
@@ -146,15 +142,10 @@ def _score(values: np.ndarray, place: str, demonstrators) -> str:
     return f"{found:z.2f}" if np.isfinite(found) else "-"
 
 
-def _expert(run: Run) -> float | None:
-    """Return the return of the paper's demonstrator in a run's place; None if the paper has none."""
-    return evaluation.expert_return(run.configuration.setup)
-
-
 def _paper(result: RunResult, steps: int) -> str:
     """The paper's return after as many steps; a dash where its curves have none."""
-    setup = result.run.configuration.setup
-    found = published.at(setup.body.name, _algorithm(result.run), steps) if claims.is_papers(result) else None
+    run = result.run.configuration
+    found = published.at(run.setup.body.name, run.algorithm, steps) if claims.is_papers(result) else None
     return "-" if found is None else f"{found:.0f}"
 
 
@@ -162,11 +153,11 @@ def _finals(groups: Groups, demonstrators) -> str:
     lines = []
     for place, kinds in groups.items():
         for kind, seeds in kinds.items():
-            run, values = seeds[0].run, results.scores(seeds)
-            steps, score = min(each.steps[-1] for each in seeds), _score(values, place, demonstrators)
+            steps, values = min(each.steps[-1] for each in seeds), results.scores(seeds)
+            score = _score(values, place, demonstrators)
             cells = (place, kind, f"{steps:,}", str(len(seeds)), _mean(values), score, _iqm(values))
             lines.append((*cells, _paper(seeds[0], steps), results.notes(seeds)))
-        expert = _expert(run)
+        expert = evaluation.expert_return(seeds[0].run.configuration.setup)
         for name, totals in demonstrators.get(place, {}).items():
             own = f"{expert:.0f}" if name == "medium" and expert else "-"
             score = _score(totals, place, demonstrators)
@@ -177,52 +168,30 @@ def _finals(groups: Groups, demonstrators) -> str:
 
 def _efficiency(groups: Groups, demonstrators) -> str:
     lines = []
-    for place, kinds in groups.items():
-        half = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf
-        for kind, seeds in kinds.items():
-            cells = []
-            for threshold in (half, 3500.0):
-                steps, seconds = results.until(seeds, threshold)
-                cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
-            area = np.mean([each.returns.mean() for each in seeds])
-            lines.append((place, kind, *cells, f"{area:.1f}"))
+    for place, kind, seeds in _kinds(groups):
+        half, cells = anchors.of_returns(demonstrators[place]).at(0.5) if place in demonstrators else np.inf, []
+        for threshold in (half, 3500.0):
+            steps, seconds = results.until(seeds, threshold)
+            cells += [f"{steps:,.0f}", f"{seconds / 60.0:.1f}"] if np.isfinite(steps) else ["-", "-"]
+        area = np.mean([each.returns.mean() for each in seeds])
+        lines.append((place, kind, *cells, f"{area:.1f}"))
     heads = ("robot, task", "algorithm", "steps to score .5", "CPU min", "steps to 3,500", "CPU min", "area")
     return table(heads, lines)
 
 
-def _improvements(groups: Groups) -> str | None:
-    """The table of all kinds that can be compared; None without any."""
-    names = list(dict.fromkeys(kind for kinds in groups.values() for kind in kinds))
-    found = {pair: results.improvement(groups, *pair) for pair in itertools.permutations(names, 2)}
-    found = {pair: each for pair, each in found.items() if each is not None}
-    names = [name for name in names if any(name in pair for pair in found)]
-    if not names:
-        return None
-
-    def cell(pair):
-        return "{:.2f} [{:.2f}, {:.2f}]".format(found[pair][0], *found[pair][1]) if pair in found else "-"
-
-    return table(("more than", *names), [(x, *(cell((x, y)) for y in names)) for x in names])
-
-
 def _phases(groups: Groups) -> str:
     lines = []
-    for place, kinds in groups.items():
-        for kind, seeds in kinds.items():
-            updates = np.concatenate([each.phases for each in seeds])
-            if len(updates):
-                figures = (updates.mean(), updates.min(), updates.max())
-                lines.append((place, kind, str(len(updates)), *(f"{figure:,.0f}" for figure in figures)))
+    for place, kind, seeds in _kinds(groups):
+        updates = np.concatenate([each.phases for each in seeds])
+        if len(updates):
+            numbers = (len(updates), updates.mean(), updates.min(), updates.max())
+            lines.append((place, kind, *(f"{number:,.0f}" for number in numbers)))
     return table(("robot, task", "algorithm", "phases", "mean", "least", "most"), lines)
 
 
 def _style(groups: Groups) -> str:
-    names = list(dict.fromkeys(name for kinds in groups.values() for s in kinds.values() for name in s[0].style))
-    lines = []
-    for place, kinds in groups.items():
-        for kind, seeds in kinds.items():
-            cells = [_size(name, seeds) for name in names]
-            lines.append((place, kind, *cells))
+    names = list(dict.fromkeys(name for _, _, seeds in _kinds(groups) for name in seeds[0].style))
+    lines = [(place, kind, *(_size(name, seeds) for name in names)) for place, kind, seeds in _kinds(groups)]
     return table(("robot, task", "algorithm", *(name.replace("_", " ") for name in names)), lines)
 
 
@@ -234,21 +203,21 @@ def _size(name: str, seeds: Sequence[RunResult]) -> str:
 def _rows(name: str, groups: Groups, demonstrators) -> list[dict[str, str]]:
     """Return the rows of a study in the leaderboard, by `leaderboard.HEADS`."""
     rows = []
-    for seeds in (seeds for kinds in groups.values() for seeds in kinds.values()):
+    for _, _, seeds in _kinds(groups):
         run, values = seeds[0].run, results.scores(seeds)
-        figure = next(iter(seeds[0].progress))
-        own = f"{figure} {np.mean([np.mean(each.progress[figure]) for each in seeds]):.3f}"
+        length = getattr(run.configuration.hyperparameters, "phase_updates", 0)
+        own = next(iter(seeds[0].progress))
         style = [_size(metric, seeds) for metric in ("gait_compliance", "heading_error", "torso_pitch")]
         cells = {
             "robot, task": run.place,
             "algorithm": run.kind,
-            "phases, updates": _phase_length(run),
+            "phases, updates": f"{length:,}" if length else "-",
             "prior data, episodes": f"{run.prior.preset}, {run.prior.episodes:,}" if run.prior else "-",
             "seeds": str(len(seeds)),
             "return": f"{values.mean():.1f}",
             "score": _score(values, run.place, demonstrators),
             "IQM [95 %]": _iqm(values),
-            "metric": own,
+            "metric": f"{own} {np.mean([np.mean(each.progress[own]) for each in seeds]):.3f}",
             **dict(zip(leaderboard.STYLE, style, strict=True)),
             "steps": f"{min(each.steps[-1] for each in seeds):,} of {run.configuration.steps:,}",
             "CPU min": f"{np.mean([each.cpu[-1] for each in seeds]) / 60.0:.1f}",
@@ -259,12 +228,6 @@ def _rows(name: str, groups: Groups, demonstrators) -> list[dict[str, str]]:
         }
         rows.append(cells)
     return rows
-
-
-def _phase_length(run: Run) -> str:
-    """The most updates of a stabilisation phase."""
-    length = getattr(run.configuration.hyperparameters, "phase_updates", 0)
-    return f"{length:,}" if length else "-"
 
 
 def _identity(run: Run) -> str:

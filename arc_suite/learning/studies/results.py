@@ -128,6 +128,12 @@ def scores(seeds: Sequence[RunResult]) -> np.ndarray:
     return np.array([each.final for each in seeds])
 
 
+def curve(seeds: Sequence[RunResult]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the steps (points,) of the evaluations that all seeds have, and the mean returns (seeds, points)."""
+    count = min(len(each.steps) for each in seeds)
+    return seeds[0].steps[:count], np.array([each.returns.mean(axis=1)[:count] for each in seeds])
+
+
 def size(values: np.ndarray) -> float:
     """Return the mean size of the values that are finite; NaN where none are."""
     sizes = np.abs(values[np.isfinite(values)])
@@ -146,27 +152,3 @@ def until(seeds: Sequence[RunResult], threshold: float) -> tuple[float, float]:
         found.append((each.steps[enough[0]], each.cpu[enough[0]]) if enough.size else (np.inf, np.inf))
     steps, seconds = np.mean(found, axis=0)
     return float(steps), float(seconds)
-
-
-def improvement(groups: Groups, x: str, y: str) -> tuple[float, tuple[float, float]] | None:
-    """Return the probability that a run of kind x earns more than one of y, with its interval.
-
-    Places in which both have several seeds are strata. Both are compared at the latest step that all their runs have
-    reached. None without such a place.
-    """
-    pairs = [(kinds[x], kinds[y]) for kinds in groups.values() if x in kinds and y in kinds]
-    cut = [[_until_step(side, both) for side in both] for both in pairs if min(map(len, both)) > 1]
-    cut = [both for both in cut if all(side for side in both)]
-    if not cut:
-        return None
-    strata = [[scores(side) for side in both] for both in cut]
-    return evaluation.probability_of_improvement([each[0] for each in strata], [each[1] for each in strata])
-
-
-def _until_step(side: Sequence[RunResult], both: Sequence[Sequence[RunResult]]) -> list[RunResult]:
-    """Results cut back to the latest step at which all have been evaluated."""
-    common = set.intersection(*(set(each.steps.tolist()) for seeds in both for each in seeds))
-    if not common:
-        return []
-    ends = [int(np.flatnonzero(each.steps == max(common))[0]) + 1 for each in side]
-    return [each._replace(returns=each.returns[:end]) for each, end in zip(side, ends, strict=True)]

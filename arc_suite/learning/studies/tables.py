@@ -117,12 +117,14 @@ _SIX = ("sac", "sacfd", "speq", "speq_o2o", "sope_eo", "sope")
 _PRIOR = ("sacfd", "speq_o2o", "sope")
 
 
-def _has_phases(algorithm: str) -> bool:
-    return algorithms.ALGORITHMS[algorithm].hyperparameters.phase_updates > 0
-
-
 def six(
-    robots: Iterable[str], steps: int, seeds: int, prior: Prior, phases: Mapping[str, Any] | None = None, **fields
+    robots: Iterable[str],
+    steps: int,
+    seeds: int,
+    prior: Prior,
+    phases: Mapping[str, Any] | None = None,
+    names=_SIX,
+    **fields,
 ) -> tuple[Run, ...]:
     """Return runs of the paper's six algorithms, those of one seed before those of the next.
 
@@ -132,20 +134,14 @@ def six(
         seeds: number of seeds.
         prior: data of the algorithms that take any.
         phases: hyperparameters of the algorithms that have stabilisation phases.
+        names: of the algorithms, for fewer than six.
         **fields: others of `run`.
     """
-    return tuple(
-        run(
-            robot,
-            name,
-            steps,
-            seed,
-            prior=prior if name in _PRIOR else None,
-            hyperparameters=phases if _has_phases(name) else None,
-            **fields,
-        )
-        for seed, robot, name in itertools.product(range(seeds), robots, _SIX)
-    )
+    own = {name: {"prior": prior if name in _PRIOR else None} for name in names}
+    for name in names:
+        own[name]["hyperparameters"] = phases if algorithms.ALGORITHMS[name].hyperparameters.phase_updates else None
+    each = itertools.product(range(seeds), robots, names)
+    return tuple(run(robot, name, steps, seed, **own[name], **fields) for seed, robot, name in each)
 
 
 # A tenth of the published phases, of the interval of their checks, and of the patience.
@@ -161,6 +157,16 @@ _PARTS = {
     "sac_parallel-one-step": {"n_step": 1},
 }
 
+# `sac_parallel` with prior data, or with phases.
+_ADDED = (
+    ("sac_parallel", {}, None),
+    ("sac_parallel-medium", {"prior": "symmetric_sampling"}, Prior("medium", 100)),
+    ("sac_parallel-refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
+    ("sac_parallel-phases", _SHORT, None),
+)
+_FEEDBACK = ("steer", "rough", "slopes", "stairs", "navigate")  # tasks in which it pays
+_ROBOTS = ("tick", "leaper", "queen", "bastion")
+
 # The paper's own study is `paper`: 3,000 hours of a core. The others fit fewer hours.
 STUDIES = {
     "paper": Study("the paper's six algorithms as published", six(ROBOTS, 1_000_000, 5, Prior())),
@@ -172,10 +178,7 @@ STUDIES = {
             sorted(
                 (
                     *six(("tick", "leaper"), 100_000, 2, Prior(), _SHORT),
-                    *(
-                        run(robot, name, 100_000, prior=Prior() if name in _PRIOR else None)
-                        for robot, name in itertools.product(("queen", "bastion"), ("sac", "sacfd"))
-                    ),
+                    *six(("queen", "bastion"), 100_000, 1, Prior(), names=("sac", "sacfd")),
                 ),
                 key=lambda each: each.configuration.seed,
             )
@@ -191,18 +194,14 @@ STUDIES = {
         "prior data of the demonstrators with refined numbers in place of medium, short phases: 7,500 updates",
         tuple(
             each._replace(label=f"{each.kind}-refined")
-            for each in six(("tick",), 100_000, 1, Prior("refined"), _SHORT)
-            if each.prior is not None
+            for each in six(("tick",), 100_000, 1, Prior("refined"), _SHORT, _PRIOR)
         ),
     ),
     # Half a minute of a core a run, two on `gaps`.
     "imitation": Study(
         "imitation of the demonstrators by DAgger in tasks in which feedback pays",
         (
-            *(
-                run("tick", "dagger", 38_400, task=task, evaluate_every=38_400)
-                for task in ("steer", "rough", "slopes", "stairs", "navigate")
-            ),
+            *(run("tick", "dagger", 38_400, task=task, evaluate_every=38_400) for task in _FEEDBACK),
             # A foot misses a trench in a few steps of an episode alone: that takes more episodes.
             run("tick", "dagger", 153_600, task="gaps", evaluate_every=76_800),
             run("queen", "dagger", 38_400, task="steer", evaluate_every=38_400),
@@ -222,9 +221,7 @@ STUDIES = {
         "SAC from nothing in parallel environments, 100,000 steps, with returns of three steps and of one",
         tuple(
             run(robot, "sac_parallel", 100_000, seed, hyperparameters=_PARTS[kind], label=kind)
-            for kind, seed, robot in itertools.product(
-                ("sac_parallel", "sac_parallel-one-step"), range(3), ("tick", "leaper", "queen", "bastion")
-            )
+            for kind, seed, robot in itertools.product(("sac_parallel", "sac_parallel-one-step"), range(3), _ROBOTS)
         ),
     ),
     # What each part of it gives.
@@ -240,15 +237,7 @@ STUDIES = {
         "SAC in parallel environments with prior data of 100 episodes, or short phases, 60,000 steps",
         tuple(
             run(robot, "sac_parallel", 60_000, hyperparameters=changes, prior=prior, label=label)
-            for robot, (label, changes, prior) in itertools.product(
-                ("tick", "leaper"),
-                (
-                    ("sac_parallel", {}, None),
-                    ("sac_parallel-medium", {"prior": "symmetric_sampling"}, Prior("medium", 100)),
-                    ("sac_parallel-refined", {"prior": "symmetric_sampling"}, Prior("refined", 100)),
-                    ("sac_parallel-phases", _SHORT, None),
-                ),
-            )
+            for robot, (label, changes, prior) in itertools.product(("tick", "leaper"), _ADDED)
         ),
     ),
     "beyond": Study(

@@ -16,7 +16,7 @@ from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.tuning.evaluator import STYLE, Evaluator, PresetScore
-from arc_suite.learning.tuning.space import SPACES
+from arc_suite.learning.tuning.space import SPACES, rounded
 
 SPREAD = 0.5  # of the first generation, in scales of the parameters
 HARD = 8  # starts that candidates are tried in
@@ -55,15 +55,7 @@ class Search:
         candidates: how many a generation has.
     """
 
-    def __init__(
-        self,
-        setup: Setup,
-        seed: int,
-        episodes: int,
-        steps: int,
-        starts: int,
-        space: str = "law",
-    ):
+    def __init__(self, setup: Setup, seed: int, episodes: int, steps: int, starts: int, space: str = "law"):
         """Evaluate `medium` and the possible starting points; the search starts from the best.
 
         Args:
@@ -123,7 +115,7 @@ class Search:
 
     def result(self) -> Preset:
         """Return what the search believes to be best: the mean of its distribution, rounded."""
-        return self._space.preset(self._space.rounded(self._vector(self._strategy.mean)))
+        return self._space.preset(rounded(self._vector(self._strategy.mean), self._space.ranges()))
 
     def _vector(self, solution) -> np.ndarray:
         return self._origin + self._scale * solution

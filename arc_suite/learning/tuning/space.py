@@ -85,10 +85,6 @@ class Space(NamedTuple):
         """Return possible starting points (size,): the preset with leads over its clock."""
         return [self.vector(lead / LEADS) for lead in range(LEADS)]
 
-    def rounded(self, vector: np.ndarray) -> np.ndarray:
-        """Return a vector (size,) to the decimals that matter."""
-        return _rounded(vector, self.ranges())
-
     def vector(self, lead: float = 0.0) -> np.ndarray:
         """Return the vector (size,) of the preset itself with a lead of all legs, cycles."""
         preset = self.origin
@@ -152,10 +148,6 @@ class Torques(NamedTuple):
         """Return the vector (size,) at which a search starts: no torques except for steering."""
         return [np.array([*[0.0] * math.prod(self._shape), _STEERED])]
 
-    def rounded(self, vector: np.ndarray) -> np.ndarray:
-        """Return a vector (size,) to the decimals that matter."""
-        return _rounded(vector, self.ranges())
-
     def preset(self, vector: np.ndarray) -> Preset:
         """Return the preset of a vector (size,), within its ranges."""
         _, low, high, _ = np.transpose(self.ranges())
@@ -165,7 +157,8 @@ class Torques(NamedTuple):
         return self.origin._replace(torques=torques, steering=float(steering))
 
 
-def _rounded(vector: np.ndarray, ranges: Iterable[Range]) -> np.ndarray:
+def rounded(vector: np.ndarray, ranges: Iterable[Range]) -> np.ndarray:
+    """Return a vector (size,) to the decimals that matter."""
     return np.array([round(value, number.decimals) for value, number in zip(vector, ranges, strict=True)])
 
 

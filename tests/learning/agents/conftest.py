@@ -52,7 +52,7 @@ def learning(algorithm, hyperparameters, folder, setup, steps=10_000, evaluate_e
     """Begin to learn; slices end after every step unless told otherwise."""
     definition = algorithms.algorithm(algorithm).with_hyperparameters(hyperparameters)
     fields = {"seed": 0, "steps": steps, "evaluate_every": evaluate_every, "folder": folder} | context
-    return Learning(definition.module.learn(definition.hyperparameters, RunContext(setup, **fields)))
+    return Learning(definition.learn(definition.hyperparameters, RunContext(setup, **fields)))
 
 
 @pytest.fixture(autouse=True)

@@ -3,11 +3,12 @@
 import dataclasses
 
 import interpreters
+import programs
 import pytest
 
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
-from arc_suite.learning.agents.algorithms import ALGORITHMS, Algorithm, algorithm
+from arc_suite.learning.agents.algorithms import ALGORITHMS, algorithm
 from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 
@@ -100,11 +101,10 @@ def test_unknown_algorithms(name, line):
         algorithm(name)
 
 
-def test_what_a_learner_needs_is_named():
-    with pytest.raises(ValueError, match=r"^training needs JAX: pip install -e '.*\[learn\]' \(No module named"):
-        _ = Algorithm("arc_suite.learning.agents.nowhere", SoftActorCritic(), "").module
-    with pytest.raises(ValueError, match=r"^learner others: No module named 'others'$"):
-        _ = Algorithm("others", SoftActorCritic(), "").module
+def test_without_jax_is_one_line(tmp_path):
+    done = programs.without("jax", tmp_path, "train", "--robot=tick", f"--output={tmp_path / 'run'}")
+    programs.refused(done, f"arc-suite train: training needs JAX: {programs.install('learn')} (")
+    assert not (tmp_path / "run").exists()
 
 
 def test_the_policy_acts_before_the_buffer_is_full():

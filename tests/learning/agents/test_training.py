@@ -15,11 +15,12 @@ from arc_suite import evaluation, policies
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms, configuration, off_policy, priors, run_folder
 from arc_suite.learning.agents.configuration import Configuration
+from arc_suite.learning.agents.hyperparameters import SoftActorCritic
 from arc_suite.learning.agents.learner import Diverged
 from arc_suite.learning.agents.run_folder import RunFolder
 from arc_suite.learning.agents.training import train
 
-NAMES = [name for name, each in algorithms.ALGORITHMS.items() if each.learner == "arc_suite.learning.agents.off_policy"]
+NAMES = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each.hyperparameters, SoftActorCritic)]
 STEPS, EVERY = 250, 100
 
 
@@ -121,6 +122,15 @@ def test_the_record_of_a_run(tiny, tmp_path):
     assert {"arc_suite", "mujoco", "numpy", "jax", "jaxlib", "optax"} <= config["versions"].keys()
     assert len(config["model_sha256"]) == len(config["body_sha256"]) == 64
     assert configuration.read(tmp_path / "run" / "config.json") == tiny("sac")
+
+
+def test_a_run_whose_record_names_its_learner_goes_on(tiny, tmp_path):
+    """As records of earlier versions do, by module paths that are gone."""
+    run, path = tiny("sac", steps=30), tmp_path / "run" / "config.json"
+    assert not train(run, tmp_path / "run", minutes=0.0, progress=silent)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"learner": "arc_suite.agents.off_policy"}))
+    assert configuration.read(path) == run
+    assert train(run, tmp_path / "run", progress=silent)
 
 
 def test_other_prior_data_under_the_same_id_are_another_run(tiny, tmp_path, prior, monkeypatch):
