@@ -12,19 +12,12 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import ROBOTS, generator
 
-# Forward, left and turning, in the body's own units.
-COMMANDS = np.array(
+# In the body's own units.
+COMMANDS = np.transpose(
     [
-        (1.0, 0.0, 0.0),
-        (0.4, 0.0, 0.0),
-        (-0.7, 0.0, 0.0),
-        (0.0, 0.5, 0.0),
-        (0.0, -0.5, 0.0),
-        (0.0, 0.0, 1.0),
-        (0.0, 0.0, -1.0),
-        (0.7, 0.0, 0.5),
-        (0.6, 0.4, 0.0),
-        (0.0, 0.0, 0.0),
+        (1.0, 0.4, -0.7, 0.0, 0.0, 0.0, 0.0, 0.7, 0.6, 0.0),  # forward
+        (0.0, 0.0, 0.0, 0.5, -0.5, 0.0, 0.0, 0.0, 0.4, 0.0),  # left
+        (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0, 0.5, 0.0, 0.0),  # turning
     ]
 )
 
@@ -41,7 +34,6 @@ def obeyed(body, preset="steered", steps=300):
         fell |= terminated
         if step >= 100:
             motions.append(envs.task.split(observations)["command"][:, 3:])
-    envs.close()
     return np.mean(motions, axis=0), fell
 
 
