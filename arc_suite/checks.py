@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-_LARGEST_SEED = 2**32 - 1  # that a RandomState takes
+LARGEST_SEED = 2**32 - 1  # that a RandomState takes
 _SMALL = 1e-6  # least number that errors name as a bound; a smaller one keeps out 0
 _LONGEST_QUOTE = 300  # characters
 
@@ -61,7 +61,7 @@ def seed(value) -> int:
     Raises:
         ValueError: it is not an integer from 0 to 2**32 - 1.
     """
-    return integer("seed", value, 0, _LARGEST_SEED)
+    return integer("seed", value, 0, LARGEST_SEED)
 
 
 def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
@@ -154,15 +154,23 @@ def _numbers(low: float, high: float) -> str:
     return f"finite number of at least {low:g}" if high == math.inf else f"number from {low:g} to {high:g}"
 
 
-def array(what: str, value: Any, size: int) -> np.ndarray:
+def array(what: str, value: Any, size: int, low: float = -math.inf, high: float = math.inf) -> np.ndarray:
     """Return the value as (size,) floats; a single number stands for all of them.
 
+    Args:
+        what: name of the value, with which an error begins.
+        value: a number, or a list or array of them.
+        size: how many.
+        low: least that they may be.
+        high: most that they may be.
+
     Raises:
-        ValueError: it is neither one finite number nor so many of them.
+        ValueError: it is neither one finite number nor so many of them, or out of range.
     """
     numbers = np.asarray(value)
-    if numbers.dtype.kind not in "if" or numbers.shape not in ((), (size,)) or not np.isfinite(numbers).all():
-        raise ValueError(f"{what}: expected one finite number or {size} of them, got {value!r}")
+    fits = numbers.dtype.kind in "if" and numbers.shape in ((), (size,)) and np.isfinite(numbers).all()
+    if not (fits and ((low <= numbers) & (numbers <= high)).all()):
+        raise ValueError(f"{what}: expected one {_numbers(low, high)} or {size} of them, got {value!r}")
     return np.broadcast_to(numbers, size).astype(float)
 
 

@@ -8,6 +8,8 @@ from gymnasium.error import ClosedEnvironmentError
 
 from arc_suite import checks
 
+MOST_ENVS = 1 << 20
+
 # Attributes that have a value for each environment.
 _OF_EACH = ("np_random", "np_random_seed", "render", "positions", "resampled")
 _OF_ONE = {"observation_space": "single_observation_space", "action_space": "single_action_space"}
@@ -68,8 +70,8 @@ class Together(gymnasium.vector.VectorEnv):
             if len(seed) != self.num_envs:
                 raise ValueError(f"seed: expected one for each of {self.num_envs} environments, got {len(seed)}")
             return [None if each is None else checks.seed(each) for each in seed]
-        first = checks.seed(seed)
-        return [checks.seed(first + index) for index in range(self.num_envs)]
+        first = checks.integer("seed", checks.seed(seed), 0, checks.LARGEST_SEED - self.num_envs + 1)
+        return [first + index for index in range(self.num_envs)]
 
     def _reset_mask(self, options) -> np.ndarray:
         """The checked mask of `reset`'s options."""

@@ -23,7 +23,7 @@ from arc_suite.envs.calls import (
 )
 from arc_suite.envs.prepare import checked_changes, checked_limit, prepared
 from arc_suite.envs.task_view import TaskView
-from arc_suite.envs.together import Together
+from arc_suite.envs.together import MOST_ENVS, Together
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
@@ -33,7 +33,7 @@ from arc_suite.simulation.model import checked_fields
 from arc_suite.tasks import Task, terms
 from arc_suite.tasks.contract import CURRICULUM
 
-_MOST_ENVS, _MOST_THREADS = 1 << 20, 1 << 10
+_MOST_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
 
 
@@ -134,7 +134,7 @@ class VectorEnv(KnownAttributes, Together):
         self.autoreset_mode = AutoresetMode(checks.name(mode, modes, "autoreset_mode"))
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
-        self.num_envs = checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
+        self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         pictures.check_size(height, width)
         threads = min(usable_cores(), _MOST_THREADS) if num_threads is None else num_threads
         threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)

@@ -162,7 +162,7 @@ class CommandTask(Task):
         elsewhere = () if cls.own_arena else ("arena",)
         given = parameters.values(body, overrides, cls.name, cls.names(), elsewhere)
         return CommandTaskSettings(
-            parameters.parameters(body, given),
+            parameters.parameters(body, given, backward=False),
             parameters.weights(cls.weights, given["weights"], overrides.get("weights")),
             parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
             parameters.noise(given),

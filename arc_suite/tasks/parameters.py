@@ -141,13 +141,23 @@ class Noise(NamedTuple):
 # Settings that every task with a gait has.
 NAMES = (*Parameters._fields, *SHARED_NOISE, *Noise._fields, "weights", "gait")
 
+LEAST_SPEED = 0.001  # m/s; paths and speeds are divided by the target velocity
+
 BOUNDS = {
-    "target_velocity": (-LARGEST, LARGEST),
-    "gait_frequency": (0.0, LARGEST),
+    "target_velocity": (-1000.0, 1000.0),
+    "gait_frequency": (0.001, 1000.0),
     "duty_factor": (0.0, 1.0),
+    "phase_offsets": (-TWO_PI, TWO_PI),
     "stance_threshold": (-LARGEST, LARGEST),
-    **dict.fromkeys(Noise._fields, (0.0, LARGEST)),
+    "default_angles": (-TWO_PI, TWO_PI),
+    "position_noise": (0.0, 1000.0),
+    "orientation_noise": (0.0, 10.0),
+    "linear_velocity_noise": (0.0, 1000.0),
+    "angular_velocity_noise": (0.0, 1000.0),
+    "joint_angle_noise": (0.0, TWO_PI),
+    "joint_velocity_noise": (0.0, 1000.0),
 }
+BOUNDS |= {shared: (0.0, min(BOUNDS[name][1] for name in names)) for shared, names in SHARED_NOISE.items()}
 
 
 def values(body: Body, overrides: Mapping[str, Any], task: str, names: Iterable[str], elsewhere=()) -> dict[str, Any]:
@@ -182,22 +192,31 @@ def _spread(given: Mapping[str, Any]) -> dict[str, Any]:
     spread = dict(given)
     for shared, names in SHARED_NOISE.items():
         if shared in spread:
-            number = checks.number(shared, spread.pop(shared), 0.0, LARGEST)
+            number = checks.number(shared, spread.pop(shared), *BOUNDS[shared])
             spread = dict.fromkeys(names, number) | spread
     return spread
 
 
-def parameters(body: Body, given: Mapping[str, Any]) -> Parameters:
+def parameters(body: Body, given: Mapping[str, Any], backward: bool = True) -> Parameters:
     """Return checked parameters from the values of all settings by name.
+
+    Args:
+        body: that has them.
+        given: values by name.
+        backward: whether the target velocity may be negative.
 
     Raises:
         ValueError: a value that does not fit the body or its bounds.
     """
-    return Parameters(
-        **{name: checks.number(name, given[name], *BOUNDS[name]) for name in Parameters._fields if name in BOUNDS},
-        phase_offsets=checks.array("phase_offsets", given["phase_offsets"], len(body.legs)),
-        default_angles=checks.array("default_angles", given["default_angles"], len(body.joint_names)),
-    )
+    sizes = {"phase_offsets": len(body.legs), "default_angles": len(body.joint_names)}
+    arrays = {name: checks.array(name, given[name], size, *BOUNDS[name]) for name, size in sizes.items()}
+    low, high = BOUNDS["target_velocity"]
+    speed = checks.number("target_velocity", given["target_velocity"], low if backward else LEAST_SPEED, high)
+    if abs(speed) < LEAST_SPEED:
+        raise ValueError(f"target_velocity: expected at least {LEAST_SPEED:g} m/s in either direction, got {speed!r}")
+    names = [name for name in Parameters._fields if name not in (*sizes, "target_velocity")]
+    numbers = {name: checks.number(name, given[name], *BOUNDS[name]) for name in names}
+    return Parameters(target_velocity=speed, **numbers, **arrays)
 
 
 def noise(given: Mapping[str, Any]) -> Noise:

@@ -323,3 +323,17 @@ def test_bodies_of_other_formats(tmp_path):
         arc_suite.load(str(tmp_path / "q.xml"), "walk")
     message = "expected a body in JSON, got XML: MJCF and URDF cannot be read; see docs/bodies.md"
     assert str(caught.value) == f"{tmp_path / 'q.xml'}: {message}"
+
+
+def test_seeds_that_go_on_beyond_the_last_one():
+    for vector in (VectorEnv("tick", "walk", 3), BodiesEnv("walk", 3)):
+        with pytest.raises(ValueError) as caught:
+            vector.reset(seed=2**32 - 2)
+        assert str(caught.value) == "seed: expected an integer from 0 to 4294967293, got 4294967294"
+        vector.reset(seed=2**32 - 3)
+
+
+def test_too_many_environments_of_different_bodies():
+    with pytest.raises(ValueError) as caught:
+        BodiesEnv("walk", 10**9, "varied:0-1")
+    assert str(caught.value) == "num_envs: expected an integer from 1 to 1048576, got 1000000000"

@@ -406,7 +406,7 @@ def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
     ("seed", "message"),
     [
         ([1, 2], "seed: expected one for each of 3 environments, got 2"),
-        (2**32 - 2, f"seed: expected an integer from 0 to 4294967295, got {2**32}"),
+        (2**32 - 2, f"seed: expected an integer from 0 to 4294967293, got {2**32 - 2}"),
         ("one", "seed: expected an integer from 0 to 4294967295, got 'one'"),
         ([1, 2, 2.5], "seed: expected an integer from 0 to 4294967295, got 2.5"),
     ],

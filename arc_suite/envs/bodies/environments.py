@@ -14,7 +14,7 @@ from arc_suite import checks, registry
 from arc_suite.envs.bodies.groups import Group, Member, Place, grouped, scatter
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
-from arc_suite.envs.together import Together
+from arc_suite.envs.together import MOST_ENVS, Together
 from arc_suite.tasks import tokens
 from arc_suite.tasks.contract import CURRICULUM
 from arc_suite.tasks.tokens import Description, Tokens
@@ -114,7 +114,7 @@ class BodiesEnv(KnownAttributes, Together):
         self._lock, self._places, self._begun = Lock(), [], False
         given = bodies if isinstance(bodies, list | tuple) else [bodies]
         found = list(itertools.chain.from_iterable(map(registry.bodies_of, given)))
-        num_envs = checks.integer("num_envs", num_envs, 1)
+        num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         if not found:
             raise ValueError(f"bodies: expected at least one, got {bodies!r}")
         if len(found) > num_envs:
