@@ -108,5 +108,9 @@ def test_a_folder_is_required():
 
 def test_a_search_that_finds_nothing_says_why(tmp_path):
     done = design("--bodies=20", "--power=0.001", "--processes=1", f"--output={tmp_path}")
-    programs.refused(done, "arc-suite design: none of 20 bodies counts; most often: ")
+    assert (
+        done.returncode == 1
+        and done.stderr.startswith("arc-suite design: none of 20 bodies counts; most often: ")
+        and done.stderr.count("\n") == 1
+    )
     assert (tmp_path / "bodies.csv").read_text().count("\n") == 21
