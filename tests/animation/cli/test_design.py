@@ -108,9 +108,6 @@ def test_a_folder_is_required():
 
 def test_a_search_that_finds_nothing_says_why(tmp_path):
     done = design("--bodies=20", "--power=0.001", "--processes=1", f"--output={tmp_path}")
-    assert (
-        done.returncode == 1
-        and done.stderr.startswith("arc-suite design: none of 20 bodies counts; most often: ")
-        and done.stderr.count("\n") == 1
-    )
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert done.stderr.startswith("arc-suite design: none of 20 bodies counts; most often: ")
     assert (tmp_path / "bodies.csv").read_text().count("\n") == 21
