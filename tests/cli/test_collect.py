@@ -54,12 +54,6 @@ def test_a_mixture_with_noise_on_a_body_made_to_order():
     ("arguments", "message"),
     [
         (["--robot=all", "--id=some-v0"], f"--id=some-v0: names one dataset, and --robot=all makes {len(ROBOTS)}"),
-        (
-            ["--id=arc_suite/queen/mine"],
-            "dataset id 'arc_suite/queen/mine': expected names of letters, digits, '-' and '_' with '/' between, two "
-            "characters at least before the last '/', and a version at the end alone, such as "
-            "'arc_suite/queen/mine-v0'",
-        ),
         (["--episodes=4294967296"], "flag --episodes=4294967296: expected an integer in the range [1, 100000]"),
         (
             ["--id="],

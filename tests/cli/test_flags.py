@@ -19,17 +19,6 @@ SPIDER, WORDS = EXAMPLES["spider"], ", ".join(registry.words())
 NO_PALETTE = f"Body(walker_4x3).palette: expected one of {', '.join(PALETTES)}, or a seed of 0 or more, got 'mos'"
 
 
-@pytest.mark.slow
-def test_evaluate_takes_a_spec_and_a_body_made_to_order():
-    done = programs.arc_suite("evaluate", "--spec=spider", "--episodes=1")
-    fields = done.stdout.splitlines()[-1].split()
-    assert fields[:2] == ["spider,", "medium"]
-    assert float(fields[5]) > 2500.0
-    assert fields[-1] == "1000.0"  # and nothing of the paper, which knows nothing of it
-    done = programs.arc_suite("evaluate", "--legs=4", "--links=2", "--policy=zero", "--episodes=1")
-    assert done.stdout.splitlines()[-1].split()[0] == "walker_4x2"
-
-
 @pytest.mark.parametrize("program", ["evaluate", "render", "style", "collect"])
 @pytest.mark.parametrize(
     ("arguments", "message"),

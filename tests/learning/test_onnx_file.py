@@ -21,18 +21,19 @@ pytest.importorskip("onnx", reason="of the extra learn: make check-agents")
 runtime = pytest.importorskip("onnxruntime", reason="runs policies in a test: make check-agents")
 
 
-def session(path):
+def exported(policy, folder):
+    """Write a policy as policy.onnx, and return what runs it."""
+    onnx_file.save(folder / "policy.onnx", policy)
     options = runtime.SessionOptions()
     options.intra_op_num_threads = 1
-    return runtime.InferenceSession(path, options, providers=["CPUExecutionProvider"])
+    return runtime.InferenceSession(folder / "policy.onnx", options, providers=["CPUExecutionProvider"])
 
 
 @pytest.mark.parametrize(("robot", "task"), [("queen", "walk"), ("tick", "steer")])
 def test_equal_over_an_episode(robot, task, tmp_path):
     policy = made(robot, task, hidden=256)
-    onnx_file.save(tmp_path / "policy.onnx", policy)
+    run, act, greatest, steps = exported(policy, tmp_path), alone(policy), 0.0, 0
     assert (tmp_path / "policy.onnx").stat().st_size <= 600_000
-    run, act, greatest, steps = session(tmp_path / "policy.onnx"), alone(policy), 0.0, 0
     walk = alone(policies.policy("cpg", robot))  # who knows nothing yet would fall at once
     environment = arc_suite.load(robot, task)
     timestep = environment.reset(0)
@@ -47,8 +48,7 @@ def test_equal_over_an_episode(robot, task, tmp_path):
 
 def test_any_number_of_environments(tmp_path):
     policy = made()
-    onnx_file.save(tmp_path / "policy.onnx", policy)
-    run = session(tmp_path / "policy.onnx")
+    run = exported(policy, tmp_path)
     for num_envs in (1, 5, 64):
         observations = np.random.default_rng(num_envs).normal(size=(num_envs, policy.size)).astype(np.float32)
         (actions,) = run.run(None, {"observations": observations})
@@ -56,9 +56,7 @@ def test_any_number_of_environments(tmp_path):
 
 
 def test_metadata_tell_what_a_game_needs(tmp_path):
-    policy = made("leaper")
-    onnx_file.save(tmp_path / "policy.onnx", policy)
-    texts = session(tmp_path / "policy.onnx").get_modelmeta().custom_metadata_map
+    texts = exported(made("leaper"), tmp_path).get_modelmeta().custom_metadata_map
     assert (texts["robot"], texts["task"]) == ("leaper", "walk")
     environment = arc_suite.load("leaper", "walk")
     timestep = environment.reset(0)
@@ -91,8 +89,7 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
     """In an episode that the policy itself plays."""
     setup = Setup.of(body, task, settings | {"time_limit": 1.0})
     network = legs.network()
-    onnx_file.save(tmp_path / "policy.onnx", universal.for_body(network, setup))
-    run, environment, greatest = session(tmp_path / "policy.onnx"), setup.load(), 0.0
+    run, environment, greatest = exported(universal.for_body(network, setup), tmp_path), setup.load(), 0.0
     policy = Universal(network, environment.task.definition)
     timestep = environment.reset(0)
     while not timestep.last():

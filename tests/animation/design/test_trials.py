@@ -48,10 +48,7 @@ def test_a_body_walks_and_challenges_an_elite():
     speed = challenger.first.speed
     assert math.isclose(challenger.first.power, 9.81 * speed * challenger.first.cost_of_transport, rel_tol=0.05)
     assert str(evaluate(trial, body, 0.0)) == str(challenger._replace(second=None))  # NaN is not equal to itself
-
-
-def test_no_body_and_unsound_bodies_are_not_let_walk():
-    trial, body = Trial.of("walk", {}, "transport", BUDGET, 100), generate(6, 3)
+    # No body and unsound bodies are not let walk.
     assert evaluate(trial, "no body: too large", 0.0) == ("no body: too large", None, None)
     high = body.replace(torso=body.torso.replace(standing_height=0.7))
     assert evaluate(trial, high, 0.0).reason.startswith("unsound: feet hang")

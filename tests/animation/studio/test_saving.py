@@ -73,15 +73,6 @@ def test_a_page_to_play_in_has_the_body_and_its_law(creature, monkeypatch):
     assert walker["name"] == "tick_shaped" and walker["policy"]["kind"] == "law"
 
 
-def test_without_a_viewer_there_is_no_page(creature, monkeypatch):
-    def viewer():
-        raise ValueError("no viewer for pages: `make web` builds it, which needs Node")
-
-    monkeypatch.setattr(saving.pages, "viewer", viewer)
-    with pytest.raises(ValueError, match="make web"):
-        content(creature, "Page")
-
-
 @pytest.mark.slow
 def test_a_film(creature, monkeypatch):
     monkeypatch.setattr(saving, "_FILM_STEPS", 6)

@@ -51,14 +51,9 @@ def test_settings_of_the_task():
     own = sketches.setup(dataclasses.replace(SKETCHES["shaped"], speed=1.0)).definition.parameters.target_velocity
     (speed,) = sketches.setup(SKETCHES["shaped"]).task_kwargs.values()
     assert speed == pytest.approx(0.8 * own, rel=1e-3)
-
-
-def test_a_task_with_a_ground_of_its_own_ignores_the_ground():
+    # A task with a ground of its own ignores the ground; settings of the field come before those of sliders.
     sketch = dataclasses.replace(SKETCHES["example"], ground="bumps")
     assert sketches.setup(sketch).task_kwargs == {"difficulty": 0.5}
-
-
-def test_settings_of_the_field_come_before_those_of_sliders():
     sketch = Sketch(kicks=0.5, settings='{"kicks": 1.0, "friction": 0.5}')
     assert sketches.setup(sketch).task_kwargs == {"kicks": 1.0, "friction": 0.5}
 

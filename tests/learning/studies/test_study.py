@@ -23,7 +23,6 @@ from refusals import refused
 from arc_suite import data, evaluation, policies, registry, style
 from arc_suite.envs.dm import load
 from arc_suite.learning.agents import configuration, run_folder
-from arc_suite.learning.agents.configuration import Configuration
 from arc_suite.learning.agents.training import train
 from arc_suite.learning.studies import csv_files, publication, results, runner, tables
 from arc_suite.learning.studies.publication import METRICS
@@ -273,18 +272,6 @@ def test_a_study_is_found_in_the_current_folder(tmp_path):
     (tmp_path / "my_studies.py").write_text(code)
     done = programs.arc_suite("study", "my_studies:MINE", "--shard=6/7", cwd=tmp_path)
     programs.refused(done, "arc-suite study: --shard=6/7: no run, as the study has 6\n")
-
-
-@pytest.mark.parametrize("name", tables.STUDIES)
-def test_runs_go_through_files(name):
-    """The configuration of a run is the one that `arc-suite train` reads."""
-    study = tables.study(name)
-    assert study.title
-    for each in study.runs[:12]:
-        text = json.dumps(each.configuration.to_dict())
-        assert Configuration.from_dict(json.loads(text)) == each.configuration
-        takes_prior = getattr(each.configuration.hyperparameters, "prior", "none") != "none"
-        assert (each.configuration.prior is not None) == takes_prior
 
 
 def test_a_study_is_submitted_in_shares(tmp_path, monkeypatch):

@@ -10,14 +10,20 @@ from arc_suite.learning.tuning import Evaluator, Search
 SETTINGS = {"setup": Setup.of("bastion"), "seed": 3, "episodes": 2, "steps": 12, "starts": 8}
 
 
+def resumed(settings, count):
+    """Search, and go on with the last generation in another search; return the search and its generations."""
+    straight, other = Search(**settings), Search(**settings)
+    generations = [straight.step() for _ in range(count)]
+    for generation in generations[:-1]:
+        assert other.step(generation.fitness) is None
+    assert other.step() == generations[-1]
+    assert other.result() == straight.result()
+    return straight, generations
+
+
 @pytest.mark.release
 def test_a_search_goes_on_where_it_was_broken_off():
-    straight, resumed = Search(**SETTINGS), Search(**SETTINGS)
-    generations = [straight.step() for _ in range(4)]
-    for generation in generations[:3]:
-        assert resumed.step(generation.fitness) is None
-    assert resumed.step() == generations[3]
-    assert resumed.result() == straight.result()
+    straight, generations = resumed(SETTINGS, 4)
     assert len(generations[0].fitness) == straight.candidates
     assert generations[0] != generations[1]
 
@@ -25,12 +31,7 @@ def test_a_search_goes_on_where_it_was_broken_off():
 @pytest.mark.long
 def test_a_search_for_torques_goes_on_where_it_was_broken_off_and_sets_out_from_tuned():
     settings = SETTINGS | {"setup": Setup.of("leaper"), "space": "torques", "episodes": 1, "steps": 40, "starts": 0}
-    straight, resumed = Search(**settings), Search(**settings)
-    generations = [straight.step() for _ in range(3)]
-    for generation in generations[:2]:
-        assert resumed.step(generation.fitness) is None
-    assert resumed.step() == generations[2]
-    assert resumed.result() == straight.result()
+    straight, generations = resumed(settings, 3)
     assert [generation.tipping for generation in generations] == [0.0] * 3
     tuned = PRESETS["leaper"]["tuned"]
     assert straight.result()._replace(torques=None, steering=0.0) == tuned

@@ -32,12 +32,18 @@ def test_a_lead_moves_the_clock_of_all_legs():
 
 
 def test_every_number_of_a_vector_counts_and_stays_within_bounds():
-    space = Space(ROBOTS["tick"], PRESETS["tick"]["medium"])
-    vector, (scale, low, high, _) = space.vector(0.1), np.transpose(space.ranges())
-    presets = [space.preset(vector - step) for step in np.diag(0.5 * scale)]
-    assert len({str(preset) for preset in presets}) == vector.size
-    assert space.preset(np.full(vector.size, 1e9)) == space.preset(high)
-    assert space.preset(np.full(vector.size, -1e9)) == space.preset(low)
+    space, torques = (
+        Space(ROBOTS["tick"], PRESETS["tick"]["medium"]),
+        Torques(ROBOTS["leaper"], PRESETS["leaper"]["tuned"]),
+    )
+    (origin,) = torques.origins()
+    for each, vector, sign in ((space, space.vector(0.1), -1.0), (torques, origin, 1.0)):
+        scale, low, high, _ = np.transpose(each.ranges())
+        presets = [each.preset(vector + sign * step) for step in np.diag(0.5 * scale)]
+        assert len({str(preset) for preset in presets}) == vector.size
+        assert each.preset(np.full(vector.size, 1e9)) == each.preset(high)
+        assert each.preset(np.full(vector.size, -1e9)) == each.preset(low)
+    assert rounded(np.full(origin.size, 0.12345), torques.ranges()).tolist() == [0.123] * origin.size
 
 
 @pytest.mark.parametrize("robot", PRESETS)
@@ -55,13 +61,3 @@ def test_torques_are_searched_about_tuned_and_refined_is_such(robot):
             assert getattr(begun, name) == getattr(refined, name) == getattr(PRESETS[robot]["tuned"], name)
     found = [value for rows in refined.torques.values() for row in rows for value in row]
     assert space.preset(np.array([*found, refined.steering])) == refined
-
-
-def test_every_torque_counts_and_stays_within_bounds():
-    space = Torques(ROBOTS["leaper"], PRESETS["leaper"]["tuned"])
-    (vector,), (scale, low, high, _) = space.origins(), np.transpose(space.ranges())
-    presets = [space.preset(vector + step) for step in np.diag(0.5 * scale)]
-    assert len({str(preset) for preset in presets}) == vector.size
-    assert space.preset(np.full(vector.size, 1e9)) == space.preset(high)
-    assert space.preset(np.full(vector.size, -1e9)) == space.preset(low)
-    assert rounded(np.full(vector.size, 0.12345), space.ranges()).tolist() == [0.123] * vector.size
