@@ -104,10 +104,8 @@ def _curves(groups: Groups, demonstrators):
     for place, kinds in groups.items():
         algorithms = {kind: seeds[0].run.configuration.algorithm for kind, seeds in kinds.items()}
         curves = {kind: plots.Curve(algorithms[kind], *results.curve(seeds)) for kind, seeds in kinds.items()}
-        setup, end = (
-            next(iter(kinds.values()))[0].run.configuration.setup,
-            max(each.steps[-1] for each in curves.values()),
-        )
+        setup = next(iter(kinds.values()))[0].run.configuration.setup
+        end = max(each.steps[-1] for each in curves.values())
         drawn[place], finals[place] = curves, evaluation.published_returns(setup, [*algorithms.values()], end)
     lines = {p: {_policy(n): v.mean() for n, v in every.items()} for p, every in demonstrators.items()}
     return plots.study(drawn, lines, finals)
