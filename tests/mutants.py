@@ -110,7 +110,7 @@ MUTANTS = {
     "fall reported as a time limit": "return «0.0→1.0» if terminated else",
     "a new stream carries on the old one": "self._random, self._stream_begins = value, «True→False»",
     "a new stream of an environment carries on the old one": "self._streams_begin[index] = seeds[index], «True→False»",
-    "environments share a seed": "checks.seed(first« + index→») for",
+    "environments share a seed": "[first« + index→» for index in range(self.num_envs)]",
     "observations of a batch handed out live": "self._observation = observation«.copy()→»",
     "a command for all environments": "memory = changed« if mask is None else trees.chosen(mask, changed, memory)→»",
     "commands of environments replace one another": "«value, mask = np.where(mask[:, None], value, before)→mask»",
@@ -131,7 +131,7 @@ MUTANTS = {
     "mirror image of a foot's path forgotten": "« * (1.0, -1.0, 1.0)→»",
     "motors win back what they brake": "np.diff(track.joint_angles, axis=0)).«clip(0.0).→»sum()",
     "a foot that bounces strides": "«0.5 * foot_clearance(track)→0.0»",
-    "order of tracks in a file": "index) for index in range(count)«→[::-1]»]",
+    "order of tracks in a file": "_track(setup, arrays, index) for index in range(count)«→[::-1]»]",
     "a replay that differs let through": "«np.array_equal(track.rewards, episode.rewards)→"
     "len(track.rewards) == episode.length»",
     # Searches and datasets.
@@ -149,7 +149,6 @@ MUTANTS = {
     # Studies and datasets of agents.
     "medium agents are the best": ">= «MEDIUM * →»best",
     "evaluations under way count": "if« count == evaluation.EPISODES and→» step in times",
-    "runs compared wherever they are": "«int(np.flatnonzero(each.steps == max(common))[0]) + 1→len(each.steps)»",
     "a run made by two studies": "fcntl.flock(file, fcntl.«LOCK_EX→LOCK_SH»",
     "shares of a study overlap": "study.runs[part:«:parts→»]",
 }

@@ -13,6 +13,9 @@ from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
 ALL = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, planned, balanced"
+GENERAL = "slow, medium, fast, steered, surefooted, reactive, sighted, planned"
+
+JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -68,16 +71,10 @@ def test_policies_that_are_no_demonstrators_give_the_actions_that_a_task_takes()
         (("cgp", "queen"), "unknown policy 'cgp'; did you mean 'cpg'? (there are: cpg, zero, random, ppo, universal)"),
         (("zero", "quen"), f"unknown robot 'quen'; did you mean 'queen'? (there are: {', '.join(registry.words())})"),
         (("cpg", "queen", "midium"), f"unknown preset 'midium'; did you mean 'medium'? (there are: {ALL})"),
-        (
-            ("cpg", generate(4, 2), "tuned"),
-            "unknown preset 'tuned' (there are: slow, medium, fast, steered, surefooted, reactive, sighted, planned)",
-        ),
+        (("cpg", generate(4, 2), "tuned"), f"unknown preset 'tuned' (there are: {GENERAL})"),
         (("cpg", "queen", ()), f"preset: expected one or more of {ALL}, got none"),
         (("zero", "queen", "medium", 1, -0.1), "noise: expected a finite number of at least 0, got -0.1"),
-        (
-            ("cpg", ROBOTS["bastion"].replace(name="queen")),
-            "presets: expected a body named 'queen' to have the 18 joints of queen, got 12; give it another name",
-        ),
+        (("cpg", ROBOTS["bastion"].replace(name="queen")), f"presets: {JOINTS}, got 12; give it another name"),
     ],
 )
 def test_unknown_names_are_named(arguments, message):

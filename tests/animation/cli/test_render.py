@@ -17,6 +17,9 @@ from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
 
+CAMERAS = "(there are: tracking, portrait, profile)"
+EXTENSIONS = "(there are: .png, .mp4, .gif, .webp, .html)"
+
 
 def render(folder, *arguments):
     return programs.arc_suite("render", "--width=64", "--height=48", *arguments, cwd=folder)
@@ -142,15 +145,9 @@ def test_a_take_stays_at_its_end():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (
-            ["--camera=portait", "--output=a.png"],
-            "unknown camera 'portait'; did you mean 'portrait'? (there are: tracking, portrait, profile)",
-        ),
-        (["--camera=", "--output=a.png"], "unknown camera '' (there are: tracking, portrait, profile)"),
-        (
-            ["--output=a.jpg"],
-            "unknown extension '.jpg'; did you mean '.png'? (there are: .png, .mp4, .gif, .webp, .html)",
-        ),
+        (["--camera=portait", "--output=a.png"], f"unknown camera 'portait'; did you mean 'portrait'? {CAMERAS}"),
+        (["--camera=", "--output=a.png"], f"unknown camera '' {CAMERAS}"),
+        (["--output=a.jpg"], f"unknown extension '.jpg'; did you mean '.png'? {EXTENSIONS}"),
         (["--steps=0", "--output=a.html"], "--steps=0: expected 1 or more for a film or a page"),
         (["--output=missing/a.mp4"], "cannot write missing/a.mp4: no such file or directory"),
         ([], "no file to write; say --output=FILE.png, .mp4, .gif, .webp or .html"),

@@ -28,6 +28,7 @@ PRESETS = [(robot, preset) for robot in ROBOTS for preset in ("slow", "medium", 
 # Tests share the clips of a robot. `make check` has one walk alone.
 EACH = tiers(ROBOTS, never, lambda robot: robot == "tick")
 NAMES = ("walk", "turn_left", "start", "stop", "idle")
+SHORT = Setup.of("tick", "walk", {"time_limit": 1.0})
 slow = functools.partial(pytest.param, marks=pytest.mark.slow)
 
 
@@ -382,10 +383,7 @@ def test_the_recording_is_the_episode_to_the_bit():
         ({"names": ["walk"], "fps": 0.0}, "fps: expected a number from 1 to 1000"),
         slow({"names": ["walk"], "policy": "zero"}, "tick, clip walk: the pose does not return within"),
         slow({"names": ["walk"], "policy": "random"}, "tick, clip walk: "),
-        (
-            {"names": ["walk"], "setup": Setup.of("tick", "walk", {"time_limit": 1.0})},
-            "tick, clip walk: the episode ends after 20",
-        ),
+        ({"names": ["walk"], "setup": SHORT}, "tick, clip walk: the episode ends after 20"),
     ],
 )
 def test_errors_are_one_line(arguments, message):

@@ -22,6 +22,7 @@ ROOT = pathlib.Path(__file__).parents[3]
 TINY = ["--robot=tick", "--algorithm=sope_eo", "--set", "time_limit=2", "--steps=200", "--evaluate_every=100"]
 for number in ("hidden=16", "batch=8", "start_steps=20", "phase_every=100", "phase_updates=60", "check_every=20"):
     TINY += ["--hp", number]
+WORDS = f"(there are: {', '.join(registry.words())})"
 FINISHED = re.compile(
     r"runs/tick-walk-sope_eo-0: finished, return \d+\.\d \+- \d+\.\d, score -?\d\.\d\d "
     r"\(standing still \d+\.\d, demonstrator refined \d+\.\d\)\n"
@@ -42,10 +43,7 @@ def run(*arguments, cwd):
             "did you mean 'PATIENT'?\n",
         ),
         (["--robot=all"], "arc-suite train: --robot=all: expected one robot"),
-        (
-            ["--robot=tock"],
-            f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? (there are: {', '.join(registry.words())})\n",
-        ),
+        (["--robot=tock"], f"arc-suite train: unknown robot 'tock'; did you mean 'tick'? {WORDS}\n"),
         (["--stps=5"], "arc-suite train: unknown flag 'stps'; did you mean 'steps'? (there are: algorithm, config, "),
         (["--steps=abc"], "arc-suite train: flag --steps=abc: expected a positive integer\n"),
         (["--minutes=x"], "arc-suite train: flag --minutes=x: expected a non-negative number\n"),
