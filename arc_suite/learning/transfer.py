@@ -8,7 +8,7 @@ still, 0, to the body's own demonstrator, 1.
 import contextlib
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium.vector import AutoresetMode
@@ -123,8 +123,8 @@ def compare(network: Network, bodies: Iterable[Body], task: str, settings: Mappi
         ValueError: a task or a body that does not fit.
     """
     bodies = list(bodies)
-    options = {"num_threads": 1, "autoreset_mode": AutoresetMode.DISABLED, "max_episode_steps": STEPS, "flat": True}
-    environment = BodiesEnv(task, len(bodies), bodies, task_kwargs=settings, **options)
+    options: dict[str, Any] = {"num_threads": 1, "autoreset_mode": AutoresetMode.DISABLED, "task_kwargs": settings}
+    environment = BodiesEnv(task, len(bodies), bodies, max_episode_steps=STEPS, flat=True, **options)
     with contextlib.closing(environment):
         zero = Script(lambda seed: (), *environment.action_space.shape)
         played = [_episodes(environment, policy) for policy in (network, Teacher(environment), zero)]

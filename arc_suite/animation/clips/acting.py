@@ -52,8 +52,8 @@ def idle(body: Body, rest: Pose) -> Motion:
 
 def held(pose: Pose, samples: int, step: float) -> Motion:
     """Return a pose held for a number of samples after the first one, with a root that stays."""
-    still = (np.tile(values, (samples + 1, 1)) for values in pose)
-    return Motion(step, np.zeros((samples + 1, 3)), *still, np.zeros(3))
+    positions, quaternions, joints = (np.tile(values, (samples + 1, 1)) for values in pose)
+    return Motion(step, np.zeros((samples + 1, 3)), positions, quaternions, joints, np.zeros(3))
 
 
 def hit(body: Body, rest: Pose) -> Motion:

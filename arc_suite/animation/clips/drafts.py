@@ -86,7 +86,7 @@ def drafts(
     for name in gaits.keys() - clocked.keys():
         found |= _in_step(body, {name: gaits[name]}, _MOST_ALONE, loops.CLOSED, left_out)
     reasons = {name: _unfit(name, draft, recorder.units, found.get("walk")) for name, draft in found.items()}
-    left_out |= {name: reason for name, reason in reasons.items() if reason}
+    left_out.update({name: reason for name, reason in reasons.items() if reason})
     found = {name: draft for name, draft in found.items() if not reasons[name]}
     if straight:
         found = {name: draft._replace(motion=_straight(name, draft.motion)) for name, draft in found.items()}

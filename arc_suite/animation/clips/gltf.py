@@ -56,8 +56,9 @@ class Document:
             view["target"] = target
         self._buffer += data.tobytes()
         self._buffer += bytes(-len(self._buffer) % _ALIGNED)
-        accessor = {"bufferView": self.add("bufferViews", view), "componentType": _COMPONENTS[values.dtype]}
-        accessor |= {"count": len(values), "type": _TYPES[values.shape[1:]]}
+        component, kind = _COMPONENTS[values.dtype], _TYPES[values.shape[1:]]
+        accessor: dict[str, Any] = {"bufferView": self.add("bufferViews", view), "componentType": component}
+        accessor |= {"count": len(values), "type": kind}
         if normalized:
             accessor["normalized"] = True
         if bounds:

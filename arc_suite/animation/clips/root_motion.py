@@ -68,7 +68,8 @@ class Motion(NamedTuple):
 
     def mapped(self, change: Callable[[np.ndarray], np.ndarray]) -> "Motion":
         """Return the motion with positions, quaternions and joints, (samples, ...) each, that a function changes."""
-        return self._replace(**{name: change(getattr(self, name)) for name in ("positions", "quaternions", "joints")})
+        positions, quaternions, joints = map(change, (self.positions, self.quaternions, self.joints))
+        return self._replace(positions=positions, quaternions=quaternions, joints=joints)
 
     def begun(self, sample: int) -> "Motion":
         """Return the loop with another of its samples first."""

@@ -131,7 +131,7 @@ class View:
             if arrows:
                 radius = arrows[0].radius / self._unit
                 colours = np.array([_rgb(marker.colour[:3]) for marker in arrows])
-                sizes = {"shaft_radius": radius, "head_radius": 2.0 * radius, "head_length": 3.0 * radius}
+                sizes: dict = {"shaft_radius": radius, "head_radius": 2.0 * radius, "head_length": 3.0 * radius}
                 self._arrows = self._server.scene.add_arrows("/world/markers/arrows", points, colours, **sizes)
         elif arrows and abs(self._arrows.points - points).max() > _SAME:
             self._arrows.points = points
