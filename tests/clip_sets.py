@@ -87,9 +87,8 @@ def main(count: str = "100") -> int:
         except ValueError as error:
             numbers[name], left_out = {"clips": 0}, {"all": str(error)}
         told = ", ".join(f"{key} {value:.3g}" for key, value in numbers[name].items())
-        print(
-            "; ".join([f"{name}: {told}", *(f"no {clip}: {reason}" for clip, reason in left_out.items())]), flush=True
-        )
+        missing = [f"no {clip}: {reason}" for clip, reason in left_out.items()]
+        print("; ".join([f"{name}: {told}", *missing]), flush=True)
 
     def values(key, names):
         return np.array([numbers[name].get(key, np.nan) for name in names])

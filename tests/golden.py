@@ -43,9 +43,8 @@ def walked(robot: str, steps: int = STEPS) -> dict[str, np.ndarray]:
         timestep = environment.step(demonstrator(timestep) + noise.normal(0.0, 0.3, environment.action_spec().shape))
         rewards.append(timestep.reward)
         terms.append(list(environment.task.terms.values()))
-    names = {
-        f"walk/terms/{name}": np.array(values) for name, *values in zip(environment.task.terms, *terms, strict=True)
-    }
+    named = zip(environment.task.terms, *terms, strict=True)
+    names = {f"walk/terms/{name}": np.array(values) for name, *values in named}
     return {"walk/observations": np.array(observations), "walk/rewards": np.array(rewards)} | names
 
 

@@ -31,9 +31,8 @@ def decoded(vector):
 def shares(environment, exploits, seeds, limit, metric):
     """For each exploit its gain as a share of what it may gain, and its metric as a share of the demonstrator's."""
     repeated = [exploit for exploit in exploits for _ in seeds]
-    totals, metrics = earned(
-        environment, Exploiting(environment.task.definition, repeated), list(seeds) * len(exploits)
-    )
+    policy = Exploiting(environment.task.definition, repeated)
+    totals, metrics = earned(environment, policy, list(seeds) * len(exploits))
     means = [values.reshape(len(exploits), len(seeds)).mean(axis=-1) for values in (totals, metrics[metric])]
     return (means[0] - limit.standing) / limit.gain, means[1] / limit.metric
 

@@ -120,14 +120,6 @@ def test_a_film_keeps_the_sum_of_frames_between_the_units_of_its_format(tmp_path
     assert (film.n_frames, total, film.info["loop"]) == (20, milliseconds, 0)
 
 
-@pytest.mark.slow
-def test_settings_of_the_task_are_seen(tmp_path):
-    still = ("--robot=tick", "--policy=zero", "--steps=5", "--output=tick.png")
-    plain, quick = render(tmp_path, *still), render(tmp_path, *still, "--set=velocity_band=9")
-    assert quick.stdout.splitlines()[1:] == plain.stdout.splitlines()[1:]
-    assert quick.stdout != plain.stdout
-
-
 def test_a_take_stays_at_its_end():
     environment = arc_suite.load("leaper", "walk", {"random": 0})
     footage = films.Footage("leaper", environment, alone(policy("random", "leaper"), 0), "profile", (64, 48))
