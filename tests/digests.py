@@ -135,13 +135,10 @@ def digested(case: Case) -> dict[str, Any]:
             observations.append(observation)
             rewards.append(np.nan if reward is None else reward)
             metrics.extend(float(progress[name]) for name in sorted(progress))
-    return {
-        "observations": _digest(observations),
-        "unsigned": _digest(observation + 0.0 for observation in observations),
-        "rewards": _digest(rewards),
-        "metrics": _digest(metrics),
-        "first": [None if np.isnan(reward) else float(f"{reward:.9g}") for reward in rewards[:FIRST]],
-    }
+    unsigned = (observation + 0.0 for observation in observations)
+    found = {"observations": observations, "unsigned": unsigned, "rewards": rewards, "metrics": metrics}
+    first = [None if np.isnan(reward) else float(f"{reward:.9g}") for reward in rewards[:FIRST]]
+    return {name: _digest(arrays) for name, arrays in found.items()} | {"first": first}
 
 
 def _digest(arrays) -> str:

@@ -12,9 +12,8 @@ from arc_suite.robots import ROBOTS
 
 
 def compared(policy, demonstrator, zero, walked=True):
-    return Comparison(
-        "body", Judged(policy, walked, math.nan), Judged(demonstrator, True, math.nan), Judged(zero, 0, 0)
-    )
+    played = ((policy, walked, math.nan), (demonstrator, True, math.nan), (zero, 0, 0))
+    return Comparison("body", *(Judged(*each) for each in played))
 
 
 def test_a_score_is_the_way_from_standing_to_the_demonstrator():

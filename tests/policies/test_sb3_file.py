@@ -42,9 +42,8 @@ def test_does_what_the_agent_does(name, saved):
 def test_in_a_batch_it_does_the_same(saved):
     policy, task = policies.policy(str(saved[0] / "SAC.zip"), "tick"), {"time_limit": 1.0}
     envs = VectorEnv("tick", "walk", 3, 1, "Disabled", task_kwargs=task)
-    assert evaluation.episodes_in_batch(envs, policy, range(3)) == evaluation.episodes(
-        arc_suite.load("tick", "walk", task), policy, range(3)
-    )
+    alone = evaluation.episodes(arc_suite.load("tick", "walk", task), policy, range(3))
+    assert evaluation.episodes_in_batch(envs, policy, range(3)) == alone
 
 
 def test_errors_are_one_line(saved, tmp_path):

@@ -76,10 +76,8 @@ def test_kinds_of_one_algorithm_differ_in_their_markers():
 
 @pytest.mark.parametrize("places", ["a", "ab"])
 def test_a_legend_of_long_names_lies_in_the_picture(places):
-    kinds = {
-        f"sac_parallel-three-step-{part}-environments": Curve("sac_parallel", STEPS, np.zeros((1, 5)))
-        for part in "abcde"
-    }
+    curve = Curve("sac_parallel", STEPS, np.zeros((1, 5)))
+    kinds = {f"sac_parallel-three-step-{part}-environments": curve for part in "abcde"}
     figure = plots.study(dict.fromkeys(places, kinds), {}, {})
     figure.draw_without_rendering()
     box = figure.legends[0].get_window_extent()
