@@ -148,7 +148,7 @@ MUTANTS = {
     "the mouse pulls at nothing": "data.xfrc_applied[:] = «forces→0.0»",
     # Studies and datasets of agents.
     "medium agents are the best": ">= «MEDIUM * →»best",
-    "evaluations under way count": "if« count == evaluation.EPISODES and→» step in times",
+    "evaluations under way count": "if« count == evaluation.CURVE_EPISODES and→» step in times",
     "a run made by two studies": "fcntl.flock(file, fcntl.«LOCK_EX→LOCK_SH»",
     "shares of a study overlap": "study.runs[part:«:parts→»]",
 }

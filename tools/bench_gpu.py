@@ -102,7 +102,7 @@ def episodes(robot, impl, count):
 def minutes(robot, simulation):
     """Row of a table: minutes and control steps after which PPO earns what `medium` does, evaluations counted."""
     setup = Setup.of(robot)
-    with contextlib.closing(setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled")) as environment:
+    with contextlib.closing(setup.make_vec(evaluation.CURVE_EPISODES, autoreset_mode="Disabled")) as environment:
         medium = Demonstrator(environment, "medium")
         goal = np.mean([episode.total for episode in evaluation.episodes_in_batch(environment, medium)])
     run = Configuration.of(setup, "ppo", {"simulation": simulation, **LEARNING}, steps=50_000_000, evaluate_every=10**6)

@@ -50,7 +50,7 @@ flags.DEFINE_list("tasks", None, "Which tasks. [default: all]")
 flags.DEFINE_list("robots", list(ROBOTS), "Who walks.")
 flags.DEFINE_list("presets", None, "Of the demonstrator; zero stands still. [default: those that suit the task]")
 flags.DEFINE_list("difficulties", ["0.3333", "0.6667", "1"], "Of ground, from 0 to 1.")
-flags.DEFINE_integer("episodes", evaluation.EPISODES, "How many of each.", lower_bound=1)
+flags.DEFINE_integer("episodes", evaluation.CURVE_EPISODES, "How many of each.", lower_bound=1)
 flags.DEFINE_integer("terrain_seed", 1, "Of what is random in the ground; learners train on others.", lower_bound=0)
 flags.DEFINE_integer("threads", None, "To simulate on. [default: as many as there are cores]", lower_bound=1)
 flags.DEFINE_boolean("write", False, "Write the tables into docs/results.md.")
@@ -116,7 +116,7 @@ def anchor(robot: str, task: str) -> anchors.Returns:
     setup = Setup.of(robot, task)
     names = [name for name in PRESETS.get(task, WALK) if name in (anchors.ZERO, *presets_of(setup.body))]
     bar = program.progress(names, desc=f"{task} {robot}", leave=False)
-    found = {name: anchors.played(setup, name) for name in bar}
+    found = {name: anchors.played(setup, name, range(evaluation.EPISODES)) for name in bar}
     return {name: found[name] for name in (anchors.ZERO, anchors.of_returns(found).preset)}
 
 

@@ -2,7 +2,7 @@
 
 Walk's metrics are the mean speed, m/s, and gait compliance, the share of feet as prescribed. IQM is
 the interquartile mean of the return, with a stratified bootstrap interval. `zero` is the return of standing
-still in the same episodes, at most ten. The score is 0 for standing still and 1 for the best demonstrator of the
+still in the first ten of the episodes. The score is 0 for standing still and 1 for the best demonstrator of the
 suite; only places of the benchmark have one. With --preset medium, which is the paper's demonstrator, the table
 ends with the paper's return. A policy that learned from the episodes is refused. The JSON is an entry for
 `arc-suite enter`: it holds every episode, and hashes of policy, body, model and task.
@@ -64,7 +64,7 @@ def main() -> None:
         width = max(12, *map(len, labels.values()))
         for robot, (environment, policy) in players.items():
             episodes = evaluate(robot, environment, policy)
-            seeds = range(FLAGS.seed, FLAGS.seed + min(FLAGS.episodes, evaluation.EPISODES))
+            seeds = range(FLAGS.seed, FLAGS.seed + min(FLAGS.episodes, evaluation.CURVE_EPISODES))
             stood = float(anchors.played(asked[robot], anchors.ZERO, seeds).mean())
             known = anchors.known(asked[robot])
             if not reports:

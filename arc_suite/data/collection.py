@@ -164,7 +164,7 @@ def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, thre
     """Return Minari's metadata without the counts."""
     presets = f" {' and '.join(settings.presets)}" if settings.presets else ""
     noise = f", with normal noise of standard deviation {settings.noise:g} on its actions" if settings.noise else ""
-    environment = settings.environment(evaluation.EPISODES, threads)
+    environment = settings.environment(evaluation.CURVE_EPISODES, threads)
     with contextlib.closing(environment):
         return {
             "dataset_id": dataset_id,
@@ -180,7 +180,7 @@ def _metadata(dataset_id: str, settings: DatasetSettings, provenance: dict, thre
             "requirements": [f"{name}=={version}" for name, version in provenance["versions"].items() if version],
             "ref_min_score": _mean_return(environment, settings._replace(policy="zero", presets=(), noise=0.0)),
             "ref_max_score": terms.greatest(environment.task.definition.settings.weights) * settings.steps,
-            "num_episodes_average_score": evaluation.EPISODES,
+            "num_episodes_average_score": evaluation.CURVE_EPISODES,
             "arc_suite": provenance,
         }
 

@@ -1,6 +1,7 @@
 """Evaluation of policies: the protocol, and statistics over episodes."""
 
 from arc_suite.evaluation.protocol import (
+    CURVE_EPISODES,
     EPISODES,
     EpisodeResult,
     check_ends,
@@ -24,6 +25,7 @@ from arc_suite.evaluation.statistics import (
 )
 
 __all__ = [
+    "CURVE_EPISODES",
     "EPISODES",
     "Curve",
     "EpisodeResult",

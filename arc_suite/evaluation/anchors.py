@@ -1,9 +1,9 @@
 """Anchors of a score: what standing still and the best demonstrator earn with a robot, a task and settings.
 
 `anchors.csv` holds both for robots of the suite in tasks with default settings: the returns of the protocol's episodes,
-written by `python tools/results.py --anchors`. In places that it lacks they are measured. Episodes run in a batch,
-where policies observe float32 as learners do. `arc-suite evaluate` has float64, and chaotic walks diverge: Leaper's
-`medium` earns 2619.8 here and 2610.4 there.
+written by `python tools/results.py --anchors`. In places that it lacks they are measured, in ten episodes. Episodes run
+in a batch, where policies observe float32 as learners do. `arc-suite evaluate` has float64, and chaotic walks diverge:
+Leaper's `medium` earns 2619.8 here and 2610.4 there, over ten episodes.
 """
 
 import contextlib
@@ -84,7 +84,9 @@ def _of_several(setup: Setup) -> Anchors:
     """The anchors of bodies, each in an episode with its own suited demonstrator."""
     zero, demonstrators = [], []
     members = setup.members()
-    for seed in tqdm(range(protocol.EPISODES), desc=f"anchors of {setup}", unit="body", leave=False, disable=None):
+    for seed in tqdm(
+        range(protocol.CURVE_EPISODES), desc=f"anchors of {setup}", unit="body", leave=False, disable=None
+    ):
         member = members[seed % len(members)]
         zero.append(played(member, ZERO, range(seed, seed + 1)))
         demonstrators.append(played(member, suited_preset(member.definition), range(seed, seed + 1)))
@@ -97,13 +99,13 @@ def known(setup: Setup) -> Returns | None:
 
 
 @functools.lru_cache(maxsize=16)
-def measured(setup: Setup) -> Returns:
-    """Return the returns of standing still and of all presets that suit the task; see `anchors`."""
+def measured(setup: Setup, episodes: int = protocol.CURVE_EPISODES) -> Returns:
+    """Return the returns of standing still and of all presets that suit the task, from seed 0 on; see `anchors`."""
     found = {}
     names = (ZERO, *suited_presets(setup.definition))
     for name in tqdm(names, desc=f"anchors of {setup}", unit="policy", leave=False, disable=None):
         try:
-            found[name] = played(setup, name)
+            found[name] = played(setup, name, range(episodes))
         except ValueError:
             if name == ZERO:
                 raise
@@ -111,7 +113,7 @@ def measured(setup: Setup) -> Returns:
     return found
 
 
-def played(setup: Setup, name: str, seeds: range = range(protocol.EPISODES)) -> np.ndarray:
+def played(setup: Setup, name: str, seeds: range) -> np.ndarray:
     """Return the returns (episodes,) of standing still, `zero`, or of a preset of the demonstrator.
 
     Raises:

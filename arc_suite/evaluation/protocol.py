@@ -1,4 +1,4 @@
-"""The evaluation protocol, in one place: ten seeded episodes and deterministic actions."""
+"""The evaluation protocol, in one place: seeded episodes and deterministic actions."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,7 +12,8 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.evaluation import published
 from arc_suite.policies import Policy, alone
 
-EPISODES = 10  # the paper's Section 6, Experimental Setting
+EPISODES = 100  # of a final policy, from seed 0
+CURVE_EPISODES = 10  # of a point of a learning curve: the paper's Section 6, Experimental Setting
 
 _PROGRESS = "progress_"  # prefix of the task's metrics in an info
 
@@ -109,7 +110,7 @@ def episodes(environment, policy: Policy, seeds: Iterable[int] = range(EPISODES)
 def episodes_in_batch(
     environment: VectorEnv | BodiesEnv,
     policy: Policy,
-    seeds: Sequence[int] = range(EPISODES),
+    seeds: Sequence[int] | None = None,
     watch: Callable[[np.ndarray, np.ndarray], None] | None = None,
 ) -> list[EpisodeResult]:
     """Run one episode for each seed, all at once.
@@ -119,7 +120,7 @@ def episodes_in_batch(
     Args:
         environment: one environment for each seed, in the mode Disabled.
         policy: made for as many environments.
-        seeds: of the episodes; by default the protocol's.
+        seeds: of the episodes; by default from 0 on.
         watch: called after the reset and after each control step with two masks (num_envs,): of the environments
             that played the step, none after the reset, and of those whose episodes it terminated.
 
@@ -127,7 +128,7 @@ def episodes_in_batch(
         ValueError: episodes that need not end.
     """
     check_ends(environment.step_limit)
-    num_envs = len(seeds)
+    num_envs, seeds = environment.num_envs, range(environment.num_envs) if seeds is None else seeds
     observations, _ = environment.reset(seed=list(seeds))
     policy.reset(range(num_envs), list(seeds))
     totals, rewards, lengths = np.zeros(num_envs), np.zeros(num_envs), np.zeros(num_envs, int)

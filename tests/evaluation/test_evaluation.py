@@ -62,9 +62,9 @@ def test_returns_of_the_papers_demonstrators():
     assert evaluation.expert_return(Setup.of(generator.generate(4, 2))) is None
 
 
-def test_the_protocol_is_ten_episodes():
+def test_a_final_policy_is_judged_on_100_episodes():
     environment = arc_suite.load("tick", "walk", {"time_limit": 0.1})
-    assert len(evaluation.episodes(environment, Demonstrator("tick"))) == 10
+    assert len(evaluation.episodes(environment, Demonstrator("tick"))) == 100
 
 
 def test_episodes_that_need_not_end_are_one_line():

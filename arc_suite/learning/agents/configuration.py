@@ -76,7 +76,7 @@ class Configuration:
     @property
     def validation(self) -> Setup:
         """Setup in which the policy is evaluated while it learns."""
-        return self.setup.validation(evaluation.EPISODES)
+        return self.setup.validation(evaluation.CURVE_EPISODES)
 
     @property
     def definition(self) -> algorithms.Algorithm:
@@ -132,7 +132,7 @@ class Configuration:
         """
         provenance = self.setup.provenance()
         packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
-        own = {"episodes": evaluation.EPISODES, "versions": provenance["versions"] | packages}
+        own = {"episodes": evaluation.CURVE_EPISODES, "versions": provenance["versions"] | packages}
         return self.to_dict() | provenance | own
 
 

@@ -66,7 +66,7 @@ def train(
         context = RunContext(**own, folder=Path(folder), threads=threads, checkpoint=run_files.arrays)
         slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
         options = {"num_threads": threads, "autoreset_mode": AutoresetMode.DISABLED}
-        vector = configuration.validation.make_vec(evaluation.EPISODES, **options)
+        vector = configuration.validation.make_vec(evaluation.CURVE_EPISODES, **options)
         environment = stack.enter_context(contextlib.closing(vector))
         wall, cpu = time.monotonic() - state["wall"], time.process_time() - state["cpu"]
         bar = progress(

@@ -3,7 +3,7 @@
   arc-suite evaluate --robot tick --policy ppo.zip --json entry.json
   arc-suite enter entry.json --policy ppo.zip --name my_ppo
 
-The ten episodes are played again: versions, hashes and returns must be those of the file. The entry is copied into
+The 100 episodes are played again: versions, hashes and returns must be those of the file. The entry is copied into
 studies/entries, and studies/README.md is written anew. The file imports nothing: --task names a module that it needs.
 """
 

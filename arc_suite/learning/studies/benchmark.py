@@ -43,8 +43,8 @@ class RunScore(NamedTuple):
         result: mean return of the protocol's episodes.
         score: of it, clipped to `CLIP`.
         minutes: of the processor until an evaluation had the score `HALF`; infinite if none had, NaN if unknown.
-        gait_compliance: mean over the episodes.
-        heading_error: mean size over the episodes, rad; NaN for tasks of `TURNING`.
+        gait_compliance: mean over ten episodes.
+        heading_error: mean size over ten episodes, rad; NaN for tasks of `TURNING`.
         notes: what the score must not be compared with others for; empty for nothing.
     """
 
@@ -137,10 +137,11 @@ def _of_policy(path: Path, setup: Setup, seed: int) -> RunScore:
     name = f"{path}:{MAKE}" if path.suffix == named.MODULE else path
     known = provenance.training_seeds(str(name), range(evaluation.EPISODES)) is not None
     policy = policies.policy(name, setup.body, task=environment.task.definition)
-    tracks = [style.record(environment, policy, seed) for seed in range(evaluation.EPISODES)]
+    tracks = [style.record(environment, policy, seed) for seed in range(evaluation.CURVE_EPISODES)]
+    others = evaluation.episodes(environment, policy, range(evaluation.CURVE_EPISODES, evaluation.EPISODES))
     every = [style.measure(track) for track in tracks]
     measured = {each: np.array([metrics[each].value for metrics in every]) for each in STYLE}
-    result = np.mean([track.rewards.sum() for track in tracks])
+    result = np.mean([*(track.rewards.sum() for track in tracks), *(each.total for each in others)])
     notes = "" if known else provenance.UNKNOWN
     return _score(setup, seed, result, np.nan, measured, anchors.anchors(setup), notes)
 

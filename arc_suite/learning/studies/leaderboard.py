@@ -26,11 +26,11 @@ HEADS = (
 _NAME = re.compile(r"[\w.-]+")
 _TEXT = (
     "All committed studies, written by `arc-suite study NAME --report`, and entries, written by `arc-suite enter`. "
-    "Return: mean of the latest evaluation. Score: (return - standing still) / (best demonstrator - standing still). "
-    "IQM: interquartile mean with 95 % bootstrap interval over seeds; a single seed has none. Then the task's own "
-    "metric, speed in m/s; headings are relative to the x axis, which is not the direction of a command. Runs of one "
-    "configuration that several studies have are in one row. Phases: the most updates of the critics alone; 75,000 are "
-    "published."
+    "Return: mean over 100 episodes of the latest policy, unless noted. Score: (return - standing still) / (best "
+    "demonstrator - standing still). IQM: interquartile mean with 95 % bootstrap interval over seeds; a single seed "
+    "has none. Then the task's own metric, speed in m/s; headings are relative to the x axis, which is not the "
+    "direction of a command. Runs of one configuration that several studies have are in one row. Phases: the most "
+    "updates of the critics alone; 75,000 are published."
 )
 
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from gymnasium.vector import AutoresetMode
+
 from arc_suite import evaluation, files, policies, style
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
@@ -46,7 +48,7 @@ def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
     for run in runs:
         if found := _evaluated(folder / run.name):
             configurations[run.name] = _configuration(run, folder / run.name)
-            episodes[run.name] = _with_style(run, folder / run.name, found)
+            episodes[run.name] = _judged(run, folder / run.name, _with_style(run, folder / run.name, found))
     names = [run.name for run in runs if run.name in episodes]
     if not names:
         return
@@ -63,7 +65,7 @@ def _evaluated(folder: Path) -> list[dict[str, str]]:
     rows = run_folder.lines(folder, "evaluations")
     times = {row.pop("step"): row for row in run_folder.lines(folder, "times")}
     counts = Counter(row["step"] for row in rows)
-    whole = {step for step, count in counts.items() if count == evaluation.EPISODES and step in times}
+    whole = {step for step, count in counts.items() if count == evaluation.CURVE_EPISODES and step in times}
     return [{"run": folder.name, **row, **times[row["step"]]} for row in rows if row["step"] in whole]
 
 
@@ -109,12 +111,37 @@ def _measured(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
     lines = []
     with contextlib.closing(setup.load()) as environment:
         policy = policies.policy(path, setup.body, task=environment.task.definition)
-        for seed in range(evaluation.EPISODES):
+        for seed in range(evaluation.CURVE_EPISODES):
             measured = style.measure(style.record(environment, policy, seed))
             metrics = {name: repr(measured[name].value) for name in METRICS if name in measured}
             lines.append({"step": step, "seed": str(seed)} | metrics)
     csv_files.write(folder / "style.csv", list(lines[0]), lines)
     return lines
+
+
+def _judged(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
+    """Return rows of episodes, and those that complete the latest evaluation, which the folder keeps."""
+    latest = rows[-1]
+    kept = run_folder.lines(folder, "final")
+    if not kept or kept[-1]["step"] != latest["step"]:
+        _judge(run, folder, latest["step"])
+        kept = run_folder.lines(folder, "final")
+    shared = {name: latest[name] for name in ("run", *TIMES)}
+    return [*rows, *(shared | row for row in kept)]
+
+
+def _judge(run: Run, folder: Path, step: str) -> None:
+    """Write a table of the episodes that judge the policy at a step, after those of its curve."""
+    setup, seeds = run.configuration.validation, range(evaluation.CURVE_EPISODES, evaluation.EPISODES)
+    policy = network.load(folder / checkpoints.FOLDER / step)
+    environment = setup.make_vec(len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
+    with contextlib.closing(environment):
+        played = evaluation.episodes_in_batch(environment, policy, seeds)
+    lines = [
+        {"step": step, "seed": seed, "return": each.total, "length": each.length, **each.progress}
+        for seed, each in zip(seeds, played, strict=True)
+    ]
+    csv_files.write(folder / "final.csv", list(lines[0]), lines)
 
 
 def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:
@@ -128,7 +155,7 @@ def _publish_demonstrators(runs: Sequence[Run], published: Path) -> None:
 
 def _demonstrated(setup: Setup) -> anchors.Returns:
     """Return the returns of the evaluation protocol of standing still and of demonstrators of a body, by policy."""
-    found = dict(anchors.known(setup) or anchors.measured(setup))
+    found = dict(anchors.known(setup) or anchors.measured(setup, evaluation.EPISODES))
     usual = COMMANDED if "command" in setup.definition.blocks else PRESETS
     missing = [preset for preset in usual if preset in presets_of(setup.body) and preset not in found]
-    return found | {preset: anchors.played(setup, preset) for preset in missing}
+    return found | {preset: anchors.played(setup, preset, range(evaluation.EPISODES)) for preset in missing}

@@ -58,10 +58,10 @@ _CURVES = (
     "still and demonstrators. Dotted: the paper's returns at the last step, from 50,000 on."
 )
 _FINALS = (
-    "Mean of the latest evaluation, ten seeded episodes, and standard deviation over seeds; interquartile mean with "
-    "95 % bootstrap interval over seeds. A single seed has neither. Score: (return - standing still) / (best "
-    "demonstrator - standing still). The paper's returns are at equal steps, read off its curves within about 30. "
-    "Then come standing still and the demonstrators, with the standard deviation over episodes."
+    "Mean over 100 seeded episodes of the latest policy, unless noted, and standard deviation over seeds; "
+    "interquartile mean with 95 % bootstrap interval over seeds. A single seed has neither. Score: (return - standing "
+    "still) / (best demonstrator - standing still). The paper's returns are at equal steps, read off its curves "
+    "within about 30. Then come standing still and the demonstrators, with the standard deviation over episodes."
 )
 _EFFICIENCY = (
     "Environment steps and minutes of one core until an evaluation has the score 0.5, and the return 3,500; a dash if "

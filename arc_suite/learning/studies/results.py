@@ -19,7 +19,7 @@ RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators
 # Columns of the table of runs: the configuration, then the updates of stabilisation phases by environment step.
 RUN_COLUMNS = ("run", "kind", *CONFIGURATION, *PROVENANCE, "phases")
 TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
-SHARED = "data share seeds with evaluation"
+SHARED, TEN = "data share seeds with evaluation", "ten episodes"
 STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
 _OTHERS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode that are not the task's metrics
 
@@ -30,7 +30,8 @@ class RunResult(NamedTuple):
     Attributes:
         run: of the study.
         steps: (evaluations,) environment steps.
-        returns: (evaluations, episodes)
+        returns: (evaluations, episodes) of the curve.
+        finals: (episodes,) returns of the latest policy.
         progress: the task's progress in the latest evaluation by name, each (episodes,).
         cpu: (evaluations,) s of the processor until then.
         style: metrics of style of the latest policy by name, each (episodes,).
@@ -41,6 +42,7 @@ class RunResult(NamedTuple):
     run: Run
     steps: np.ndarray
     returns: np.ndarray
+    finals: np.ndarray
     progress: dict[str, np.ndarray]
     cpu: np.ndarray
     style: dict[str, np.ndarray]
@@ -49,15 +51,16 @@ class RunResult(NamedTuple):
 
     @property
     def final(self) -> float:
-        """Mean return of the latest evaluation."""
-        return float(self.returns[-1].mean())
+        """Mean return of the latest policy."""
+        return float(self.finals.mean())
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What its final return must not be compared with others for."""
+        few = (TEN,) * (len(self.finals) < evaluation.EPISODES)
         if self.training_seeds is None:
-            return (provenance.UNKNOWN,)
-        return (SHARED,) * bool(common(self.training_seeds, EVALUATION))
+            return (*few, provenance.UNKNOWN)
+        return few + (SHARED,) * bool(common(self.training_seeds, EVALUATION))
 
 
 Groups = Mapping[str, Mapping[str, Sequence[RunResult]]]  # results by place and kind
@@ -87,17 +90,22 @@ def episodes_of(published: Path) -> dict[str, list[dict[str, str]]]:
 
 
 def _result(run: Run, rows: Sequence[Mapping[str, str]], known: Mapping[str, str]) -> RunResult:
-    def column(name):
-        return np.array([row[name] for row in rows], float).reshape(-1, evaluation.EPISODES)
+    by_step: dict[str, list[Mapping[str, str]]] = {}
+    for row in rows:
+        by_step.setdefault(row["step"], []).append(row)
+    *_, latest = by_step.values()
 
-    latest = rows[-evaluation.EPISODES :]
-    metrics = {name: np.array([row[name] for row in latest], float) for name in latest[0] if name not in _OTHERS}
+    def curve(name):
+        return np.array([[row[name] for row in each[: evaluation.CURVE_EPISODES]] for each in by_step.values()], float)
+
+    metrics = {n: np.array([row[n] for row in latest if n in row], float) for n in latest[0] if n not in _OTHERS}
     return RunResult(
         run=run,
-        steps=column("step")[:, 0].astype(int),
-        returns=column("return"),
+        steps=curve("step")[:, 0].astype(int),
+        returns=curve("return"),
+        finals=np.array([row["return"] for row in latest], float),
         progress={name: values for name, values in metrics.items() if not name.startswith(STYLE)},
-        cpu=column("cpu_seconds")[:, 0],
+        cpu=curve("cpu_seconds")[:, 0],
         style={name.removeprefix(STYLE): values for name, values in metrics.items() if name.startswith(STYLE)},
         phases=np.array(list(json.loads(known["phases"] or "{}").values())),
         training_seeds=from_json(json.loads(known[TRAINING_SEEDS] or "null")),

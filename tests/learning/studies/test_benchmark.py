@@ -78,7 +78,7 @@ def result(levels, steps=(50_000, 100_000), **fields):
     returns = np.array([[scale().at(level)] * 10 for level in levels])
     style = {"gait_compliance": np.full(10, 0.9), "heading_error": np.array([np.nan, *[0.2, -0.2] * 4, 0.2])}
     run = tables.run("tick", "sac", 100_000, **fields)
-    return RunResult(run, np.array(steps), returns, {}, np.array([60.0, 180.0]), style, np.empty(0))
+    return RunResult(run, np.array(steps), returns, returns[-1], {}, np.array([60.0, 180.0]), style, np.empty(0))
 
 
 def test_a_score_is_that_of_the_end_and_minutes_are_those_of_the_first_half():
@@ -244,8 +244,9 @@ def make(robot):
 
 
 def test_modules_are_scored_and_what_is_no_policy_is_left_out(tmp_path, monkeypatch):
-    """A module acts by the weights next to it; this one stands still, for one episode in place of ten."""
-    monkeypatch.setattr(evaluation, "EPISODES", 1)
+    """A module acts by the weights next to it; this one stands still, for one episode."""
+    for name in ("EPISODES", "CURVE_EPISODES"):
+        monkeypatch.setattr(evaluation, name, 1)
     (tmp_path / "tick-walk-2.py").write_text(MODULE)
     np.save(tmp_path / "tick-walk-2.npy", np.zeros(18))
     for name in ("README.md", ".hidden.py", "_helpers.py", "tick-walk-2_vecnormalize.pkl", "studies/other.zip"):
@@ -303,7 +304,7 @@ def test_a_track_is_run_and_resumed(tmp_path):
     (row,) = csv_files.read(folder / results.RUNS)
     assert row["steps"] == "300"
     returns = [float(each["return"]) for each in csv_files.read(folder / results.EVALUATIONS) if each["step"] == "300"]
-    assert found.result == pytest.approx(np.mean(returns)) and len(returns) == 10
+    assert found.result == pytest.approx(np.mean(returns)) and len(returns) == evaluation.EPISODES
     assert (folder / "README.md").is_file() and printed.count("not run") == 9
     episodes = (folder / results.EVALUATIONS).read_bytes()
     go()

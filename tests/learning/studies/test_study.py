@@ -207,6 +207,10 @@ def test_a_curriculum_is_judged_at_the_difficulty(tmp_path):
     with contextlib.closing(load("tick", "gaps", tiny_studies.SHORT)) as environment:
         policy = policies.policy(folder / each.name, "tick", task=environment.task.definition)
         assert evaluation.run(environment, policy, 4).total == table["return"][4]
+        (found,) = results.results([each], published)
+        assert found.finals[:10].tolist() == found.returns[-1].tolist() == table["return"].tolist()
+        assert len(found.finals) == evaluation.EPISODES and found.notes == ()
+        assert evaluation.run(environment, policy, 57).total == found.finals[57], "the first ten are the curve's"
 
 
 def test_the_page_counts_runs():
@@ -304,4 +308,4 @@ def test_demonstrators_beside_runs_follow_the_command_where_there_is_one(tmp_pat
     each = run("tick", "sac", 100, task=task, task_kwargs={"time_limit": 0.5})
     publication._publish_demonstrators([each], tmp_path)
     found = results.demonstrators(tmp_path)[each.place]
-    assert set(found) == presets and all(len(totals) == 10 for totals in found.values())
+    assert set(found) == presets and all(len(totals) == evaluation.EPISODES for totals in found.values())

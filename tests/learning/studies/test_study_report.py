@@ -74,7 +74,7 @@ def test_report(made):
     )
     assert cells(page, "tick, walk", "sope", "0")[3:] == ["1,000,000 of 1,000,000", "3.0", command]
     # 3610 and 3611, each with 0 to 9 on top; the anchors are 1600 and 3600
-    final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610", "-"]
+    final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610", "ten episodes"]
     assert cells(page, "tick, walk", "sope", "1,000,000")[3:] == final
     assert cells(page, "leaper, walk", "sope", "1,000,000")[5] == "-", "without anchors"
     assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048", "-"]
@@ -159,7 +159,7 @@ def test_one_seed_has_no_interval(tmp_path):
     for each in runs:
         publish(tmp_path / "mine", each, constant(100.0, 200.0))
     page = report.write("mine", Study("one seed each", runs), tmp_path / "mine").read_text()
-    assert cells(page, "tick, walk", "sac", "1,000,000", "1")[4:] == ["204.5", "-", "-", "2590", "-"]
+    assert cells(page, "tick, walk", "sac", "1,000,000", "1")[4:] == ["204.5", "-", "-", "2590", "ten episodes"]
     assert cells((tmp_path / "README.md").read_text(), "tick, walk", "sac")[4:8] == ["1", "204.5", "-", "-"]
 
 
