@@ -20,6 +20,7 @@ RUNS, EVALUATIONS, DEMONSTRATORS = "runs.csv", "evaluations.csv", "demonstrators
 RUN_COLUMNS = ("run", "kind", *CONFIGURATION, *PROVENANCE, "phases")
 TIMES = ("wall_seconds", "cpu_seconds")  # until the end of an evaluation
 SHARED, TEN = "data share seeds with evaluation", "ten episodes"
+_FEW = evaluation.CURVE_EPISODES
 STYLE = "style_"  # prefix of the columns with metrics of style, which the latest evaluation has
 _OTHERS = ("run", "step", "seed", "return", "length", *TIMES)  # columns of an episode that are not the task's metrics
 
@@ -94,9 +95,12 @@ def _result(run: Run, rows: Sequence[Mapping[str, str]], known: Mapping[str, str
     for row in rows:
         by_step.setdefault(row["step"], []).append(row)
     *_, latest = by_step.values()
+    counts = [len(each) for each in by_step.values()]
+    if set(counts[:-1]) - {_FEW} or counts[-1] not in (_FEW, evaluation.EPISODES):
+        raise ValueError(f"{run.name}: expected {_FEW} episodes of a step, got {counts}")
 
     def curve(name):
-        return np.array([[row[name] for row in each[: evaluation.CURVE_EPISODES]] for each in by_step.values()], float)
+        return np.array([[row[name] for row in each[:_FEW]] for each in by_step.values()], float)
 
     metrics = {n: np.array([row[n] for row in latest if n in row], float) for n in latest[0] if n not in _OTHERS}
     return RunResult(
