@@ -33,12 +33,12 @@ def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> st
     if value in valid:
         return value
     valid += near
-    raise ValueError(f"unknown {kind} {value!r}{hint(value, valid)} (there are: {', '.join(valid)})")
+    raise ValueError(f"unknown {kind} {shown(value)}{hint(value, valid)} (there are: {', '.join(valid)})")
 
 
 def hint(value, valid: Iterable[str]) -> str:
     """Return how an error goes on that names an unknown value: with a valid one that is near, if there is any."""
-    close = difflib.get_close_matches(str(value), valid, n=1)
+    close = difflib.get_close_matches(shown(value).strip("'"), valid, n=1)
     return f"; did you mean {close[0]!r}?" if close else ""
 
 
@@ -82,7 +82,7 @@ def integer(what: str, value: Any, low: int, high: int | None = None) -> int:
         number = low - 1
     if number < low or (high is not None and number > high):
         bounds = f"from {low}" if high is None else f"from {low} to {high}"
-        raise ValueError(f"{what}: expected an integer {bounds}, got {value!r}")
+        raise ValueError(f"{what}: expected an integer {bounds}, got {shown(value)}")
     return number
 
 
@@ -104,7 +104,7 @@ def number(what: str, value: Any, low: float = -math.inf, high: float = math.inf
     except OverflowError:  # of a large integer
         found = math.inf
     if not math.isfinite(found) or not low <= found <= high:
-        raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {value!r}")
+        raise ValueError(f"{what}: expected a {_numbers(low, high)}, got {shown(value)}")
     return found
 
 
@@ -119,7 +119,7 @@ def boolean(what: str, value: Any) -> bool:
         ValueError: it is neither.
     """
     if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{what}: expected true or false, got {value!r}")
+        raise ValueError(f"{what}: expected true or false, got {shown(value)}")
     return bool(value)
 
 
@@ -141,7 +141,7 @@ def span(what: str, value: Any, low: float, high: float) -> tuple[float, float]:
         return first, number(what, last, first, high)
     except ValueError:
         raise ValueError(
-            f"{what}: expected a {_numbers(low, high)}, or two of them, the lower first, got {value!r}"
+            f"{what}: expected a {_numbers(low, high)}, or two of them, the lower first, got {shown(value)}"
         ) from None
 
 
@@ -167,10 +167,13 @@ def array(what: str, value: Any, size: int, low: float = -math.inf, high: float 
     Raises:
         ValueError: it is neither one finite number nor so many of them, or out of range.
     """
-    numbers = np.asarray(value)
+    try:
+        numbers = np.asarray(value)
+    except (ValueError, RecursionError):  # of unequal lengths, or nested too deeply
+        numbers = np.asarray(None)
     fits = numbers.dtype.kind in "if" and numbers.shape in ((), (size,)) and np.isfinite(numbers).all()
     if not (fits and ((low <= numbers) & (numbers <= high)).all()):
-        raise ValueError(f"{what}: expected one {_numbers(low, high)} or {size} of them, got {value!r}")
+        raise ValueError(f"{what}: expected one {_numbers(low, high)} or {size} of them, got {shown(value)}")
     return np.broadcast_to(numbers, size).astype(float)
 
 
@@ -183,7 +186,7 @@ def mapping(what: str, value: Any) -> Mapping[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping):
-        raise ValueError(f"{what}: expected a mapping of names to values, got {value!r}")
+        raise ValueError(f"{what}: expected a mapping of names to values, got {shown(value)}")
     return value
 
 
@@ -195,13 +198,21 @@ def json_text(what: str, value: Any) -> str:
     """
     try:
         return json.dumps(value, sort_keys=True)
-    except TypeError as error:
-        raise ValueError(f"{what}: expected values that JSON can hold: {error}") from None
+    except (TypeError, ValueError, RecursionError) as error:
+        raise ValueError(f"{what}: expected values that JSON can hold: {quoted(error)}") from None
 
 
 def quoted(value: Any) -> str:
     """Return the beginning of a foreign text, such as another library's error, without line breaks."""
     return " ".join(str(value).split())[:_LONGEST_QUOTE]
+
+
+def shown(value: Any) -> str:
+    """Return how errors write a value of any origin, such as of a file: the beginning of its text, in one line."""
+    try:
+        return quoted(repr(value))
+    except Exception:  # nested too deeply, or broken
+        return f"a {type(value).__name__} that cannot be shown"
 
 
 def imported(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resolve_name) -> Any:

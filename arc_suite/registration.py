@@ -92,7 +92,7 @@ def _family_name(name) -> str:
 def _task_name(task) -> str:
     name = getattr(task, "name", None)
     if not (isinstance(task, type) and issubclass(task, Task)):
-        raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {task!r}")
+        raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {checks.shown(task)}")
     if not (isinstance(name, str) and name.isidentifier()):
         raise ValueError(f"task {name!r}: expected a name of letters, digits and underscores")
     if missing := sorted(task.__abstractmethods__):
@@ -102,7 +102,7 @@ def _task_name(task) -> str:
 
 def _register_body(body, parameters, presets, visuals) -> None:
     if not isinstance(body, Body):
-        raise ValueError(f"body: expected a spec.Body, got {body!r}")
+        raise ValueError(f"body: expected a spec.Body, got {checks.shown(body)}")
     if body.name == BODIES:
         raise ValueError(f"robot {BODIES!r}: ids of environments of different bodies have this name; choose another")
     if ROBOTS.get(body.name, body) != body:

@@ -138,9 +138,13 @@ def _range(family: str, seeds: str) -> range:
 
 
 def _member(family: str, seed: int) -> Body:
-    body = family_of(family)(seed)
+    make = family_of(family)
+    try:
+        body = make(seed)
+    except ValueError as error:
+        raise ValueError(f"robot '{family}:{seed}': {checks.quoted(error)}") from None
     if not isinstance(body, Body):
-        raise ValueError(f"family {family!r}: expected a spec.Body of seed {seed}, got {body!r}")
+        raise ValueError(f"family {family!r}: expected a spec.Body of seed {seed}, got {checks.shown(body)}")
     return body
 
 

@@ -72,7 +72,9 @@ class Stride(NamedTuple):
             ValueError: the speed or the gait does not fit.
         """
         if abs(checks.number("froude", froude, -1.0, 1.0)) < _LEAST_FROUDE:
-            raise ValueError(f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {froude!r}")
+            raise ValueError(
+                f"froude: expected {_LEAST_FROUDE:g} or more, forwards or backwards, got {checks.shown(froude)}"
+            )
         body, gait = task.scene.body, gait_of(task)
         pose = standing(body)  # of the body as it came, for which the task has it at hand
         body = sized(body)

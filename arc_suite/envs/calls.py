@@ -135,7 +135,9 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
     size = task.commands[checks.name(name, task.commands, "command")]
     numbers = np.full(size, np.nan) if value is None else _real(value)
     if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
-        raise ValueError(f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {value!r}")
+        raise ValueError(
+            f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {checks.shown(value)}"
+        )
     return np.broadcast_to(numbers, (*leading, size)).copy()
 
 
@@ -146,5 +148,5 @@ def _real(value) -> np.ndarray | None:
         if array.dtype.kind in _NOT_REAL or (array is not value and isinstance(value, np.ma.MaskedArray)):
             return None
         return array.astype(float, copy=False)
-    except (TypeError, ValueError, OverflowError):
+    except (TypeError, ValueError, OverflowError, RecursionError):
         return None

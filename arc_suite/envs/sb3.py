@@ -40,7 +40,7 @@ class VecEnv(vec_env.VecEnv):
             raise ValueError(
                 "stable-baselines3 resets at once: expected a vector environment of this suite with "
                 "autoreset_mode='SameStep', "
-                f"got {environments!r}{'' if mode is None else f' in the mode {mode.value}'}"
+                f"got {checks.shown(environments)}{'' if mode is None else f' in the mode {mode.value}'}"
             )
         self.environments = environments
         self._actions: np.ndarray | None = None
@@ -126,7 +126,9 @@ class VecEnv(vec_env.VecEnv):
 
     def _check_all(self, name: str, indices) -> None:
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
-            raise ValueError(f"{name}: environments share it; expected all {self.num_envs}, got {indices!r}")
+            raise ValueError(
+                f"{name}: environments share it; expected all {self.num_envs}, got {checks.shown(indices)}"
+            )
 
 
 def _hand_out(info: Mapping[str, Any], infos: list[dict[str, Any]]) -> None:

@@ -69,7 +69,7 @@ class Setup:
         domain, task = domain_name if several else registry.body_of(domain_name), registry.task_of(task_name)
         if "random" in settings:
             raise ValueError(
-                f"setting 'random': expected none, as every episode has a seed, got {settings['random']!r}"
+                f"setting 'random': expected none, as every episode has a seed, got {checks.shown(settings['random'])}"
             )
         if several:
             checks.name(settings.get("actions", "position"), ["position"], "actions of different bodies")
@@ -230,7 +230,7 @@ class Setup:
         """
         for name, kind in (("robot", str), ("task", str), ("task_kwargs", dict)):
             if not isinstance(fields.get(name), kind):
-                raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.quoted(fields.get(name))!r}")
+                raise ValueError(f"expected {name} to be a {kind.__name__}, got {checks.shown(fields.get(name))}")
         robot, task, settings = registry.stored(fields["robot"]), fields["task"], fields["task_kwargs"]
         registry.imported("task", task)
         registry.imported("arena", str(settings.get("arena", "flat")))

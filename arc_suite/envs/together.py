@@ -57,7 +57,9 @@ class Together(gymnasium.vector.VectorEnv):
         """
         values = list(values) if isinstance(values, list | tuple) else [values]
         if len(values) not in (1, self.num_envs) or any(value != values[0] for value in values):
-            raise ValueError(f"set_attr {name!r}: environments share it; expected one value for all, got {values!r}")
+            raise ValueError(
+                f"set_attr {name!r}: environments share it; expected one value for all, got {checks.shown(values)}"
+            )
         setattr(self, name, values[0])
 
     def _check_open(self, call: str) -> None:
@@ -85,7 +87,9 @@ class Together(gymnasium.vector.VectorEnv):
             return np.ones(self.num_envs, bool)
         mask = np.asarray(mask)
         if mask.shape != (self.num_envs,) or mask.dtype != bool or not mask.any():
-            raise ValueError(f"{name}: expected {self.num_envs} booleans, at least one of them true, got {mask!r}")
+            raise ValueError(
+                f"{name}: expected {self.num_envs} booleans, at least one of them true, got {checks.shown(mask)}"
+            )
         return mask.copy()
 
     def _indices(self, indices: Iterable[int] | None) -> list[int]:
@@ -94,5 +98,5 @@ class Together(gymnasium.vector.VectorEnv):
         indices = list(every if indices is None else indices)
         for index in indices:
             if index not in every:
-                raise ValueError(f"indices: expected integers from 0 to {self.num_envs - 1}, got {index!r}")
+                raise ValueError(f"indices: expected integers from 0 to {self.num_envs - 1}, got {checks.shown(index)}")
         return indices

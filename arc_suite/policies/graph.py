@@ -157,6 +157,8 @@ def checked(graph: Graph, size: int) -> Graph:
     Raises:
         ValueError: too many nodes or numbers, an unknown operator, inputs that do not fit, or no actions at the end.
     """
+    if size > _MOST_NUMBERS:
+        raise ValueError(f"expected at most {_MOST_NUMBERS} numbers of an observation, got {size}")
     if not 0 < len(graph.nodes) <= _MOST_NODES:
         raise ValueError(f"expected 1 to {_MOST_NODES} nodes, got {len(graph.nodes)}")
     for name, array in graph.arrays.items():

@@ -113,12 +113,16 @@ def _values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
     low, high = FIELDS[name]
     try:
         found = np.broadcast_to(np.asarray(values, float), like.shape).copy()
-    except (TypeError, ValueError):
-        raise ValueError(f"model field {name!r}: expected numbers of shape {like.shape}, got {values!r}") from None
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        raise ValueError(
+            f"model field {name!r}: expected numbers of shape {like.shape}, got {checks.shown(values)}"
+        ) from None
     least = np.where(like > 0.0, 1e-15, low) if name in _POSITIVE else low
     if not ((found >= least) & (found <= high)).all():
         above = ", above 0 where the model's are" if name in _POSITIVE else ""
-        raise ValueError(f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {values!r}")
+        raise ValueError(
+            f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {checks.shown(values)}"
+        )
     return found
 
 

@@ -63,7 +63,7 @@ def test_feet_in_the_floor_come_with_the_cure(policy, tmp_path):
         (["--set==1"], "--set =1: expected name=value"),
         (["--set=random=1"], "--set random=1: programs seed every episode; see --help for the flag of the first seed"),
         (["--set=target_velocty=1"], "unknown setting of walk 'target_velocty'; did you mean 'target_velocity'? "),
-        (["--set", "target_velocity=fast"], "target_velocity: expected a number from -1e+06 to 1e+06, got 'fast'"),
+        (["--set", "target_velocity=fast"], "target_velocity: expected a number from -1000 to 1000, got 'fast'"),
     ],
 )
 def test_bad_tasks_and_settings_are_one_line(program, arguments, message, tmp_path):

@@ -182,8 +182,8 @@ CASES = [
     # Keyword arguments.
     (walk(time_limit=0), f"time_limit: {POSITIVE}, got 0"),
     (walk(time_limit=1e308), f"time_limit: {POSITIVE}, got 1e+308"),
-    (walk(target_velocity=10**400), f"target_velocity: expected a number from -1000 to 1000, got {10**400}"),
-    (policy("zero", "queen", noise=10**400), f"noise: expected a finite number of at least 0, got {10**400}"),
+    (walk(target_velocity=10**400), f"target_velocity: expected a number from -1000 to 1000, got 1{299 * '0'}"),
+    (policy("zero", "queen", noise=10**400), f"noise: expected a finite number of at least 0, got 1{299 * '0'}"),
     (walk(time_limit=float("nan")), f"time_limit: {POSITIVE}, got nan"),
     (walk(target_velocity=True), "target_velocity: expected a number from -1000 to 1000, got True"),
     (walk(healthy_range=(1, 2, 3)), "healthy_range: expected one finite number or 2 of them, got (1, 2, 3)"),

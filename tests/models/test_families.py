@@ -113,7 +113,10 @@ FAMILIES = "random, varied, few_legs, few_links"
         ("random:", "robot 'random:': expected random:seed or random:first-last, such as random:0-9"),
         ("varied:5-3", "robot 'varied:5-3': expected seeds in ascending order, at most 65536"),
         ("varied:0-99999999", "robot 'varied:0-99999999': expected seeds in ascending order, at most 65536"),
-        ("varied:4294967296", "seed: expected an integer from 0 to 4294967295, got 4294967296"),
+        (
+            "varied:4294967296",
+            "robot 'varied:4294967296': seed: expected an integer from 0 to 4294967295, got 4294967296",
+        ),
         ("json:varied:3", "family 'json:varied': varied is the suite's own, expected without a module"),
         ("json:vared:3", f"unknown family 'vared'; did you mean 'varied'? (there are: {FAMILIES})"),
     ],

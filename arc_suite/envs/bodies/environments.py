@@ -116,7 +116,7 @@ class BodiesEnv(KnownAttributes, Together):
         found = list(itertools.chain.from_iterable(map(registry.bodies_of, given)))
         num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
         if not found:
-            raise ValueError(f"bodies: expected at least one, got {bodies!r}")
+            raise ValueError(f"bodies: expected at least one, got {checks.shown(bodies)}")
         if len(found) > num_envs:
             raise ValueError(f"num_envs: expected at least one for each of {len(found)} bodies, got {num_envs}")
         for body in found:

@@ -61,7 +61,7 @@ class Algorithm(NamedTuple):
             kinds = (int, float) if kind is float else kind
             if not isinstance(value, kinds) or isinstance(value, bool) != (kind is bool):
                 raise ValueError(
-                    f"hyperparameter {name}: expected {kind.__name__} like {fields[name]!r}, got {value!r}"
+                    f"hyperparameter {name}: expected {kind.__name__} like {fields[name]!r}, got {checks.shown(value)}"
                 )
         return self._replace(hyperparameters=dataclasses.replace(self.hyperparameters, **changes))
 

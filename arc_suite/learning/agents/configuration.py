@@ -70,7 +70,7 @@ class Configuration:
         checks.integer("steps", steps, 1)
         checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
-            raise ValueError(f"prior: expected the id of a dataset, got {prior!r}")
+            raise ValueError(f"prior: expected the id of a dataset, got {checks.shown(prior)}")
         return cls(setup, algorithm, definition.hyperparameters, seed, steps, evaluate_every, prior)
 
     @property

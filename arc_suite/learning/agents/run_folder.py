@@ -192,6 +192,20 @@ def table(path: str | os.PathLike, name: str) -> dict[str, np.ndarray]:
         raise ValueError(f"{Path(path) / name}.csv: no table of a run: {checks.quoted(error)}") from None
 
 
+def check_evaluated(path: str | os.PathLike, step: int) -> None:
+    """Check the step of the latest evaluation that a checkpoint tells by the table of evaluations.
+
+    Raises:
+        ValueError: it is another one, so that evaluations would be left out.
+    """
+    steps = table(path, "evaluations").get("step", np.zeros(1))
+    if step != steps[-1]:
+        raise ValueError(
+            f"{Path(path) / CHECKPOINT} is damaged: evaluated: expected {steps[-1]:g}, as in evaluations.csv, "
+            f"got {checks.shown(step)}; delete it to start the run over"
+        )
+
+
 def is_begun(path: str | os.PathLike) -> bool:
     """Return whether the run of a folder has begun: it has a checkpoint, or a line in a table."""
     tables = [Path(path) / f"{name}.csv" for name in TABLES]

@@ -62,6 +62,7 @@ def train(
     growing = ("steps",) if definition.extends else ()
     with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
+        run_folder.check_evaluated(folder, state["evaluated"])
         own = {name: getattr(configuration, name) for name in ("setup", "seed", "steps", "evaluate_every", "prior")}
         context = RunContext(**own, folder=Path(folder), threads=threads, checkpoint=run_files.arrays)
         slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
