@@ -19,7 +19,8 @@ def of_setup(setup: Setup) -> dict[str, Any]:
 
 def policy_sha256(policy: str) -> str | None:
     """Return the hash of a policy's files; None for one without files, such as a demonstrator."""
-    return policies.digest(policy) if policies.is_file(policy) or policy.endswith(".npz") else None
+    has_files = policies.is_file(policy) or policy.endswith(".npz") or policies.function_file(policy) is not None
+    return policies.digest(policy) if has_files else None
 
 
 def training_seeds(policy: str, played: range) -> seed_ranges.Ranges | None:

@@ -147,8 +147,25 @@ def is_file(name: str) -> bool:
     return bool(zips.parts(name)) or (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
 
 
+def function_file(name: str) -> Path | None:
+    """Return the file of the function that a policy's name gives; None for other names, and where no file is."""
+    module, colon, _ = name.rpartition(":")
+    if not colon or name in POLICIES or zips.parts(name):
+        return None
+    if module.endswith(MODULE):
+        return Path(module)
+    try:
+        found = importlib.util.find_spec(module)
+    except (ImportError, ValueError):
+        return None
+    return Path(found.origin) if found and found.has_location else None
+
+
 def digest(name: str) -> str:
-    """Return the sha256 of the files of a policy: of a run, of all checkpoints, or of a zip and its statistics.
+    """Return the sha256 of the files of a policy.
+
+    They are those of a run, all checkpoints, a zip and its statistics, or the file of a function. What that file
+    imports or reads is not among them.
 
     Raises:
         ValueError: as `zips.statistics`.
@@ -156,6 +173,8 @@ def digest(name: str) -> str:
     """
     if zipped := zips.parts(name):
         held = filter(None, (zipped[0], zips.statistics(*zipped)))
+    elif (code := function_file(name)) is not None:
+        held = [code]
     else:
         held = _policy_files(Path(name))
     return hashlib.sha256(b"".join(file.read_bytes() for file in held)).hexdigest()

@@ -4,7 +4,8 @@
   arc-suite enter entry.json --policy ppo.zip --name my_ppo
 
 The 100 episodes are played again: versions, hashes and returns must be those of the file. The entry is copied into
-studies/entries, and studies/README.md is written anew. The file imports nothing: --task names a module that it needs.
+studies/entries, and studies/README.md is written anew. That proves that a result can be reproduced, and not how the
+policy was made. The file imports nothing: --task names a module that it needs.
 """
 
 from pathlib import Path
