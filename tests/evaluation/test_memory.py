@@ -8,11 +8,13 @@ import networks
 import numpy as np
 import programs
 import pytest
+from datasets import ID, SETTINGS, collect, edited
 from tqdm import tqdm
 
 from arc_suite import data, evaluation, policies, seed_ranges
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import provenance
+from arc_suite.learning.agents import priors
 from arc_suite.learning.agents.learner import MOST_SEEDS
 from arc_suite.policies import network
 
@@ -58,6 +60,17 @@ def test_a_replay_of_the_data_earns_on_evaluations_seeds_what_it_earns_on_others
         judged = earned(range(PLAYED))
         assert judged == pytest.approx(earned(range(50_000, 50_000 + PLAYED)), rel=0.1)
         assert judged < 0.95 * known
+
+
+@pytest.mark.parametrize("seed", [0, 9_999])
+def test_data_with_episodes_of_evaluation_are_no_prior_data(tmp_path, monkeypatch, seed):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    collect(ID, SETTINGS, 2)
+    assert priors.seeds(ID) == range(10_005, 10_007)
+    edited(tmp_path, lambda metadata: metadata["arc_suite"].update(seed=seed))
+    with pytest.raises(ValueError) as error:
+        priors.seeds(ID)
+    assert str(error.value) == f"prior {ID!r}: expected seeds from 10000 on, got {seed}; collect it anew"
 
 
 def test_every_seed_has_one_owner():
