@@ -88,7 +88,7 @@ def test_restricted_families_leave_out_what_tests_have():
     assert {len(leg.joints) for seed in range(20) for leg in families.few_links(seed).legs} == {2, 3}
     assert families.few_legs(7).name == "few_legs_7" and families.few_links(7).name == "few_links_7"
     for name, count in (("many_legs", {9, 10, 11, 12}), ("four_links", {4})):
-        bodies = [transfer.FAMILIES[name].made(index) for index in range(8)]
+        bodies = [transfer.FAMILIES[name][0](index) for index in range(8)]
         assert {len(body.legs) if name == "many_legs" else len(body.legs[0].joints) for body in bodies} == count
 
 
