@@ -115,7 +115,7 @@ def test_another_task_than_the_papers_has_no_expert(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967304"),
+        ([f"--seed={2**32 - 1}"], "seed: expected an integer from 0 to 4294967295, got 4294967394"),
         (["--json=/nowhere/a.json"], "cannot write /nowhere/a.json: no such file or directory"),
         (["--episodes=0"], "flag --episodes=0: expected an integer in the range [1, 100000]"),
         (["--episodes=1e20"], "flag --episodes=1e20: expected an integer in the range [1, 100000]"),

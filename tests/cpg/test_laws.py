@@ -108,9 +108,9 @@ def test_presets_walk_at_the_tasks_speed_and_frequency(settings, preset, speed, 
 
 
 def test_who_cannot_be_fitted_is_told_in_one_line():
-    still = arc_suite.load("tick", "steer", {"gait_frequency": 0.0})
+    still = arc_suite.load("tick", "steer", {"duty_factor": 1.0})
     message = (
-        "task steer: a demonstrator needs a gait_frequency above 0 and a duty_factor between 0 and 1, got 0 and 0.6"
+        "task steer: a demonstrator needs a gait_frequency above 0 and a duty_factor between 0 and 1, got 1.5 and 1"
     )
     for preset in ("steered", "medium"):
         with refused(message):

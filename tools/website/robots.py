@@ -37,7 +37,7 @@ def page(robot: str, player: str = "") -> str:
         "What `walk` prescribes.",
         _gait(task),
         "## Returns",
-        "Means and standard deviations over 100 episodes, by the [evaluation protocol](../results.md).",
+        "Means and standard deviations, by the [evaluation protocol](../results.md).",
         returns.demonstrators(robots=(robot,)),
         "What the paper publishes for `walk`, and the policy in the package:",
         returns.published(robot),

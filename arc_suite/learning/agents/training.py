@@ -56,7 +56,7 @@ def train(
     record, definition, setup = configuration.record(), configuration.definition, configuration.setup
     if configuration.prior is not None:  # the data under an id may change
         record[PRIOR_SHA256] = priors.digest(configuration.prior)
-    training_seeds = _training_seeds(configuration)
+    training_seeds = _training_seeds(configuration, Path(folder))
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(setup.definition.step_limit)
     growing = ("steps",) if definition.extends else ()
@@ -121,8 +121,16 @@ def _postfix(metrics: Mapping[str, float], state: Mapping[str, Any]) -> str:
     return ", ".join(f"{name} {value:.4g}" for name, value in shown.items())
 
 
-def _training_seeds(configuration: Configuration) -> seed_ranges.Ranges | None:
-    """Seeds of the episodes of a run, of its prior data, and of the policy that it starts from; None if unknown."""
+def _training_seeds(configuration: Configuration, folder: Path) -> seed_ranges.Ranges | None:
+    """Seeds of the episodes of a run, of its prior data, and of the policy that it starts from; None if unknown.
+
+    Those of a run that has begun are in its record: the policy may be gone by now.
+    """
+    if run_folder.is_begun(folder):
+        try:
+            return seed_ranges.from_json(run_folder.config_of(folder).get(TRAINING_SEEDS))
+        except (TypeError, ValueError):
+            raise ValueError(f"{folder}: {TRAINING_SEEDS}: expected pairs of seeds") from None
     found = [seed_ranges.of_run(configuration.seed)]
     if configuration.prior is not None:
         found.append(priors.seeds(configuration.prior))
