@@ -157,7 +157,7 @@ class TestRun:
         programs.refused(done, f"arc-suite {command[0]}: {line}")
 
     def test_evaluation_is_that_of_the_table(self, folder, tmp_path):
-        command = ["evaluate", "--robot=tick", "--set", "time_limit=2", f"--policy={folder}", "--episodes=10", "--json=a.json"]
+        command = ["evaluate", "--set", "time_limit=2", f"--policy={folder}", "--episodes=10", "--json=a.json"]
         assert run(*command, cwd=tmp_path).returncode == 0
         episodes = json.loads((tmp_path / "a.json").read_text())["robots"]["tick"]["episodes"]
         lines = (folder / "evaluations.csv").read_text().splitlines()[-10:]
