@@ -1,5 +1,6 @@
 """Untrained policies by name."""
 
+import hashlib
 import sys
 
 import numpy as np
@@ -7,7 +8,8 @@ import pytest
 from refusals import refused
 
 import arc_suite
-from arc_suite import registry
+from arc_suite import policies, registry
+from arc_suite.evaluation import provenance
 from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
@@ -142,3 +144,18 @@ def test_paths_that_lead_nowhere_are_named(own, tmp_path, monkeypatch, path, mes
     (tmp_path / "needs.py").write_text("import tortch")
     with refused(f"policy {path!r}: {message}"):
         policy(path, "tick")
+
+
+def test_hashes_of_functions(tmp_path, monkeypatch):
+    file = tmp_path / "standing.py"
+    file.write_text("def make(robot):\n    return lambda timestep: 0.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    expected = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert provenance.policy_sha256(f"{file}:make") == provenance.policy_sha256("standing:make") == expected
+    file.write_text("def make(robot):\n    return lambda timestep: 1.0\n")
+    assert provenance.policy_sha256("standing:make") != expected
+
+
+def test_others_have_none():
+    for name in ("zero", "cpg", "nowhere:make", "sys:exit"):
+        assert policies.function_file(name) is None and provenance.policy_sha256(name) is None

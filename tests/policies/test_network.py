@@ -233,3 +233,25 @@ def test_a_policy_of_torques_is_refused_where_positions_are_taken(saved):
     assert policies.policy(str(saved), "tick", task=arc_suite.load("tick", "walk").task.definition) is not None
     network.save(saved / "policy.npz", made()._replace(setup=Setup.of("tick", "walk", {"actions": "position"})))
     assert policies.policy(str(saved), "tick", task=task) is not None
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"blocks": {"posture": 10**13}},
+        {"blocks": {"posture": 10**30}},
+        {"nodes": [["tanh", "observations"]] * 10**5},
+        {"nodes": [["tanh", 10**9]]},
+        {"nodes": [["tanh"] + ["observations"] * 10**4]},
+        {"nodes": 3},
+        {"blocks": [1]},
+    ],
+)
+def test_headers_that_lie_are_one_line_at_once(tmp_path, changes):
+    header = {**Setup.of("tick").to_dict(), "blocks": {"posture": 4}, "nodes": [["tanh", "observations"]], **changes}
+    path = tmp_path / "policy.npz"
+    np.savez(path, policy=np.array(json.dumps(header)))
+    with pytest.raises(ValueError) as caught:
+        network.load(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: no policy, or a damaged one: ") and "\n" not in message and len(message) < 700
