@@ -16,6 +16,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
 
 import contextlib
 import functools
+import importlib.util
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -78,7 +79,7 @@ def main() -> int:
         limits = {"minutes": FLAGS.minutes, "threads": FLAGS.threads}
         with resumable(folder), termination() as terminated:
             finished = train(run, folder, **limits, progress=begun, on_metrics=on_metrics, stop=terminated)
-    if finished and not run.setup.several:
+    if finished and importlib.util.find_spec("onnx") and not run.setup.several:
         onnx_file.save(folder / "policy.onnx", network.load(folder))
     print(f"{folder}: {earned(run, folder) if finished else 'stopped; the same command resumes it'}")
     return TERMINATED if not finished and terminated() else 0

@@ -264,14 +264,14 @@ def test_policies_of_others_are_scored(tmp_path):
     (tmp_path / "theirs" / "notes.txt").write_text("")
     (tmp_path / "page.md").write_text("# Mine\n\n<!-- table -->\n<!-- end -->\n")
     done = run("samples", "--policies=theirs", "--page=page.md", cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert done.returncode == 0, done.stderr
     (found,) = benchmark.read(tmp_path / "studies")["samples", "theirs"]
     assert (found.robot, found.task, found.seed) == ("tick", "walk", 1)
     assert found.score == pytest.approx(scale().score(found.result)) and found.score > 0.9
     assert np.isnan(found.minutes) and found.gait_compliance > 0.95 and found.heading_error < 0.2
     page = (tmp_path / "page.md").read_text()
     assert page == f"# Mine\n\n<!-- table -->\n\n{benchmark.text(tmp_path / 'studies')}\n\n<!-- end -->\n"
-    assert row(page, "theirs")[4] == "-"
+    assert row(page, "theirs")[4:6] == ["tick walk 0.99", "-"]  # the lowest place, and minutes that nobody knows
 
 
 SHORT = """
@@ -284,7 +284,7 @@ program.run(benchmark.main, "benchmark", sys.argv[1:])
 """
 
 
-@pytest.mark.long
+@pytest.mark.release
 def test_a_track_is_run_and_resumed(tmp_path):
     """A division of 300 steps, by an algorithm that needs no JAX; the second command has nothing left to do."""
     environ = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), str(ROOT / "tests" / "fixtures")])}
@@ -295,7 +295,7 @@ def test_a_track_is_run_and_resumed(tmp_path):
         done = subprocess.run(
             [*command, "--seeds=1", "--jobs=1"], env=environ, cwd=tmp_path, capture_output=True, text=True
         )
-        assert (done.returncode, done.stderr) == (0, "")
+        assert done.returncode == 0, done.stderr
         return done.stdout
 
     printed = go()
