@@ -192,9 +192,9 @@ def caught_by(project: pathlib.Path, first: str = "") -> str | None:
         project: its folder.
         first: a folder of tests to try before all others.
     """
-    fast = ["-m", "not slow and not long"]
+    fast = ["-m", "not slow and not long and not release"]
     near = [[*fast, f"tests/{first}"]] if first and (project / "tests" / first).is_dir() else []
-    for selection in (*near, fast, ["-m", "slow and not long"], ["-m", "long"]):
+    for selection in (*near, fast, ["-m", "slow and not long and not release"], ["-m", "long and not release"]):
         command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "-p", "no:cacheprovider", *selection]
         environment = {**os.environ, "PYTHONPATH": str(project)}
         result = subprocess.run(command, cwd=project, env=environment, capture_output=True, text=True)
