@@ -18,7 +18,7 @@ from tqdm import tqdm
 ROOT = pathlib.Path(__file__).parents[1]
 
 
-# By mistake: a text that occurs once in the whole package, with «what is there→what is planted».
+# By mistake: a text that the package holds once, in which «right→wrong» marks the right code and the wrong code.
 MUTANTS = {
     # Bodies.
     "swapped leg": 'leg.«mirrored(→replace(name=»leg.name.replace("l", "r")) for leg in LEFT_LEGS)),\n'

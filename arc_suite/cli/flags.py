@@ -170,10 +170,14 @@ def only_body() -> Body:
         ValueError: as `bodies`, or several bodies.
         OSError: as `bodies`.
     """
-    body, *others = bodies(near=()).values()
+    return _only(bodies(near=()))
+
+
+def _only(found: dict[str, Any]) -> Any:
+    first, *others = found.values()
     if others:
         raise ValueError(f"--robot={FLAGS.robot}: expected one robot")
-    return body
+    return first
 
 
 def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[str, Setup]:
@@ -231,10 +235,7 @@ def only_setup() -> Setup:
         ValueError: as `setups`, or several bodies.
         OSError: as `setups`.
     """
-    found, *others = setups(near=()).values()
-    if others:
-        raise ValueError(f"--robot={FLAGS.robot}: expected one robot")
-    return found
+    return _only(setups(near=()))
 
 
 def task() -> tuple[str, dict[str, Any]]:

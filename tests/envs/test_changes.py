@@ -1,4 +1,4 @@
-"""Model fields and settings that change while environments run: one is a vector to the bit, and nothing is silent."""
+"""Model fields and settings change while environments run: one environment equals a vector, or raises an error."""
 
 import pickle
 

@@ -88,7 +88,7 @@ def test_a_damaged_file_is_one_line(tmp_path):
 @pytest.mark.parametrize("body", BODIES, ids=lambda body: body.name)
 @pytest.mark.parametrize("settings", [{}, {"actions": "position"}])
 def test_fitted_to_a_body_it_does_the_same(body, settings):
-    """To the bit where actions are positions; torques are float64 in `act` and float32 in a graph."""
+    """Actions are bit-equal where they are positions; torques are float64 in `act` and float32 in a graph."""
     setup = Setup.of(body, "steer", settings)
     environment = setup.make_vec(3, seed=0)
     policy, fitted = Universal(drawn(), setup.definition), universal.for_body(drawn(), setup)

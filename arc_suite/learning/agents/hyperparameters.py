@@ -220,7 +220,7 @@ class ProximalPolicy:
 
 
 def _check(hp, ranges: Mapping[str, tuple]) -> None:
-    """Check numbers by their ranges; others are integers from 1, or shares, of which 0 and 1 would learn nothing."""
+    """Check numbers by their ranges; the others are integers from 1, or shares between 0 and 1."""
     for field in dataclasses.fields(hp):
         name, value = field.name, getattr(hp, field.name)
         if field.type is int:
