@@ -197,7 +197,7 @@ def setup_of(name: str | os.PathLike) -> Setup | None:
     path = Path(name)
     if not path.exists():
         return None
-    return network.load(next(iter(network.checkpoint_files(path)), path)).setup
+    return network.load(_policy_files(path)[0]).setup
 
 
 def training_seeds(name: str) -> seed_ranges.Ranges | None:
