@@ -267,7 +267,11 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
 
 
 def _limit_of_make(caller: types.FrameType) -> int | None:
-    """The step limit that `gymnasium.make` was asked for, which it tells a wrapper and not the environment."""
+    """The step limit that `gymnasium.make` was asked for, from its frame.
+
+    `make` tells it to `TimeLimit` alone: the environment's own spec has None. Additional wrappers of the spec
+    would see it, but `make_vec` refuses specs that have both those and a vector entry point.
+    """
     if caller.f_code is not gymnasium.make.__code__:
         return None
     limit, spec = caller.f_locals.get("max_episode_steps"), caller.f_locals.get("env_spec")

@@ -68,8 +68,10 @@ def test_agents_save_what_they_were_trained_for(both):
 
 def test_calls_of_environments(both):
     envs, _ = both
-    envs.set_attr("note", 7)
-    assert envs.get_attr("note") == [7] * 3
+    envs.set_attr("metadata", {"render_fps": 7})
+    assert envs.get_attr("metadata") == [{"render_fps": 7}] * 3
+    with pytest.raises(AttributeError, match=r"^cannot set 'note': there is no such attribute; "):
+        envs.set_attr("note", 7)
     assert len(envs.env_method("render", indices=[0, 1, 2])) == 3
     for use in (lambda: envs.set_attr("note", 8, indices=0), lambda: envs.env_method("note", indices=[0])):
         with pytest.raises(ValueError, match=r"^note: environments share it; expected all 3, got "):
