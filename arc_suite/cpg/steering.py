@@ -15,9 +15,9 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.kinematics import flows, rises, weights
-from arc_suite.cpg.stride import lifted
 from arc_suite.models.sizing import sized
 from arc_suite.models.standing import standing
+from arc_suite.models.stride import lifted
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 

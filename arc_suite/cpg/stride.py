@@ -15,7 +15,7 @@ from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Clocked, Pattern, joint_targets, torques
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
-from arc_suite.robots.spec import Leg
+from arc_suite.models.stride import lifted, swept, target_ranges
 from arc_suite.tasks.contract import Task
 
 _LEAST_FROUDE = 1e-3
@@ -25,16 +25,6 @@ LIFT = 0.2  # of the standing height: how far a foot is lifted in mid-swing
 # A leg that cannot sweep, such as a radial one in front, would brake: it is held this share of the
 # standing height off the ground in stance too, and carries only when the others sink or tilt.
 UNLOAD = 0.1
-
-LARGEST_SWEEP = 0.5  # rad, of a joint to either side
-LARGEST_LIFT = 0.9  # rad
-_USED = 0.9  # share of a joint's range that targets may use
-
-# How much it matters that a foot moves as wanted along x, y and z. In stance it must not rise or
-# sink; if it slips sideways all of its friction points there and none of it brakes the body.
-_SWEEP_WEIGHTS = (1.0, 0.1, 4.0)
-_LIFT_WEIGHTS = (0.2, 0.2, 1.0)
-_DAMPING = 0.1  # of the leg's largest Jacobian entry
 
 ONSET = 1.0  # cycles over which the gait grows to its full size
 STEERING = 1.5  # share of the sweep per rad of yaw, for the outermost feet
@@ -85,8 +75,8 @@ class Stride(NamedTuple):
         counts = [len(leg.joints) for leg in body.legs]
         sweeps, lifts, raised = [], [], []
         for leg, jacobian in zip(body.legs, pose.jacobians, strict=True):
-            sweep = _sweep(leg, jacobian, reach)
-            low, high = _ranges(leg)
+            sweep = swept(leg, jacobian, reach)
+            low, high = target_ranges(leg)
             lift = lifted(jacobian, LIFT * pose.height, -low, high)
             able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
             sweeps.append(sweep)
@@ -131,48 +121,3 @@ class StrideLaw(Clocked):
     def __init__(self, task: Task, froude: float):
         """Fit a stride; see `Stride.fit`."""
         super().__init__(Stride.fit(task, froude))
-
-
-def _sweep(leg: Leg, jacobian, reach: float) -> np.ndarray:
-    """Return the joint angles (joints of the leg,) that bring a leg's foot forward by `reach`, and back if negated."""
-    low, high = _ranges(leg)
-    room = np.minimum(np.minimum(-low, high), LARGEST_SWEEP)
-    return _towards(jacobian, (reach, 0.0, 0.0), _SWEEP_WEIGHTS, room, room)
-
-
-def lifted(jacobian, height: float, below, above) -> np.ndarray:
-    """Return the joint angles (joints of the leg,) that lift a leg's foot by a height, m.
-
-    Args:
-        jacobian: (3, joints of the leg) of the foot.
-        height: m.
-        below: (joints of the leg,) room that targets have below the pose, rad.
-        above: the same above it.
-    """
-    below, above = np.minimum(below, LARGEST_LIFT), np.minimum(above, LARGEST_LIFT)
-    return _towards(jacobian, (0.0, 0.0, height), _LIFT_WEIGHTS, below, above)
-
-
-def _ranges(leg: Leg) -> np.ndarray:
-    """Return the lower and upper bounds (2, joints of the leg) of targets, rad."""
-    return _USED * np.radians([joint.range_deg for joint in leg.joints]).T
-
-
-def _towards(jacobian, displacement, weights, below, above) -> np.ndarray:
-    """Return the joint angles (joints,) that move a foot by a displacement, to first order and within bounds.
-
-    Damped least squares give the direction; along it, plain least squares give the length, which
-    the room `below` and `above` zero bounds.
-    """
-    wanted = np.array(weights) * displacement
-    weighted = np.diag(weights) @ jacobian
-    damping = _DAMPING * abs(jacobian).max()
-    square = weighted.T @ weighted + damping**2 * np.eye(jacobian.shape[1])
-    angles = np.linalg.solve(square, weighted.T @ wanted)
-    moved = weighted @ angles
-    angles *= moved @ wanted / max(moved @ moved, 1e-12 * (wanted @ wanted))
-    room = np.where(angles > 0.0, above, below)
-    stuck = (room <= 0.0) & (angles != 0.0)
-    if stuck.any():  # a knee that bends one way only must not hold the others up
-        return _towards(np.where(stuck, 0.0, jacobian), displacement, weights, below, above)
-    return angles * min(1.0, np.min(np.where(angles == 0.0, 1.0, room) / np.maximum(abs(angles), 1e-12)))

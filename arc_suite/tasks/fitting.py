@@ -5,19 +5,16 @@ sqrt(g / h) and lengths of h, the height at which the torso stands, so that bodi
 different size get the same task. The multiples lie among those of the published robots.
 """
 
-import functools
 import math
 
 import numpy as np
 
 from arc_suite.models.sizing import GRAVITY
-from arc_suite.models.standing import stability_margin, standing
-from arc_suite.robots import gaits
+from arc_suite.models.standing import standing
+from arc_suite.models.stride import GAIT_FREQUENCY, TARGET_FROUDE, fitted_gait
 from arc_suite.robots.spec import Body
 
-TARGET_FROUDE = 0.2  # published robots: 0.18 to 0.27
 BAND = 0.75  # of the target velocity; published: 0.6 to 1
-GAIT_FREQUENCY = 0.18  # of sqrt(g / h); published: 0.2 to 0.41, with feet that slip
 STANCE_HEIGHT = 0.04  # of h, by which a foot in stance may be off the ground
 HEALTHY_RANGE = (0.4, 1.8)  # of h; published: 0.3 to 0.44, and 1.6 to 2
 
@@ -28,10 +25,6 @@ LINEAR_VELOCITY_NOISE = 0.01  # of sqrt(g h); published: 0.007 to 0.05
 ANGULAR_VELOCITY_NOISE = 0.004  # of sqrt(g / h); published: 0.003 to 0.02
 JOINT_ANGLE_NOISE = 0.1  # rad, as published
 JOINT_VELOCITY_NOISE = 0.02  # of sqrt(g / h); published: 0.014 to 0.03
-
-# Duty factors to choose from: the smallest is the published one, and the fastest.
-_DUTY_FACTORS = (0.6, 0.65, 0.7, 0.75, 0.8)
-_STABLE = 0.05  # of h: static stability margin that is enough throughout a cycle
 
 
 def fitted_parameters(body: Body) -> dict:
@@ -80,36 +73,3 @@ def reach(body: Body) -> float:
     """Return R, the mean horizontal distance of the feet from the centre of mass in the standing pose, m."""
     pose = standing(body)
     return float(np.hypot(*(pose.soles - pose.centre)[:, :2].T).mean())
-
-
-@functools.lru_cache(maxsize=256)
-def fitted_gait(body: Body) -> gaits.Gait:
-    """The metachronal gait of least duty factor that is statically stable all through its cycle.
-
-    If none is, the one whose worst moment is the most stable.
-    """
-    enough, margins = _STABLE * body.torso.standing_height, {}
-    for duty_factor in _DUTY_FACTORS:
-        gait = gaits.metachronal(body, duty_factor)
-        margins[gait] = least_margin(body, gait)
-        if margins[gait] >= enough:
-            return gait
-    return max(margins, key=margins.get)
-
-
-def least_margin(body: Body, gait: gaits.Gait) -> float:
-    """Static stability margin (m) at the worst moment of a gait at the target velocity.
-
-    Feet on the ground pass from ahead of where they stand at rest to as far behind while the
-    torso moves over them; the centre of mass is taken to rest in the torso.
-    """
-    pose = standing(body)
-    ahead = 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * pose.height
-    margins = []
-    for time in np.arange(40) / 40.0:
-        cycle = (time + np.array(gait.offsets)) % 1.0
-        feet = cycle < gait.duty_factor
-        soles = pose.soles[feet, :2]
-        soles[:, 0] += ahead * (1.0 - 2.0 * cycle[feet] / gait.duty_factor)
-        margins.append(stability_margin(pose.centre, soles))
-    return min(margins)

@@ -12,9 +12,9 @@ import arc_suite
 from arc_suite import models, policies, registry, rotations
 from arc_suite.cpg import Demonstrator
 from arc_suite.models.standing import standing
+from arc_suite.models.stride import fitted_gait, least_margin
 from arc_suite.robots import ROBOTS, gaits, generator, spec_files
 from arc_suite.robots.spec_files import body_to_json, load_body
-from arc_suite.tasks.fitting import fitted_gait, least_margin
 from arc_suite.tasks.walk import Walk
 
 EXAMPLES = list(spec_files.EXAMPLES.values())
