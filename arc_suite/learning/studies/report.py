@@ -159,7 +159,8 @@ def _finals(groups: Groups, demonstrators) -> str:
         for name, totals in demonstrators.get(place, {}).items():
             own = f"{expert:.0f}" if name == "medium" and expert else "-"
             score = _score(totals, place, demonstrators)
-            lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own, "-"))
+            note = "".join(results.few_episodes(totals)) or "-"
+            lines.append((place, _policy(name), "-", "-", _mean(totals), score, "-", own, note))
     heads = ("robot, task", "algorithm", "steps", "seeds", "return", "score", "IQM [95 %]")
     return table((*heads, "paper, equal steps", "notes"), lines)
 

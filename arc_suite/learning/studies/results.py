@@ -58,7 +58,7 @@ class RunResult(NamedTuple):
     @property
     def notes(self) -> tuple[str, ...]:
         """What its final return must not be compared with others for."""
-        few = (TEN,) * (len(self.finals) < evaluation.EPISODES)
+        few = few_episodes(self.finals)
         if self.training_seeds is None:
             return (*few, provenance.UNKNOWN)
         return few + (SHARED,) * bool(common(self.training_seeds, EVALUATION))
@@ -128,6 +128,11 @@ def grouped(found: Sequence[RunResult]) -> Groups:
     for each in found:
         groups.setdefault(each.run.place, {}).setdefault(each.run.kind, []).append(each)
     return groups
+
+
+def few_episodes(returns: np.ndarray) -> tuple[str, ...]:
+    """Return the note of returns (episodes,) that are fewer than those of a final policy; none otherwise."""
+    return (TEN,) * (len(returns) < evaluation.EPISODES)
 
 
 def notes(seeds: Iterable[RunResult]) -> str:

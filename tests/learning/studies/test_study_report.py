@@ -50,7 +50,7 @@ def made(tmp_path):
     for each, (robot, name, seed) in zip(runs, keys, strict=True):
         start, style = 100.0 if name in claims.ONLINE else 300.0, {"sac": 0.5, "sope": 0.9}.get(name, 0.1)
         publish(tmp_path / "mine", each, constant(start, float(published.FINALS[robot][name]) + seed), style)
-    levels = {"zero": np.full(10, 1600.0), "medium": np.full(10, 2048.0), "refined": np.full(10, 3600.0)}
+    levels = {"zero": np.full(100, 1600.0), "medium": np.full(10, 2048.0), "refined": np.full(10, 3600.0)}
     anchors.write(tmp_path / "mine" / "demonstrators.csv", {"queen, walk": levels, "tick, walk": levels})
     return Study("as in the paper", runs), tmp_path / "mine"
 
@@ -77,7 +77,8 @@ def test_report(made):
     final = ["2", "3615.0 +- 0.5", "1.01", "3615.0 [3614.5, 3615.5]", "3610", "ten episodes"]
     assert cells(page, "tick, walk", "sope", "1,000,000")[3:] == final
     assert cells(page, "leaper, walk", "sope", "1,000,000")[5] == "-", "without anchors"
-    assert cells(page, "queen, walk", "demonstrator medium")[4:] == ["2048.0 +- 0.0", "0.22", "-", "2048", "-"]
+    medium = ["2048.0 +- 0.0", "0.22", "-", "2048", "ten episodes"]
+    assert cells(page, "queen, walk", "demonstrator medium")[4:] == medium
     assert cells(page, "queen, walk", "standing still")[4:] == ["1600.0 +- 0.0", "0.00", "-", "-", "-"]
     area = f"{np.mean([104.5, 2594.5, 104.5, 2595.5]):.1f}"
     assert cells(page, "tick, walk", "sac", "-", "-") == ["tick, walk", "sac", "-", "-", "-", "-", area]
