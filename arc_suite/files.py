@@ -78,6 +78,16 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+def write_text(path: str | os.PathLike, text: str) -> None:
+    """Write a file of text in UTF-8 as `writing` does.
+
+    Raises:
+        OSError: the target cannot be written.
+    """
+    with writing(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 @contextlib.contextmanager
 def reading(path: str | os.PathLike) -> Iterator[None]:
     """Read a file or folder, with errors of one wording: `with reading("a.md"): text = page.read_text()`.

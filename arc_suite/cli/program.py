@@ -133,8 +133,7 @@ def marked_page(flag: str, path: str) -> Callable[[str], None]:
         raise ValueError(f"--{flag}={path}: expected the lines <!-- table --> and <!-- end -->, got none")
 
     def write(table: str) -> None:
-        with files.writing(Path(path)) as temporary:
-            temporary.write_text(_MARKS.sub(lambda match: f"\n{table}\n\n", page), encoding="utf-8")
+        files.write_text(path, _MARKS.sub(lambda match: f"\n{table}\n\n", page))
 
     return write
 

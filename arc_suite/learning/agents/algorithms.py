@@ -10,8 +10,6 @@ from arc_suite.arenas import FLAT
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents.hyperparameters import BehaviourCloning, DAgger, ProximalPolicy, SoftActorCritic
 
-SOURCES = ("nothing", "prior data", "a demonstrator", "a policy")
-
 
 class Algorithm(NamedTuple):
     """An algorithm.
@@ -24,7 +22,7 @@ class Algorithm(NamedTuple):
         steps: environment steps of a run, by default.
         terrain_steps: the same in another arena than the flat one; None for as many.
         extends: whether a run can be extended to more steps, as no schedule depends on them.
-        source: what it learns from, other than its own steps: one of `SOURCES`.
+        source: what it learns from, other than its own steps: nothing, prior data, a demonstrator or a policy.
         several: whether it can learn with several bodies.
     """
 

@@ -47,8 +47,7 @@ def write(name: str, study: Study, published: Path) -> Path:
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
-    with files.writing(published / REPORT) as temporary:
-        temporary.write_text(_page(sections), encoding="utf-8")
+    files.write_text(published / REPORT, _page(sections))
     leaderboard.write(published.parent, published.name, _rows(published.name, groups, demonstrators))
     return published / REPORT
 
