@@ -230,4 +230,4 @@ def imported(path: str, kind: str, resolve: Callable[[str], Any] = pkgutil.resol
         return resolve(path)
     except (ImportError, ValueError, AttributeError) as error:
         near = hint(error.name, dir(error.obj)) if isinstance(error, AttributeError) else ""
-        raise ValueError(f"{kind} {path!r}: {error}{near}") from None
+        raise ValueError(f"{kind} {path[:80]!r}: {quoted(error)}{near}") from None

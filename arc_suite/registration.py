@@ -68,7 +68,7 @@ def register(
     for kind, table, new in added:
         for name, value in new.items():
             if name in table and (module is None or MODULES.get((kind, name)) != module) and table[name] is not value:
-                raise ValueError(f"{kind} {name!r} is already registered")
+                raise ValueError(f"{kind} {checks.shown(name)} is already registered")
     if body is None:
         if (parameters, presets, visuals) != (None, None, None):
             raise ValueError("parameters, presets and visuals belong to a body, and none is given")
@@ -85,7 +85,7 @@ def register(
 
 def _family_name(name) -> str:
     if not (isinstance(name, str) and name.isidentifier()):
-        raise ValueError(f"family {name!r}: expected a name of letters, digits and underscores")
+        raise ValueError(f"family {checks.shown(name)}: expected a name of letters, digits and underscores")
     return name
 
 
@@ -94,9 +94,10 @@ def _task_name(task) -> str:
     if not (isinstance(task, type) and issubclass(task, Task)):
         raise ValueError(f"tasks: expected classes by the contract of arc_suite.tasks.Task, got {checks.shown(task)}")
     if not (isinstance(name, str) and name.isidentifier()):
-        raise ValueError(f"task {name!r}: expected a name of letters, digits and underscores")
+        raise ValueError(f"task {checks.shown(name)}: expected a name of letters, digits and underscores")
     if missing := sorted(task.__abstractmethods__):
-        raise ValueError(f"task {name!r}: has no {' and no '.join(missing)}, which arc_suite.tasks.Task requires")
+        lacks = " and no ".join(missing)
+        raise ValueError(f"task {checks.shown(name)}: has no {lacks}, which arc_suite.tasks.Task requires")
     return name
 
 
@@ -131,7 +132,7 @@ def _check_presets(body: Body, walk: Mapping[str, Any], presets: Mapping[str, An
         try:
             law(task, preset)
         except ValueError as error:
-            raise ValueError(f"preset {name!r}: {error}") from None
+            raise ValueError(f"preset {checks.shown(name)}: {error}") from None
 
 
 def register_ids() -> None:

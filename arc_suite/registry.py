@@ -52,7 +52,7 @@ def body_of(robot, near: Iterable[str] = ()) -> Body:
     """
     body, *others = itertools.islice(_bodies(robot, near), 2)
     if others:
-        raise ValueError(f"robot {robot!r}: expected one body, got several")
+        raise ValueError(f"robot {checks.shown(robot)}: expected one body, got several")
     return body
 
 
@@ -185,7 +185,7 @@ def imported(kind: str, name: str) -> str:
     """
     module, colon, _ = name.rpartition(":")
     if colon and module not in sys.modules:
-        raise NotImported(f"{kind} {name[:80]!r}: files import nothing; import {module[:80]!r} first")
+        raise NotImported(f"{kind} {checks.shown(name)}: files import nothing; import {module[:80]!r} first")
     return name
 
 
@@ -204,11 +204,13 @@ def _find(name, table: Mapping, kind: str, near: Iterable[str] = ()):
     if isinstance(name, str) and ":" in name:
         module, _, name = name.rpartition(":")
         if not all(part.isidentifier() for part in module.split(".")):
-            raise ValueError(f"{kind} '{module}:{name}': expected module:name, with a module that can be imported")
+            given = checks.shown(f"{module}:{name}")
+            raise ValueError(f"{kind} {given}: expected module:name, with a module that can be imported")
         try:
             importlib.import_module(module)
         except ImportError as error:
-            raise ValueError(f"{kind} {name!r}: cannot import {module}: {error}") from None
+            cause = f"cannot import {module[:80]}: {checks.quoted(error)}"
+            raise ValueError(f"{kind} {name[:80]!r}: {cause}") from None
         if name in table and (kind, name) not in MODULES:
             raise ValueError(f"{kind} '{module}:{name}': {name} is the suite's own, expected without a module")
     return table[checks.name(name, table, kind, near)]

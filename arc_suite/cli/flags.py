@@ -7,7 +7,7 @@ from typing import Any
 
 from absl import flags
 
-from arc_suite import policies, registry
+from arc_suite import checks, policies, registry
 from arc_suite.envs.setup import Setup
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import zips
@@ -88,7 +88,8 @@ def policy_name(name: str) -> str:
     if FLAGS.vecnormalize is None:
         return name
     if zips.parts(name) is None:
-        raise ValueError(f"--vecnormalize={FLAGS.vecnormalize}: goes with a zip of stable-baselines3, got {name!r}")
+        given = f"--vecnormalize={checks.quoted(FLAGS.vecnormalize)}"
+        raise ValueError(f"{given}: goes with a zip of stable-baselines3, got {checks.shown(name)}")
     return zips.named(name, FLAGS.vecnormalize)
 
 
@@ -149,9 +150,9 @@ def bodies(near: Iterable[str] = ("all",)) -> dict[str, Body]:
     if body is None:
         return dict(ROBOTS) if robot.value == "all" else _named(robot.value, near)
     if robot.present:
-        raise ValueError(f"--robot={robot.value}: expected no robot with --spec or --legs")
+        raise ValueError(f"--robot={checks.quoted(robot.value)}: expected no robot with --spec or --legs")
     for flaw in flaws(body) if FLAGS.spec is not None or FLAGS.length else ():
-        warnings.warn(f"{FLAGS.spec or body.name}: {flaw.text}", stacklevel=2)
+        warnings.warn(f"{checks.quoted(FLAGS.spec or body.name)}: {flaw.text}", stacklevel=2)
     return {body.name: body}
 
 
@@ -159,7 +160,7 @@ def _named(robot: str, near: Iterable[str]) -> dict[str, Body]:
     found = registry.bodies_of(robot, near)
     named = {body.name: body for body in found}
     if len(named) < len(found):
-        raise ValueError(f"--robot={robot}: expected a name for each body, got two of one name")
+        raise ValueError(f"--robot={checks.quoted(robot)}: expected a name for each body, got two of one name")
     return named
 
 
@@ -176,7 +177,7 @@ def only_body() -> Body:
 def _only(found: dict[str, Any]) -> Any:
     first, *others = found.values()
     if others:
-        raise ValueError(f"--robot={FLAGS.robot}: expected one robot")
+        raise ValueError(f"--robot={checks.quoted(FLAGS.robot)}: expected one robot")
     return first
 
 
@@ -250,7 +251,8 @@ def task() -> tuple[str, dict[str, Any]]:
     settings = named_values("set", FLAGS["set"].value)
     if "random" in settings:
         raise ValueError(
-            f"--set random={settings['random']}: programs seed every episode; see --help for the flag of the first seed"
+            f"--set random={checks.quoted(settings['random'])}: programs seed every episode; "
+            "see --help for the flag of the first seed"
         )
     if "arena" in settings:
         registry.arena_maker(settings["arena"])
@@ -267,7 +269,7 @@ def named_values(flag: str, texts: Iterable[str]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = text.partition("=")
         if not (name and equals):
-            raise ValueError(f"--{flag} {text}: expected name=value")
+            raise ValueError(f"--{flag} {checks.quoted(text)}: expected name=value")
         try:
             found[name] = json.loads(value)
         except ValueError:

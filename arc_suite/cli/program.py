@@ -114,7 +114,7 @@ def run(main: Callable[..., int | None], name: str | None = None, arguments: Seq
             return print(VERSION)
         places = len(inspect.signature(main).parameters)
         if len(rest) > places:
-            raise ValueError(f"unexpected argument {rest[places]!r}; see --help")
+            raise ValueError(f"unexpected argument {checks.shown(rest[places])}; see --help")
         return main(*rest)
 
     guard(work, name or Path(script).name)
@@ -191,7 +191,7 @@ def _parsed(arguments: Sequence[str], module: ModuleType) -> list[str]:
         given = str(error).removesuffix(f": {error.__context__}")  # flag --NAME=VALUE
         parser = flags.FLAGS[given.removeprefix("flag --").partition("=")[0]].parser
         choices = getattr(parser, "enum_values", ("true", "false"))
-        raise ValueError(f"{given}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
+        raise ValueError(f"{checks.quoted(given)}: expected {parser.syntactic_help or ' or '.join(choices)}") from None
 
 
 def _flags(module: ModuleType) -> Iterator[flags.Flag]:

@@ -9,19 +9,22 @@ from minari.storage import get_dataset_path
 from arc_suite import checks
 
 _VERSIONED = re.compile(r"-v\d+$")
+_LONGEST = 1000  # characters; Minari's time to parse an id grows with the square of its length
 
 
 def check(dataset_id: str) -> str:
     """Return the id if Minari admits it, and it does not lie within another dataset.
 
     Raises:
-        ValueError: it is no such id, or the version is missing.
+        ValueError: it is no such id, too long, or the version is missing.
     """
+    if isinstance(dataset_id, str) and len(dataset_id) > _LONGEST:
+        raise ValueError(f"dataset id {checks.shown(dataset_id)}: expected at most {_LONGEST} characters")
     if not _valid(dataset_id):
-        example = next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0")))
+        example = checks.shown(next(filter(_valid, (f"{dataset_id}-v0", "arc_suite/queen/walk/cpg-medium-v0"))))
         raise ValueError(
-            f"dataset id {dataset_id!r}: expected names of letters, digits, '-' and '_' with '/' between, two "
-            f"characters at least before the last '/', and a version at the end alone, such as {example!r}"
+            f"dataset id {checks.shown(dataset_id)}: expected names of letters, digits, '-' and '_' with '/' between, "
+            f"two characters at least before the last '/', and a version at the end alone, such as {example}"
         )
     return dataset_id
 
@@ -61,9 +64,9 @@ def find(dataset_id: str) -> Path:
     """
     if not folder(dataset_id).joinpath("data").is_dir():
         if parts(dataset_id).is_dir():
-            raise ValueError(f"dataset {dataset_id!r} is unfinished: collect it again to continue it")
+            raise ValueError(f"dataset {checks.shown(dataset_id)} is unfinished: collect it again to continue it")
         there = existing()
         if not there:
-            raise ValueError(f"unknown dataset {dataset_id!r}: there are none in {get_dataset_path()}")
+            raise ValueError(f"unknown dataset {checks.shown(dataset_id)}: there are none in {get_dataset_path()}")
         checks.name(dataset_id, there, "dataset")
     return folder(dataset_id)

@@ -28,7 +28,8 @@ class KnownAttributes:
     def _check_known(self, name: str) -> None:
         if name not in self.__dict__ and not hasattr(type(self), name) and type(self).__module__ == self._made:
             raise AttributeError(
-                f"cannot set {name!r}: there is no such attribute; change_settings of the environment changes settings"
+                f"cannot set {checks.shown(name)}: there is no such attribute; "
+                "change_settings of the environment changes settings"
             )
 
 
@@ -131,7 +132,7 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
         ValueError: the task has no such command, or the value has another size or is out of range.
     """
     if not task.commands:
-        raise ValueError(f"command {name!r}: task {task.name} has no commands")
+        raise ValueError(f"command {checks.shown(name)}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     numbers = np.full(size, np.nan) if value is None else _real(value)
     if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():

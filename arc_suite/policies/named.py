@@ -144,7 +144,12 @@ def is_file(name: str) -> bool:
     """Return whether a policy's name is that of a folder of a run or of checkpoints that is there, or of a zip."""
     if name in POLICIES:
         return False
-    return bool(zips.parts(name)) or (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
+    if zips.parts(name):
+        return True
+    try:
+        return (Path(name) / network.FILE).is_file() or bool(network.checkpoint_files(Path(name)))
+    except OSError:  # no path: the text is too long
+        return False
 
 
 def function_file(name: str) -> Path | None:
@@ -293,10 +298,10 @@ def _from_path(path: str, body: Body, num_envs: int) -> Policy:
     resolve = _in_file if path.rpartition(":")[0].endswith(MODULE) else pkgutil.resolve_name
     factory = checks.imported(path, "policy", resolve)
     if not callable(factory):
-        raise ValueError(f"policy {path!r}: expected a function that makes a policy from a robot's name")
+        raise ValueError(f"policy {checks.shown(path)}: expected a function that makes a policy from a robot's name")
     make = _checked(path, factory, body.name if is_robot(body) else body)
     make()  # finds out at once whether it makes one
-    return Individuals(make, num_envs, len(body.joint_names), f"policy {path!r}")
+    return Individuals(make, num_envs, len(body.joint_names), f"policy {checks.shown(path)}")
 
 
 def _in_file(path: str) -> Any:
@@ -314,7 +319,7 @@ def _checked(path: str, factory: Callable, robot: str | Body) -> Callable[[], Ca
         made = factory(robot)
         if not callable(made):
             kind = type(made).__name__
-            raise ValueError(f"policy {path!r}: expected it to return a function of a TimeStep, got {kind}")
+            raise ValueError(f"policy {checks.shown(path)}: expected it to return a function of a TimeStep, got {kind}")
         return made
 
     return make

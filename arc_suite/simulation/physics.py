@@ -10,6 +10,7 @@ import numpy as np
 from dm_control import mujoco as dm_mujoco
 from dm_control.mujoco import wrapper
 
+from arc_suite import checks
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
@@ -104,7 +105,7 @@ class Physics(dm_mujoco.Physics):
         time = data.time
         self._warnings.fill(0)
         if nstep < 1:
-            raise ValueError(f"nstep: expected an integer from 1, got {nstep!r}")
+            raise ValueError(f"nstep: expected an integer from 1, got {checks.shown(nstep)}")
         with timers.off:
             if nstep > 1 and not self._shared:  # whose options another thread may be using
                 flags = option.disableflags

@@ -66,7 +66,8 @@ def _refuse(terms: Mapping, weights: Mapping) -> None:
     for name in weights:
         checks.name(name, terms, "weight")
     without = next(name for name in terms if name not in weights)
-    raise ValueError(f"term {without!r} has no weight{checks.hint(without, weights)} (there are: {', '.join(weights)})")
+    near = checks.hint(without, weights)
+    raise ValueError(f"term {checks.shown(without)} has no weight{near} (there are: {', '.join(weights)})")
 
 
 def _limited(terms: Mapping, weights: Mapping, limit) -> dict:

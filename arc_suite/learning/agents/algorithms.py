@@ -188,6 +188,6 @@ def algorithm(name: str) -> Algorithm:
     if isinstance(name, str) and ":" in name:
         found = checks.imported(name, "algorithm")
         if not isinstance(found, Algorithm):
-            raise ValueError(f"algorithm {name!r}: expected an Algorithm, got {type(found).__name__}")
+            raise ValueError(f"algorithm {checks.shown(name)}: expected an Algorithm, got {type(found).__name__}")
         return found
     return ALGORITHMS[checks.name(name, ALGORITHMS, "algorithm")]

@@ -87,12 +87,12 @@ class SoftActorCritic:
         if not whole or whole != round(whole):
             raise ValueError(
                 f"utd_ratio: expected a whole number of updates when {self.num_envs} environments step, of each if "
-                f"it is above 1, got {self.utd_ratio!r}"
+                f"it is above 1, got {checks.shown(self.utd_ratio)}"
             )
         checks.name(self.prior, ("none", "protected", "symmetric_sampling"), "prior")
         checks.name(self.early_stop, ("none", "published", "sign_safe"), "early_stop")
         if not all(isinstance(name, str) for name in self.exclude_blocks):
-            raise ValueError(f"exclude_blocks: expected names of blocks, got {self.exclude_blocks!r}")
+            raise ValueError(f"exclude_blocks: expected names of blocks, got {checks.shown(self.exclude_blocks)}")
         if self.buffer_size <= self.start_steps and self.prior != "protected":  # prior data in the same buffer count
             raise ValueError(
                 f"buffer_size: expected more than start_steps, {self.start_steps}, after which the policy acts, "
@@ -228,4 +228,4 @@ def _check(hp, ranges: Mapping[str, tuple]) -> None:
         elif field.type is float:
             checks.number(name, value, *ranges.get(name, ()))
             if name not in ranges and not 0.0 < value < 1.0:
-                raise ValueError(f"{name}: expected a number between 0 and 1, got {value!r}")
+                raise ValueError(f"{name}: expected a number between 0 and 1, got {checks.shown(value)}")

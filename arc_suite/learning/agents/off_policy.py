@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.learning.agents import learner, networks, priors
 from arc_suite.learning.agents import soft_actor_critic as sac
 from arc_suite.learning.agents.hyperparameters import SoftActorCritic
@@ -67,7 +68,7 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
     """
     if (context.prior is None) != (hp.prior == "none"):
         expected = "no prior data" if hp.prior == "none" else "prior data, the id of a dataset"
-        raise ValueError(f"prior: the algorithm takes {expected}, got {context.prior!r}")
+        raise ValueError(f"prior: the algorithm takes {expected}, got {checks.shown(context.prior)}")
     seed, core, environment = context.seed, sac.core(hp), context.environment(hp.num_envs)
     task, joints = environment.task.definition, environment.single_action_space.shape[0]
     inputs = Inputs.of(task, hp.exclude_blocks, hp.normalize, hp.symmetry_augmentation)

@@ -33,7 +33,8 @@ def seeds(prior: str) -> range:
     found = _opened(prior).seeds
     if seed_ranges.common([found], seed_ranges.EVALUATION):
         least = seed_ranges.COLLECTING.start
-        raise ValueError(f"prior {prior!r}: expected seeds from {least} on, got {found.start}; collect it anew")
+        expected = f"expected seeds from {least} on, got {found.start}"
+        raise ValueError(f"prior {checks.shown(prior)}: {expected}; collect it anew")
     return found
 
 
@@ -47,18 +48,18 @@ def mapped(context: RunContext, task: Task) -> Replay:
     dataset = _opened(context.prior)
     found, setup = dataset.settings.setup, context.setup
     if found.body != setup.body:
-        raise ValueError(f"prior {context.prior!r}: of {found.body.name}, and not of {setup.body.name}")
+        raise ValueError(f"prior {checks.shown(context.prior)}: of {found.body.name}, and not of {setup.body.name}")
     if found != setup:
-        raise ValueError(f"prior {context.prior!r}: of {found}, and not of {setup}")
+        raise ValueError(f"prior {checks.shown(context.prior)}: of {found}, and not of {setup}")
     version = dataset.metadata["arc_suite"].get("task_version")
     if version != setup.kind.version:  # of other dynamics, rewards or observations
         there, here = checks.quoted(version), f"{setup.kind.version} is installed"
-        raise ValueError(f"prior {context.prior!r}: of version {there} of {setup.kind.name}; {here}")
+        raise ValueError(f"prior {checks.shown(context.prior)}: of version {there} of {setup.kind.name}; {here}")
     summaries = dataset.summaries()
     size, joints = task.size, len(setup.body.joint_names)
     count = sum(summary["length"] for summary in summaries)
     if not count:
-        raise ValueError(f"prior {context.prior!r}: holds no episode")
+        raise ValueError(f"prior {checks.shown(context.prior)}: holds no episode")
     folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}")
     with files.locked(folder / ".lock"):
         if not (folder / _COUNT).exists():
@@ -77,7 +78,8 @@ def mapped(context: RunContext, task: Task) -> Replay:
         replay.restore(*(checks.integer(name, known[name], 0) for name in ("total", "ends", "checksum")))
         return replay
     except (Damaged, ValueError, KeyError, TypeError) as error:
-        raise ValueError(f"prior {context.prior!r}: {folder} is damaged: {checks.quoted(error)}; delete it") from None
+        damage = f"{folder} is damaged: {checks.quoted(error)}"
+        raise ValueError(f"prior {checks.shown(context.prior)}: {damage}; delete it") from None
 
 
 def _opened(prior: str):

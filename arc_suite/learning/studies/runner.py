@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from arc_suite import data, files
+from arc_suite import checks, data, files
 from arc_suite.learning.agents import run_folder
 from arc_suite.learning.agents.configuration import OF_DATA
 from arc_suite.learning.studies.tables import Run
@@ -69,7 +69,7 @@ def prepare(runs: Sequence[Run], folder: Path, threads: int, progress: Callable 
         settings = run.prior.settings(run.configuration.setup)
         data.collect(dataset, settings, episodes, threads=threads, progress=progress, wait=True)  # others may, too
         if (found := len(data.open(dataset))) != episodes:
-            what = f"dataset {dataset!r} has {found} episodes, and the study takes {episodes}"
+            what = f"dataset {checks.shown(dataset)} has {found} episodes, and the study takes {episodes}"
             raise ValueError(f"{run.name}: {what}; delete it, to have it collected anew")
     return waiting
 

@@ -289,8 +289,8 @@ def study(name: str) -> Study:
         return benchmark(division, algorithm)
     found = checks.imported(name, "study") if ":" in name else STUDIES[checks.name(name, STUDIES, "study")]
     if not isinstance(found, Study):
-        raise ValueError(f"study {name!r}: expected a Study, got {type(found).__name__}")
+        raise ValueError(f"study {checks.shown(name)}: expected a Study, got {type(found).__name__}")
     for each, count in collections.Counter(each.name for each in found.runs).items():
         if count > 1:
-            raise ValueError(f"study {name!r}: {count} runs are named {each}; a label tells them apart")
+            raise ValueError(f"study {checks.shown(name)}: {count} runs are named {each}; a label tells them apart")
     return found
