@@ -2,10 +2,9 @@
 
 import json
 
-import legs
 import numpy as np
 import pytest
-from networks import made
+from networks import made, of_many_bodies
 
 import arc_suite
 from arc_suite import policies
@@ -88,7 +87,7 @@ def test_metadata_tell_what_a_game_needs(tmp_path):
 def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
     """In an episode that the policy itself plays."""
     setup = Setup.of(body, task, settings | {"time_limit": 1.0})
-    network = legs.network()
+    network = of_many_bodies()
     run, environment, greatest = exported(universal.for_body(network, setup), tmp_path), setup.load(), 0.0
     policy = Universal(network, environment.task.definition)
     timestep = environment.reset(0)
@@ -106,5 +105,5 @@ def test_a_policy_of_many_bodies_for_one_body(tmp_path, body, task, settings):
 
 def test_a_policy_of_many_bodies_needs_one_of_them(tmp_path):
     with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; see universal.for_body$"):
-        onnx_file.save(tmp_path / "policy.onnx", legs.network())
+        onnx_file.save(tmp_path / "policy.onnx", of_many_bodies())
     assert not list(tmp_path.iterdir())

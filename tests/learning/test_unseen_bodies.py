@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from legs import network as drawn
+from networks import of_many_bodies as drawn
 
 from arc_suite.learning import transfer
 from arc_suite.learning.transfer import Comparison, Judged

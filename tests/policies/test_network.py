@@ -4,10 +4,9 @@ import json
 import os
 import zipfile
 
-import legs
 import numpy as np
 import pytest
-from networks import drawn, made
+from networks import drawn, made, of_many_bodies
 
 import arc_suite
 from arc_suite import evaluation, policies
@@ -102,7 +101,7 @@ def test_an_environment_does_the_same_alone(num_envs):
     assert np.array_equal(policy.actions(observations), alone)
 
 
-@pytest.mark.parametrize("make", [made, legs.network], ids=["one body", "many bodies"])
+@pytest.mark.parametrize("make", [made, of_many_bodies], ids=["one body", "many bodies"])
 def test_comes_back_from_a_file_to_the_bit(tmp_path, make):
     network.save(tmp_path / "policy.npz", policy := make())
     again = network.load(tmp_path / "policy.npz")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from legs import network as drawn
+from networks import of_many_bodies as drawn
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite import evaluation, policies

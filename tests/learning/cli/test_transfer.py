@@ -4,7 +4,7 @@ import csv
 
 import programs
 import pytest
-from legs import network as drawn
+from networks import of_many_bodies as drawn
 
 from arc_suite.policies import network
 

@@ -1,0 +1,102 @@
+"""Programs that are killed or asked to end: the same command goes on, and ends as if nothing had happened."""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+
+import kills
+import numpy as np
+import pytest
+
+from arc_suite.cli import program
+from arc_suite.learning.studies import csv_files, results
+
+FIXTURES = pathlib.Path(__file__).parents[1] / "fixtures"
+
+# By program: the flags, and the least number of changes of files.
+COMMANDS = {
+    "train": (
+        ("--robot=tick", "--algorithm=tiny_studies:CLIMB", "--steps=200", "--set=time_limit=0.5", "--output=run"),
+        20,
+    ),
+    "design": (
+        ("--around=tick", "--goal=speed", "--bodies=40", "--steps=10", "--nopages", "--processes=1", "-oa"),
+        10,
+    ),
+    "study": (("tiny_studies:PAIR", "--jobs=2"), 10),
+    "benchmark": (("samples", "--algorithm=tiny_studies:CLIMB", "--places=tick-walk", "--seeds=1"), 10),
+}
+
+
+def contents(folder):
+    """What must not depend on kills, by path: rows of tables without times, arrays without versions, other bytes."""
+    found = {}
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        name = path.relative_to(folder)
+        if path.suffix == ".csv" and path.name != "times.csv":
+            for number, row in enumerate(csv_files.read(path)):
+                found[f"{name}/{number}"] = {key: cell for key, cell in row.items() if key not in results.TIMES}
+        elif path.suffix == ".npz":
+            with np.load(path) as arrays:
+                found |= {f"{name}/{key}": arrays[key].tobytes() for key in arrays.files if key != "progress"}
+        elif path.suffix in (".json", ".jsonl"):
+            found[str(name)] = path.read_bytes()
+        else:
+            found[str(name)] = None
+    return found
+
+
+@pytest.mark.release
+@pytest.mark.parametrize("command", COMMANDS)
+def test_killed_at_any_change_of_files_the_same_command_completes_it(command, tmp_path):
+    flags, least = COMMANDS[command]
+    kills.whole((command, *flags), tmp_path / "whole")
+    expected = contents(tmp_path / "whole")
+
+    def check():
+        found = contents(tmp_path / "killed")
+        assert found.keys() == expected.keys()
+        assert [path for path in found if found[path] != expected[path]] == []
+
+    assert kills.resumed((command, *flags), tmp_path / "killed", check) >= least
+
+
+def test_sigterm_is_one_line_and_143(capsys):
+    before = signal.getsignal(signal.SIGTERM)
+
+    def work():
+        with program.resumable("runs/here"):
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    with pytest.raises(SystemExit) as ended:
+        program.guard(work, "arc-suite study")
+    assert ended.value.code == 143
+    assert capsys.readouterr().err == "arc-suite study: interrupted; the same command resumes runs/here\n"
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_sigterm_can_be_asked_for():
+    with program.termination() as came:
+        assert not came()
+        os.kill(os.getpid(), signal.SIGTERM)
+        assert came()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="has no SIGTERM to catch")
+def test_training_that_is_asked_to_end_leaves_a_checkpoint(tmp_path):
+    """Clusters send SIGTERM before they take a machine away."""
+    flags = ["--robot=tick", "--algorithm=tiny_studies:CLIMB", "--steps=100000", "--output=run"]
+    command, environ = [sys.executable, "-m", "arc_suite", "train", *flags], os.environ | {"PYTHONPATH": str(FIXTURES)}
+    with subprocess.Popen(
+        command, cwd=tmp_path, env=environ, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout.readline().startswith("run: ")
+        while not (tmp_path / "run" / "training.csv").exists():
+            assert process.poll() is None
+        process.send_signal(signal.SIGTERM)
+        output, _ = process.communicate(timeout=120)
+    assert (process.returncode, output.splitlines()[-1]) == (143, "run: stopped; the same command resumes it")
+    assert (tmp_path / "run" / "checkpoint.npz").exists()
