@@ -12,7 +12,7 @@ from datasets import ID, QUEEN, SETTINGS, SHORT, SPIDER, TICK, collect, digests,
 from refusals import refused
 from tiers import never, tiers
 
-from arc_suite import data, evaluation, policies
+from arc_suite import data
 from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
 
@@ -123,25 +123,6 @@ def test_normalised_scores_run_from_the_zero_policy_to_the_gaits_best():
     # Other episodes than those of evaluation, whose mean is the zero of scores.
     assert minari.get_normalized_score(dataset, np.mean(totals)) == pytest.approx(0.0, abs=0.02)
     assert minari.get_normalized_score(dataset, 4.0 * 30) == 1.0
-
-
-class Rounded:
-    """A policy whose actions are rounded as those of datasets."""
-
-    def __init__(self, policy):
-        self.policy = policy
-        self.reset = policy.reset
-
-    def act(self, observation, rewards):
-        return self.policy.act(observation, rewards).astype(np.float32)
-
-
-def test_an_episode_is_what_the_single_environment_plays():
-    collect(ID, data.DatasetSettings(TICK, "random", (), **SHORT), 2)
-    for episode in data.open(ID):
-        random = Rounded(policies.policy("random", "tick"))
-        steps = evaluation.rollout(TICK.load(), random, episode.seed, max_steps=20)
-        np.testing.assert_array_equal(episode.rewards, [timestep.reward for timestep in steps][1:])
 
 
 COLLECTED = {

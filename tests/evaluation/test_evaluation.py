@@ -81,9 +81,3 @@ def test_episodes_that_need_not_end_are_one_line():
         evaluation.episodes_in_batch(endless, zero, range(2))
     with contextlib.closing(setup.make_vec(2, max_episode_steps=3, autoreset_mode="Disabled")) as cut:
         assert [episode.length for episode in evaluation.episodes_in_batch(cut, zero, range(2))] == [3, 3]
-
-
-def test_rollouts_stop_early():
-    environment = arc_suite.load("tick", "walk")
-    steps = list(evaluation.rollout(environment, Demonstrator("tick"), seed=0, max_steps=3))
-    assert [step.first() for step in steps] == [True, False, False, False]

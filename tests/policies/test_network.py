@@ -30,7 +30,7 @@ DAMAGED = r"policy\.npz: no policy, or a damaged one: "
 def assert_refused(path, line):
     with pytest.raises(ValueError, match=line) as error:
         policies.policy(str(path), "tick")
-    assert "\n" not in str(error.value)
+    assert "\n" not in str(error.value) and len(str(error.value)) < 700
 
 
 def rewritten(saved, name, change):
@@ -184,6 +184,9 @@ def test_damaged_files(saved, kept):
         ({"layers": ["relu"]}, r"npz: .* holds layers, as policies did before they were graphs: train it again$"),
         ({"blocks": {"posture": 3}}, "a damaged one: node 0, Sub: "),
         ({"blocks": 3}, "blocks: expected a mapping"),
+        ({"blocks": [1]}, "blocks: expected a mapping"),
+        ({"blocks": {"posture": 10**13}}, "a damaged one: "),
+        ({"blocks": {"posture": 10**30}}, "a damaged one: "),
         ({"robot": None}, "expected robot to be a str"),
         ({"task": "a:stroll"}, r"npz: task 'a:stroll': files import nothing; import 'a' first$"),
     ],
@@ -232,25 +235,3 @@ def test_a_policy_of_torques_is_refused_where_positions_are_taken(saved):
     assert policies.policy(str(saved), "tick", task=arc_suite.load("tick", "walk").task.definition) is not None
     network.save(saved / "policy.npz", made()._replace(setup=Setup.of("tick", "walk", {"actions": "position"})))
     assert policies.policy(str(saved), "tick", task=task) is not None
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"blocks": {"posture": 10**13}},
-        {"blocks": {"posture": 10**30}},
-        {"nodes": [["tanh", "observations"]] * 10**5},
-        {"nodes": [["tanh", 10**9]]},
-        {"nodes": [["tanh"] + ["observations"] * 10**4]},
-        {"nodes": 3},
-        {"blocks": [1]},
-    ],
-)
-def test_headers_that_lie_are_one_line_at_once(tmp_path, changes):
-    header = {**Setup.of("tick").to_dict(), "blocks": {"posture": 4}, "nodes": [["tanh", "observations"]], **changes}
-    path = tmp_path / "policy.npz"
-    np.savez(path, policy=np.array(json.dumps(header)))
-    with pytest.raises(ValueError) as caught:
-        network.load(path)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: no policy, or a damaged one: ") and "\n" not in message and len(message) < 700

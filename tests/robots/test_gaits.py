@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
@@ -21,14 +22,8 @@ def test_metachronal_waves_run_from_the_rear_to_the_front():
     assert gait.duty_factor == pytest.approx(5.0 / 6.0)
     cycles = (np.arange(6) + 0.5) / 6.0 + gait.duty_factor  # l3 takes off at 5/6 of its cycle
     swinging = [np.flatnonzero(~stance(gait, cycle)) for cycle in cycles]
-    assert [[HEXAPOD.legs[i].name for i in feet] for feet in swinging] == [
-        ["l3"],
-        ["l2"],
-        ["l1"],
-        ["r3"],
-        ["r2"],
-        ["r1"],
-    ]
+    names = ["".join(HEXAPOD.legs[i].name for i in feet) for feet in swinging]
+    assert names == ["l3", "l2", "l1", "r3", "r2", "r1"]
 
 
 def test_the_rule_gives_a_tripod_at_half_and_a_tetrapod_at_two_thirds():
@@ -76,10 +71,9 @@ def test_gaits_that_fit_can_be_asked_for(body, fit):
             assert len(gait.offsets) == len(body.legs)
             assert all(0.0 <= offset < 1.0 for offset in gait.offsets)
         else:
-            with pytest.raises(ValueError) as error:
-                gaits.gait(body, name)
             legs = f"{body.name} with its {len(body.legs)} legs"
-            assert str(error.value) == f"gait {name!r} does not fit {legs} (fit: {', '.join(fit)})"
+            with refused(f"gait {name!r} does not fit {legs} (fit: {', '.join(fit)})"):
+                gaits.gait(body, name)
 
 
 def test_an_unknown_gait_is_named():

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import arc_suite
 from arc_suite.arenas import terrain
@@ -84,9 +85,8 @@ def assert_finite(task, settings):
     ],
 )
 def test_settings_out_of_bounds(task, settings, message):
-    with pytest.raises(ValueError) as caught:
+    with refused(message):
         arc_suite.load("tick", task, settings)
-    assert str(caught.value) == message
 
 
 def test_walk_goes_backward():

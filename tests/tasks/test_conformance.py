@@ -13,7 +13,7 @@ from dm_env.test_utils import EnvironmentTestMixin
 from episodes import assert_same_steps, begun, flat, load, random_actions
 from numpy.testing import assert_array_equal
 from refusals import refused
-from tiers import never, tiers, turns
+from tiers import tiers, turns
 
 import arc_suite
 from arc_suite.robots import ROBOTS
@@ -141,23 +141,3 @@ def test_bad_action_is_refused_and_changes_nothing(domain, task):
         with refused(message):
             one.step(bad)
     assert_same_steps(one, two, random_actions(one, 3, seed=1))
-
-
-# Without kicks, which push over who stands still.
-CALM = [pair for pair in arc_suite.ALL_TASKS if "kicks" not in TASKS[pair[1]].modifiers]
-
-
-@pytest.mark.parametrize(
-    ("domain", "task"),
-    tiers(CALM, never, lambda domain, task: domain == "tick" and task in ("walk", "stairs", "navigate")),
-)
-def test_episode_is_1000_steps_of_50_ms(domain, task):
-    unhurt = {"healthy_range": (-10.0, 10.0)} if task == "walk" else {}
-    environment = load(domain, task, **unhurt)
-    timestep, length = environment.reset(), 0
-    action = np.zeros(JOINTS[domain])
-    while not timestep.last():
-        timestep = environment.step(action)
-        length += 1
-    assert length == 1000
-    assert environment.control_timestep() == 0.05

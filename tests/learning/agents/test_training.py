@@ -1,10 +1,12 @@
 """Training: a tiny run of every algorithm, interrupted anywhere and resumed bit-exactly, and errors of one line."""
 
+import functools
 import json
 
 import numpy as np
 import pytest
 from tiers import tiers
+from tqdm import tqdm
 
 pytest.importorskip("jax", reason="of the extra learn: make check-agents")
 
@@ -24,11 +26,7 @@ NAMES = [name for name, each in algorithms.ALGORITHMS.items() if isinstance(each
 STEPS, EVERY = 250, 100
 
 
-def silent(*arguments, **keywords):
-    """A progress bar that shows nothing."""
-    from tqdm import tqdm
-
-    return tqdm(*arguments, **keywords, disable=True)
+silent = functools.partial(tqdm, disable=True)
 
 
 @pytest.fixture
@@ -174,13 +172,6 @@ def test_a_run_with_a_schedule_is_not_extended(tmp_path):
                 train(run, tmp_path / "run", progress=silent)
 
 
-def test_a_run_that_the_learner_refuses_leaves_no_folder(tmp_path):
-    run = Configuration.of(Setup.of("tick"), "finetune")
-    with pytest.raises(ValueError, match=r"^start: expected the folder of a run"):
-        train(run, tmp_path / "runs" / "run", progress=silent)
-    assert not list(tmp_path.iterdir())
-
-
 def test_another_seed_is_another_run(tiny, tmp_path):
     train(tiny("sac", steps=50), tmp_path / "run", progress=silent)
     with pytest.raises(ValueError, match=r"run: of another run, whose seed is 0, and not 1; write to another folder$"):
@@ -222,7 +213,7 @@ def broken_off(run, folder):
         train(run, folder, progress=silent, on_metrics=stop)
 
 
-def test_a_run_whose_buffer_is_gone_or_another_is_refused(tiny, tmp_path):
+def test_a_run_whose_buffer_is_another_is_refused(tiny, tmp_path):
     run, folder = tiny("sac"), tmp_path / "run"
     broken_off(run, folder)
     before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
@@ -230,11 +221,6 @@ def test_a_run_whose_buffer_is_gone_or_another_is_refused(tiny, tmp_path):
     rewards.write_bytes(bytes(len(before[rewards])))
     with pytest.raises(ValueError, match=r"checkpoint\.npz is damaged: \S*replay holds other transitions; delete"):
         train(run, folder, progress=silent)
-    (folder / "replay").rename(tmp_path / "elsewhere")
-    with pytest.raises(ValueError, match=r"is damaged: \S*observations is missing or too short; delete it to"):
-        train(run, folder, progress=silent)
-    (folder / "replay").rmdir()
-    (tmp_path / "elsewhere").rename(folder / "replay")
     rewards.write_bytes(before[rewards])
     assert train(run, folder, progress=silent)
 

@@ -9,6 +9,7 @@ import sys
 import numpy as np
 import programs
 import pytest
+from refusals import refused
 
 from arc_suite import evaluation
 from arc_suite.evaluation import anchors
@@ -64,9 +65,8 @@ def test_a_track_is_a_study(name, steps, far, prior):
     ],
 )
 def test_a_track_takes_algorithms_that_learn_from_what_it_gives(name, line):
-    with pytest.raises(ValueError) as error:
+    with refused(line, begins=True):
         tables.study(name)
-    assert str(error.value).startswith(line)
 
 
 def scale(robot="tick", task="walk"):
@@ -228,9 +228,8 @@ def test_policies_of_other_names_are_refused_before_any_plays(tmp_path, name, li
     path.parent.mkdir(exist_ok=True)
     for each in (path, tmp_path / "tick-walk-0.npz"):
         each.write_bytes(b"")
-    with pytest.raises(ValueError) as error:
+    with refused(f"{tmp_path / name.partition('/')[0]}: {line}"):
         benchmark.of_policies(tmp_path, progress=None)
-    assert str(error.value) == f"{tmp_path / name.partition('/')[0]}: {line}"
 
 
 MODULE = """
