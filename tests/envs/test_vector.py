@@ -400,18 +400,3 @@ def test_bad_arguments_are_one_line_errors(kwargs, message, monkeypatch):
         make(**kwargs)
     gc.collect()
     assert not ignored  # where Gymnasium closes what was never made
-
-
-@pytest.mark.parametrize(
-    ("seed", "message"),
-    [
-        ([1, 2], "seed: expected one for each of 3 environments, got 2"),
-        (2**32 - 2, f"seed: expected an integer from 0 to 4294967293, got {2**32 - 2}"),
-        ("one", "seed: expected an integer from 0 to 4294967295, got 'one'"),
-        ([1, 2, 2.5], "seed: expected an integer from 0 to 4294967295, got 2.5"),
-    ],
-)
-def test_bad_seeds_are_one_line_errors(seed, message):
-    batch = make()
-    with refused(message):
-        batch.reset(seed=seed)

@@ -76,11 +76,6 @@ def test_gaits_that_fit_can_be_asked_for(body, fit):
                 gaits.gait(body, name)
 
 
-def test_an_unknown_gait_is_named():
-    with pytest.raises(ValueError, match="^unknown gait 'ripples'; did you mean 'ripple'"):
-        gaits.gait(HEXAPOD, "ripples")
-
-
 @pytest.mark.parametrize(("robot", "name"), [("queen", "tripod"), ("bastion", "tripod"), ("leaper", "trot")])
 def test_published_gaits_are_among_the_named_ones(robot, name):
     published = arc_suite.load(robot, "walk").task.settings.parameters

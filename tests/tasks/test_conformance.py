@@ -12,7 +12,6 @@ from dm_env import specs
 from dm_env.test_utils import EnvironmentTestMixin
 from episodes import assert_same_steps, begun, flat, load, random_actions
 from numpy.testing import assert_array_equal
-from refusals import refused
 from tiers import tiers, turns
 
 import arc_suite
@@ -120,24 +119,3 @@ def test_action_out_of_range_is_clipped(domain, task):
     assert a.reward == b.reward
     assert_array_equal(flat(a), flat(b))
     assert one.step(np.full(JOINTS[domain], np.inf)).reward == two.step(np.ones(JOINTS[domain])).reward
-
-
-@every_task
-def test_bad_action_is_refused_and_changes_nothing(domain, task):
-    one, two = begun(domain, task), begun(domain, task)
-    n = JOINTS[domain]
-    action = random_actions(one, 1)[0]
-    one.step(action), two.step(action)
-    poisoned = action.copy()
-    poisoned[4] = np.nan
-    for bad, message in (
-        (poisoned, "action[4]: expected a number from -1 to 1, got nan"),
-        (np.zeros(n + 1), f"action: expected shape ({n},), got ({n + 1},)"),
-        (np.zeros((2, n)), f"action: expected shape ({n},), got (2, {n})"),
-        (0.5, f"action: expected shape ({n},), got ()"),
-        (["a"] * n, f"action: expected {n} numbers, got list"),
-        (None, f"action: expected {n} numbers, got NoneType"),
-    ):
-        with refused(message):
-            one.step(bad)
-    assert_same_steps(one, two, random_actions(one, 3, seed=1))

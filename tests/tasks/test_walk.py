@@ -111,23 +111,16 @@ NUMBER = "expected a number from -1e+06 to 1e+06, got"
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"target_velocty": 1}, "unknown setting of walk 'target_velocty'; did you mean 'target_velocity'?"),
         ({"timelimit": 3}, "unknown setting of walk 'timelimit'; did you mean 'time_limit'?"),
-        ({"weights": {"foward": 1}}, "unknown weight 'foward'; did you mean 'forward'?"),
         ({"weights": {"forward": math.nan}}, f"weights['forward']: {NUMBER} nan"),
         ({"weights": [1.0]}, "weights: expected a mapping of names to numbers, got [1.0]"),
         ({"duty_factor": 1.5}, "duty_factor: expected a number from 0 to 1, got 1.5"),
         ({"velocity_band": 0}, "velocity_band: expected a number above 0, at most 1e+06, got 0"),
-        ({"target_velocity": 1e308}, "target_velocity: expected a number from -1000 to 1000, got 1e+308"),
         ({"weights": {"posture": -1e300}}, f"weights['posture']: {NUMBER} -1e+300"),
-        (
-            {"phase_offsets": [0, 1]},
-            "phase_offsets: expected one number from -6.28319 to 6.28319 or 6 of them, got [0, 1]",
-        ),
+        ({"phase_offsets": [0, 1]}, f"phase_offsets: {ANGLES}, got [0, 1]"),
         ({"healthy_range": (1.0, 0.2)}, "healthy_range: expected low < high, got (1.0, 0.2)"),
         ({"base_noise": -1}, "base_noise: expected a number from 0 to 10, got -1"),
         ({"angular_velocity_noise": "big"}, "angular_velocity_noise: expected a number from 0 to 1"),
-        ({"time_limit": "long"}, "time_limit: expected a number above 0, at most 1e+06, got 'long'"),
     ],
 )
 def test_bad_settings_are_one_line_errors(settings, message):
