@@ -28,6 +28,10 @@ def compiled(body, decorated=False):
     return mjcf.Physics.from_mjcf_model(models.assemble(body, decorated=decorated)).model.ptr
 
 
+def test_three_links_are_the_default():
+    assert build_model("--legs=4").stdout == build_model("--legs=4", "--links=3").stdout
+
+
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
     path = tmp_path / "robot.xml"
