@@ -1,4 +1,4 @@
-"""Damages files at random and reads them: specs, tracks, policies, journals, datasets; `make check-fuzz`, minutes.
+"""Damages files at random and reads them: specs, policies, runs, studies, datasets, ...; `make check-fuzz`, minutes.
 
 `python tests/fuzz.py` prints, for each kind of file, how many damaged ones were read all the same,
 refused in one line, ended in a traceback, crashed, or took too long. Each is read in a process of its
@@ -9,6 +9,7 @@ status 1 if anything but that happened. The same seed damages the same places. L
 import argparse
 import contextlib
 import functools
+import itertools
 import json
 import os
 import pathlib
@@ -26,10 +27,20 @@ from tqdm import tqdm
 
 import arc_suite
 from arc_suite import data, evaluation, policies, style
+from arc_suite.animation.design.axes import Map
+from arc_suite.animation.design.genes import Budget, Made
+from arc_suite.animation.design.search import Candidates, Search
+from arc_suite.animation.design.trials import Trial, evaluate
 from arc_suite.envs.setup import Setup
 from arc_suite.journal import Journal
+from arc_suite.learning.agents import configuration
+from arc_suite.learning.agents.training import train
+from arc_suite.learning.studies import benchmark, publication, results, tables
 from arc_suite.policies import network
 from arc_suite.robots.spec_files import EXAMPLES, load_body
+
+ROOT = pathlib.Path(__file__).parents[1]
+sys.path.append(str(ROOT / "tests" / "fixtures"))  # for the learner of the runs
 
 LIMIT = 20.0  # s; the slowest sound file takes a tenth of one
 ID = "arc_suite/test/fuzz-v0"
@@ -111,12 +122,77 @@ class Generation(NamedTuple):
     result: tuple[float, ...]
 
 
+def _design() -> None:
+    """Begin or resume a search for creatures."""
+    trial = Trial.of("walk", {}, "speed", Budget(mass=12.0, span=1.5), 10)
+    search = Search(Made(), Map.of(("legs", "links"), None, 0.1), trial, 0, "design")
+    with contextlib.closing(Journal("bodies.jsonl", {"goal": "speed"}, Candidates.restored)) as journal:
+        for batch in journal.generations:
+            search.add(batch)
+        if not journal.generations:
+            journal.append(search.batch(lambda jobs: list(itertools.starmap(evaluate, jobs))))
+
+
+def _run() -> tables.Run:
+    return tables.run("tick", "tiny_studies:CLIMB", 40, task_kwargs={"time_limit": 0.2}, evaluate_every=20)
+
+
+def _begin_run() -> None:
+    train(_run().configuration, pathlib.Path("runs", RUN), progress=QUIET, stop=lambda: True)
+    publication.publish([_run()], pathlib.Path("runs"), pathlib.Path("published"))
+
+
+def _copied_runs() -> pathlib.Path:
+    shutil.rmtree("copy", ignore_errors=True)
+    return pathlib.Path(shutil.copytree("runs", "copy"))
+
+
+def _resume_run() -> None:
+    folder = _copied_runs() / RUN
+    train(configuration.read(folder / "config.json"), folder, progress=QUIET)
+
+
+def _publish() -> None:
+    publication.publish([_run()], _copied_runs(), pathlib.Path("published"))
+
+
+def _act_by_run() -> None:
+    policies.policy(f"./runs/{RUN}", "tick")
+
+
+def _read_study() -> None:
+    results.results(tables.study(STUDY).runs, pathlib.Path("studies", STUDY))
+    results.demonstrators(pathlib.Path("studies", STUDY))
+
+
+def _read_scores() -> None:
+    benchmark.text(pathlib.Path("studies"))
+
+
+def _copy_studies() -> None:
+    shutil.copytree(ROOT / "studies" / STUDY, f"studies/{STUDY}", dirs_exist_ok=True)
+    shutil.copy(ROOT / "studies" / benchmark.SCORES, "studies")
+
+
+TABLES = ("evaluations", "training", "times", "style", "final")
+RUN, STUDY = "tick-walk-tiny_studies.CLIMB-0", "first-steps"
+_USES_OF_RUNS = (_resume_run, _publish, _act_by_run)
 KINDS = {
     "spec": Kind("spec.json", lambda: shutil.copy(SPEC, "spec.json"), (_read_spec,)),
     "tracks": Kind("tracks.npz", _make_tracks, (lambda: style.load("tracks.npz"),)),
     "policy": Kind("policy.npz", _make_policy, (_act,)),
     "header of a policy": Kind("header.json", _make_policy, (_act_by_header,)),
     "journal of a search": Kind("journal.jsonl", _search, (_search,)),
+    "journal of a design": Kind("bodies.jsonl", _design, (_design,)),
+    **{
+        f"{name} of a run": Kind(f"runs/{RUN}/{name}", _begin_run, _USES_OF_RUNS)
+        for name in ("config.json", "checkpoint.npz", "policy.npz", *(f"{table}.csv" for table in TABLES))
+    },
+    **{
+        f"{name} of a study": Kind(f"studies/{STUDY}/{name}", _copy_studies, (_read_study,))
+        for name in (results.RUNS, results.EVALUATIONS, results.DEMONSTRATORS)
+    },
+    "scores of a benchmark": Kind(f"studies/{benchmark.SCORES}", _copy_studies, (_read_scores,)),
     "metadata of a dataset": Kind(f"datasets/{ID}/data/metadata.json", _collect, _USES),
     "episodes of a dataset": Kind(f"datasets/{ID}/data/main_data.hdf5", _collect, _USES, may_loop=True),
 }

@@ -26,12 +26,12 @@ def command(run: configuration.Configuration) -> str:
 
 
 def returns(path: Path) -> list[float]:
-    """Return the returns of a packaged policy in the episodes of evaluation."""
+    """Return the returns of a packaged policy in the episodes that judge a final policy."""
     packaged = network.load(path)
-    setup = packaged.setup.validation(evaluation.CURVE_EPISODES)
+    setup = packaged.setup.validation(evaluation.EPISODES)
     if not setup.several:
         setup = Setup.of(setup.body, setup.task)  # observes all
-    environment = setup.make_vec(evaluation.CURVE_EPISODES, autoreset_mode="Disabled")
+    environment = setup.make_vec(evaluation.EPISODES, autoreset_mode="Disabled")
     return [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
-from arc_suite import policies
+from arc_suite import checks, policies
 from arc_suite.cpg.selection import suited_preset, suited_presets
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation import protocol
@@ -127,11 +127,18 @@ def played(setup: Setup, name: str, seeds: range) -> np.ndarray:
 
 
 def read(path: Path) -> dict[str, dict[str, np.ndarray]]:
-    """Return the returns in a table, each (episodes,), by place, which is the text of a setup, and by policy."""
+    """Return the returns in a table, each (episodes,), by place, which is the text of a setup, and by policy.
+
+    Raises:
+        ValueError: a damaged table.
+    """
     found: dict[str, dict[str, list[float]]] = {}
-    with path.open(encoding="utf-8", newline="") as file:
-        for line in csv.DictReader(file):
-            found.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            for line in csv.DictReader(file):
+                found.setdefault(line["place"], {}).setdefault(line["policy"], []).append(float(line["return"]))
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise ValueError(f"{path}: no table of returns: {checks.quoted(error)}") from None
     return {place: {name: np.array(values) for name, values in every.items()} for place, every in found.items()}
 
 

@@ -18,11 +18,18 @@ FIXTURES = pathlib.Path(__file__).parents[1] / "fixtures"
 # By program: the flags, and the least number of changes of files.
 COMMANDS = {
     "train": (
-        ("--robot=tick", "--algorithm=tiny_studies:CLIMB", "--steps=200", "--set=time_limit=0.5", "--output=run"),
+        (
+            "--robot=tick",
+            "--algorithm=tiny_studies:CLIMB",
+            "--steps=200",
+            "--hp=slice=100",
+            "--set=time_limit=0.5",
+            "--output=run",
+        ),
         20,
     ),
     "design": (
-        ("--around=tick", "--goal=speed", "--bodies=40", "--steps=10", "--nopages", "--processes=1", "-oa"),
+        ("--around=tick", "--goal=speed", "--bodies=40", "--steps=10", "--nopages", "--processes=1", "--output=a"),
         10,
     ),
     "study": (("tiny_studies:PAIR", "--jobs=2"), 10),

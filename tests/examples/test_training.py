@@ -24,13 +24,13 @@ def run(script, *arguments, cwd):
     return done
 
 
-def test_ppo_of_stable_baselines3(tmp_path):
+def test_sac_of_stable_baselines3(tmp_path):
     pytest.importorskip("matplotlib")
-    done = run("sb3_ppo.py", "--steps=2048", "--checkpoints=1", "--episodes=1", "--output=tick", cwd=tmp_path)
+    done = run("sb3_sac.py", "--steps=704", "--checkpoints=1", "--episodes=1", "--output=tick", cwd=tmp_path)
     assert done.stderr == ""
-    names = {"2048.zip", "2048_vecnormalize.pkl", "2048.json", "curve.png"}
+    names = {"704.zip", "704_vecnormalize.pkl", "704.json", "curve.png"}
     assert {path.name for path in (tmp_path / "tick").iterdir()} == names
-    report = json.loads((tmp_path / "tick" / "2048.json").read_text())
+    report = json.loads((tmp_path / "tick" / "704.json").read_text())
     assert report["robots"]["tick"]["return"]["mean"] > 0.0
 
 

@@ -163,10 +163,15 @@ def check(path: str | os.PathLike, config: Mapping[str, Any], left_out: Sequence
             )
 
 
-def lines(path: str | os.PathLike, name: str) -> list[dict[str, str]]:
+def lines(path: str | os.PathLike, name: str, columns: Sequence[str] = ()) -> list[dict[str, str]]:
     """Return the lines of a table of a run's folder as text by column; none where there is no table.
 
     A line that is still being written is left out.
+
+    Args:
+        path: of the folder.
+        name: of the table.
+        columns: that it must have.
 
     Raises:
         ValueError: a damaged table.
@@ -175,7 +180,10 @@ def lines(path: str | os.PathLike, name: str) -> list[dict[str, str]]:
     try:
         text = path.read_text(encoding="utf-8") if path.exists() else ""
         header, *others = text[: text.rfind("\n") + 1].splitlines() or [""]
-        return [dict(zip(header.split(","), line.split(","), strict=True)) for line in others]
+        found = header.split(",")
+        if others and (missing := [column for column in columns if column not in found]):
+            raise ValueError(f"expected a column {missing[0]}")
+        return [dict(zip(found, line.split(","), strict=True)) for line in others]
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: no table of a run: {checks.quoted(error)}") from None
 

@@ -3,7 +3,7 @@
 import contextlib
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ METRICS = ("heading_error", "lateral_drift", "torso_pitch", "gait_compliance", "
 
 # Presets of demonstrators whose returns are published, in `walk`, and in tasks with a command; and the best one.
 PRESETS, COMMANDED = ("medium", "refined"), ("steered", "surefooted")
+
+_FURTHER = range(evaluation.CURVE_EPISODES, evaluation.EPISODES)  # seeds that complete the latest evaluation
 
 _EPISODE = ("run", "step", "seed", "return", "length")  # first columns of an episode
 _STYLE = tuple(STYLE + name for name in METRICS)
@@ -62,8 +64,8 @@ def publish(runs: Sequence[Run], folder: Path, published: Path) -> None:
 
 def _evaluated(folder: Path) -> list[dict[str, str]]:
     """Return the rows of the whole evaluations in the folder of a run, with their times."""
-    rows = run_folder.lines(folder, "evaluations")
-    times = {row.pop("step"): row for row in run_folder.lines(folder, "times")}
+    rows = run_folder.lines(folder, "evaluations", _EPISODE[1:])
+    times = {row.pop("step"): row for row in run_folder.lines(folder, "times", ("step", *TIMES))}
     counts = Counter(row["step"] for row in rows)
     whole = {step for step, count in counts.items() if count == evaluation.CURVE_EPISODES and step in times}
     return [{"run": folder.name, **row, **times[row["step"]]} for row in rows if row["step"] in whole]
@@ -71,7 +73,7 @@ def _evaluated(folder: Path) -> list[dict[str, str]]:
 
 def _configuration(run: Run, folder: Path) -> dict[str, str]:
     """Return the row of a run in the table of runs."""
-    training = run_folder.lines(folder, "training")
+    training = run_folder.lines(folder, "training", ("step",))
     phases = {row["step"]: int(float(row["phase_updates"])) for row in training if float(row.get("phase_updates", 0))}
     fields = {"run": run.name, "kind": run.kind, **run_folder.config_of(folder), "phases": phases or None}
     return {name: cell(value) for name, value in fields.items()}
@@ -98,11 +100,16 @@ def _merged(orders: Iterable[Sequence[str]]) -> list[str]:
 def _with_style(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
     """Return rows of episodes, those of the latest evaluation with metrics of style, which the folder keeps."""
     latest = rows[-1]["step"]
-    measured = run_folder.lines(folder, "style")
-    if not measured or measured[-1]["step"] != latest:
+    measured = run_folder.lines(folder, "style", ("step", "seed"))
+    if not _are_of(measured, latest, range(evaluation.CURVE_EPISODES)):
         measured = _measured(run, folder, latest)
     metrics = {row.pop("seed"): {STYLE + name: row[name] for name in row if name != "step"} for row in measured}
     return [row | metrics[row["seed"]] if row["step"] == latest else row for row in rows]
+
+
+def _are_of(rows: Sequence[Mapping[str, str]], step: str, seeds: range) -> bool:
+    """Return whether rows are those of a step, one for each seed."""
+    return [(row["step"], row["seed"]) for row in rows] == [(step, str(seed)) for seed in seeds]
 
 
 def _measured(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
@@ -122,8 +129,8 @@ def _measured(run: Run, folder: Path, step: str) -> list[dict[str, str]]:
 def _judged(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str, str]]:
     """Return rows of episodes, and those that complete the latest evaluation, which the folder keeps."""
     latest = rows[-1]
-    kept = run_folder.lines(folder, "final")
-    if not kept or kept[-1]["step"] != latest["step"]:
+    kept = run_folder.lines(folder, "final", _EPISODE[1:])
+    if not _are_of(kept, latest["step"], _FURTHER):
         _judge(run, folder, latest["step"])
         kept = run_folder.lines(folder, "final")
     shared = {name: latest[name] for name in ("run", *TIMES)}
@@ -132,7 +139,7 @@ def _judged(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str
 
 def _judge(run: Run, folder: Path, step: str) -> None:
     """Write a table of the episodes that judge the policy at a step, after those of its curve."""
-    setup, seeds = run.configuration.validation, range(evaluation.CURVE_EPISODES, evaluation.EPISODES)
+    setup, seeds = run.configuration.validation, _FURTHER
     policy = network.load(folder / checkpoints.FOLDER / step)
     environment = setup.make_vec(len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
     with contextlib.closing(environment):
