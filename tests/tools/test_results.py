@@ -1,4 +1,4 @@
-"""tools/results.py: tables of demonstrators, and the marks between which they stand in the page."""
+"""tools/results.py: tables of demonstrators, and the marks between which they stand in the page; errors of names."""
 
 import pathlib
 import re
@@ -29,3 +29,19 @@ def test_every_task_has_its_table_in_the_page():
     page = (TOOL.parents[1] / "docs" / "results.md").read_text()
     for task in TASKS.keys() - {"walk"}:
         assert re.search(rf"<!-- {task} -->\n\n\| {task} \| zero \|.*?<!-- end -->", page, re.DOTALL), task
+
+
+@pytest.mark.parametrize(
+    ("tool", "flag", "line"),
+    [
+        ("disturbances.py", "--robots=tik", "unknown robot 'tik'; did you mean 'tick'?"),
+        ("disturbances.py", "--presets=tuned,steerd", "unknown preset 'steerd'; did you mean 'steered'?"),
+        ("results.py", "--robots=tik", "unknown robot 'tik'; did you mean 'tick'?"),
+        ("results.py", "--presets=tuned,steerd", "unknown preset 'steerd'; did you mean 'steered'?"),
+        ("results.py", "--tasks=walk", "unknown task 'walk'"),
+    ],
+)
+def test_an_unknown_name_is_one_line_before_the_table(tool, flag, line):
+    done = programs.run(TOOL.with_name(tool), flag)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"{tool}: {line}")
