@@ -38,7 +38,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robot", default="tick")
     parser.add_argument("--steps", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seed", type=int, default=100_000)
     parser.add_argument("--output", type=pathlib.Path, default="sbx_sac.zip")
     args = parser.parse_args()
     vector = gymnasium.make_vec(f"arc_suite/{args.robot}-walk-v0", num_envs=ENVS, autoreset_mode="SameStep")
