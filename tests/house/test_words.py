@@ -43,9 +43,9 @@ ALLOWED = {
     "plan": r"\(\) plan$",  # a path around obstacles
     "motions": r" ROOT_MOTIONS$",  # whether clips move the root
     "events": r"cli\.train events$",  # files of TensorBoard
-    "lift": r"cpg\.|LIFT_OFF$",  # height of a foot in swing; the end of a stance
+    "lift": r"cpg\.|models\.stride|LIFT_OFF$",  # height of a foot in swing; the end of a stance
     "limp": r" Limp$|^README|^studies",  # the task
-    "fitted": r"arenas\.|tasks\.fitting",  # sizes and parameters that are fitted to a body
+    "fitted": r"arenas\.|models\.stride|tasks\.fitting",  # sizes and parameters that are fitted to a body
     "warm_up": r"value_warm_up$",  # the field's word
     "cloning": r" BehaviourCloning$",  # what bc abbreviates
     # Arena and body of a task; lights and floor of a picture; arguments that wrappers of others hand on.

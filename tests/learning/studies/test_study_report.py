@@ -137,9 +137,11 @@ def test_claims_need_what_they_compare(made):
 
 
 def test_unfinished_evaluations_do_not_count(tmp_path):
-    lines = [f"{step},{seed},900.0" for step in (1000, 2000, 3000) for seed in range(10)][:-9]
-    (tmp_path / "evaluations.csv").write_text("\n".join(["step,seed,return", *lines]) + "\n")
-    (tmp_path / "times.csv").write_text("step,cpu_seconds\n1000,1.0\n1500,2.0\n2000,3.0\n3000,4.0\n")
+    lines = [f"{step},{seed},900.0,40" for step in (1000, 2000, 3000) for seed in range(10)][:-9]
+    (tmp_path / "evaluations.csv").write_text("\n".join(["step,seed,return,length", *lines]) + "\n")
+    (tmp_path / "times.csv").write_text(
+        "step,wall_seconds,cpu_seconds\n1000,1,1.0\n1500,2,2.0\n2000,3,3.0\n3000,4,4.0\n"
+    )
     found = publication._evaluated(tmp_path)
     rows = [(row["step"], row["seed"], row["cpu_seconds"]) for row in found]
     assert len(rows) == 20 and rows[9:11] == [("1000", "9", "1.0"), ("2000", "0", "3.0")]
