@@ -78,7 +78,7 @@ def writing(path: str | os.PathLike) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def write_text(path: str | os.PathLike, text: str) -> None:
+def write(path: str | os.PathLike, text: str) -> None:
     """Write a file of text in UTF-8 as `writing` does.
 
     Raises:

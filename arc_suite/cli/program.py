@@ -133,7 +133,7 @@ def marked_page(flag: str, path: str) -> Callable[[str], None]:
         raise ValueError(f"--{flag}={path}: expected the lines <!-- table --> and <!-- end -->, got none")
 
     def write(table: str) -> None:
-        files.write_text(path, _MARKS.sub(lambda match: f"\n{table}\n\n", page))
+        files.write(path, _MARKS.sub(lambda match: f"\n{table}\n\n", page))
 
     return write
 

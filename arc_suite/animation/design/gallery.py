@@ -79,7 +79,7 @@ def write_specs(folder: Path, best: Iterable[Elite]) -> None:
     """Write the spec of every elite, named by its cell."""
     files.folder(folder)
     for elite in best:
-        files.write_text(folder / f"{elite.label}.json", body_to_json(elite.body))
+        files.write(folder / f"{elite.label}.json", body_to_json(elite.body))
 
 
 def caption(elite: Elite, cells: Map, goal: str) -> str:
@@ -125,7 +125,7 @@ def write_walks(folder: Path, best: Iterable[Elite], cells: Map, trial: Trial) -
         environment, policy = opened(elite.body, trial.task, trial.first, GOALS[trial.goal])
         track = style.record(environment, policy, trial.first.seeds[0], STEPS)
         environment.close()
-        files.write_text(folder / f"{elite.label}.html", pages.page({caption(elite, cells, trial.goal): track}))
+        files.write(folder / f"{elite.label}.html", pages.page({caption(elite, cells, trial.goal): track}))
 
 
 def write_page(path: Path, views: Mapping[tuple[int, ...], np.ndarray], cells: Map, title: str) -> None:
@@ -133,7 +133,7 @@ def write_page(path: Path, views: Mapping[tuple[int, ...], np.ndarray], cells: M
     shown, columns = _arranged(views)
     items = "\n".join(_item(cells.label(cell), views.get(cell)) for cell in shown)
     text = pages.template("design/gallery.html").substitute(title=html.escape(title), columns=columns, items=items)
-    files.write_text(path, text)
+    files.write(path, text)
 
 
 def _item(label: str, view: np.ndarray | None) -> str:

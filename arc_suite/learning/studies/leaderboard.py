@@ -54,7 +54,7 @@ def _write(studies: Path, lines: Iterable[dict[str, str]]) -> None:
     csv_files.write(studies / TABLE, HEADS, lines)
     heads = HEADS[:-1]  # the configuration only tells lines apart
     page = table(heads, [[(line | {"study": link(line)})[head] for head in heads] for line in ranked(lines)])
-    files.write_text(studies / PAGE, f"# Leaderboard\n\n{_TEXT}\n\n{page}\n")
+    files.write(studies / PAGE, f"# Leaderboard\n\n{_TEXT}\n\n{page}\n")
 
 
 def ranked(lines: Iterable[dict[str, str]]) -> list[dict[str, str]]:
@@ -93,7 +93,7 @@ def enter(source: Path, name: str, entries: Sequence[Entry], studies: Path) -> P
     lines: dict[str, dict[str, str]] = {}
     for entry in entries:
         copied = folder / f"{entry.setup.body.name}-{entry.setup.kind.name}-{name}.json"
-        files.write_text(copied, source.read_text(encoding="utf-8"))
+        files.write(copied, source.read_text(encoding="utf-8"))
         totals = np.array([episode.total for episode in entry.episodes])
         score = float(anchors.anchors(entry.setup).score(totals.mean()))
         figures = {key: np.mean([each.progress[key] for each in entry.episodes]) for key in entry.episodes[0].progress}

@@ -47,7 +47,7 @@ def write(name: str, study: Study, published: Path) -> Path:
     }
     with files.writing(published / CURVES) as temporary:
         _curves(groups, demonstrators).savefig(temporary)
-    files.write_text(published / REPORT, _page(sections))
+    files.write(published / REPORT, _page(sections))
     leaderboard.write(published.parent, published.name, _rows(published.name, groups, demonstrators))
     return published / REPORT
 
