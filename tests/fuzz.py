@@ -33,7 +33,7 @@ from arc_suite.animation.design.search import Candidates, Search
 from arc_suite.animation.design.trials import Trial, evaluate
 from arc_suite.envs.setup import Setup
 from arc_suite.journal import Journal
-from arc_suite.learning.agents import configuration
+from arc_suite.learning.agents import configuration, run_folder
 from arc_suite.learning.agents.training import train
 from arc_suite.learning.studies import benchmark, publication, results, tables
 from arc_suite.policies import network
@@ -174,7 +174,7 @@ def _copy_studies() -> None:
     shutil.copy(ROOT / "studies" / benchmark.SCORES, "studies")
 
 
-TABLES = ("evaluations", "training", "times", "style", "final")
+TABLES = (*run_folder.TABLES, "style", "final")
 RUN, STUDY = "tick-walk-tiny_studies.CLIMB-0", "first-steps"
 _USES_OF_RUNS = (_resume_run, _publish, _act_by_run)
 KINDS = {

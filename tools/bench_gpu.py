@@ -149,9 +149,8 @@ def main():
     print(text)
     if FLAGS.document:
         path = pathlib.Path(FLAGS.document)
-        with files.writing(path) as temporary:
-            marked = _MARKED.sub(lambda match: f"{match[1]}{text}\n{match[2]}", path.read_text(encoding="utf-8"))
-            temporary.write_text(marked, encoding="utf-8")
+        page = path.read_text(encoding="utf-8")
+        files.write(path, _MARKED.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
 
 
 if __name__ == "__main__":

@@ -139,14 +139,14 @@ def _judged(run: Run, folder: Path, rows: list[dict[str, str]]) -> list[dict[str
 
 def _judge(run: Run, folder: Path, step: str) -> None:
     """Write a table of the episodes that judge the policy at a step, after those of its curve."""
-    setup, seeds = run.configuration.validation, _FURTHER
+    setup = run.configuration.validation
     policy = network.load(folder / checkpoints.FOLDER / step)
-    environment = setup.make_vec(len(seeds), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
+    environment = setup.make_vec(len(_FURTHER), num_threads=1, autoreset_mode=AutoresetMode.DISABLED)
     with contextlib.closing(environment):
-        played = evaluation.episodes_in_batch(environment, policy, seeds)
+        played = evaluation.episodes_in_batch(environment, policy, _FURTHER)
     lines = [
         {"step": step, "seed": seed, "return": each.total, "length": each.length, **each.progress}
-        for seed, each in zip(seeds, played, strict=True)
+        for seed, each in zip(_FURTHER, played, strict=True)
     ]
     csv_files.write(folder / "final.csv", list(lines[0]), lines)
 
