@@ -206,14 +206,17 @@ def setups(stored: Setup | None = None, near: Iterable[str] = ("all",)) -> dict[
     return found
 
 
-def trained() -> Setup | None:
-    """Return the setup that judges --policy, see `Setup.judging`; None for one that is no file.
+def trained(policy: str | None = None) -> Setup | None:
+    """Return the setup that judges a policy, see `Setup.judging`; None for one that is no file.
+
+    Args:
+        policy: of a program without --policy; None for that of --policy.
 
     Raises:
         ValueError: as `policies.setup_of`.
         OSError: as `policies.setup_of`.
     """
-    own = policies.setup_of(policy_name(FLAGS.policy))
+    own = policies.setup_of(policy_name(FLAGS.policy if policy is None else policy))
     return own and own.judging()
 
 

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import programs
 import pytest
 from networks import made, of_many_bodies
 
@@ -13,6 +14,7 @@ from arc_suite.learning import onnx_file
 from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import alone, universal
 from arc_suite.policies.graph import INPUT
+from arc_suite.policies.network import PACKAGED
 from arc_suite.policies.universal import Universal
 from arc_suite.robots import generator
 
@@ -107,3 +109,12 @@ def test_a_policy_of_many_bodies_needs_one_of_them(tmp_path):
     with pytest.raises(ValueError, match=r"^policy of .*: expected one of one body; see universal.for_body$"):
         onnx_file.save(tmp_path / "policy.onnx", of_many_bodies())
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("task", ["walk", "steer"])
+def test_flags_give_a_policy_of_many_bodies_its_body_and_task(task, tmp_path):
+    size = Setup.of(generator.generate(4, 3), task).definition.size
+    done = programs.arc_suite("export", "universal", "--legs=4", f"--task={task}", "--output=a.onnx", cwd=tmp_path)
+    assert programs.passed(done).startswith(f"wrote a.onnx: {size} observations, 12 actions, ")
+    done = programs.arc_suite("export", PACKAGED / "tick-walk.npz", "--robot=tick", "--output=b.onnx", cwd=tmp_path)
+    programs.refused(done, f"arc-suite export: policy {PACKAGED / 'tick-walk.npz'}: expected one of many bodies, got ")

@@ -18,7 +18,18 @@ from pathlib import Path
 from absl import flags
 
 from arc_suite import checks, policies
-from arc_suite.cli.flags import define_body, define_task, define_vecnormalize, made_body, only_setup, policy_name
+from arc_suite.cli.flags import (
+    completed,
+    define_body,
+    define_task,
+    define_vecnormalize,
+    made_body,
+    only_body,
+    policy_name,
+    task,
+    trained,
+)
+from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file
 from arc_suite.policies import universal
 
@@ -37,7 +48,7 @@ def main(run: str | None = None) -> None:
     output = Path(FLAGS.output or (source if source.is_dir() else source.parent) / "policy.onnx")
     checks.extension(output, [".onnx"])
     if FLAGS["robot"].present or made_body() is not None:
-        setup = only_setup()
+        setup = Setup.of(only_body(), *completed(trained(run), *task()))
         policy = universal.for_body(universal.load(name, setup.definition), setup)
     elif run == universal.NAME:
         raise ValueError(f"policy {run}: expected a body for it, --robot, --spec or --legs")
