@@ -15,9 +15,9 @@ from arc_suite.robots.spec import Ballast, Body, Foot, Joint, Leg, Link, Solid, 
 LINKS = (2, 4)  # fewest and most; a leg of one link cannot lift its foot
 
 ROBOTS = (queen.BODY, bastion.BODY, tick.BODY, leaper.BODY)  # never more, as a seed stands for a body
-_FROM_ROBOTS = 0.2  # share of bodies that are robots sized anew, half of them mutated
+_FROM_ROBOTS = 0.2  # share of bodies that are mutated robots
 _SCALES = (0.25, 4.0)  # of these
-_LARGEST_MUTATION = 0.2
+_MUTATIONS = (0.05, 0.2)  # never none: unmutated robots test policies, which are blind to size
 
 _SHARED = 0.6  # probability that all pairs of a body have the same joints
 _BUILT, _SHELLED = 0.25, 0.15  # shares of bodies with three solids, and with one under a shell
@@ -60,8 +60,8 @@ class _Shape(NamedTuple):
 def drawn(random: np.random.Generator) -> Body:
     """Draw a body, `varied`.
 
-    Eight in ten are put together, the others are robots of the suite, 0.25 to 4 times as large and sized anew,
-    half of them mutated by up to 0.2. Of those put together:
+    Eight in ten are put together. The others are robots of the suite, mutated by 0.05 to 0.2 and 0.25 to 4 times as
+    large. Of those put together:
 
     - legs, layout, size and proportions are drawn as in `generator.random_body`, with wider bounds;
     - joint ranges differ to both sides, and three in ten bends bend one way only;
@@ -82,8 +82,7 @@ def drawn(random: np.random.Generator) -> Body:
 def _robot(random: np.random.Generator) -> Body:
     robot = ROBOTS[random.integers(len(ROBOTS))]
     body = generator.scaled(robot, math.exp(random.uniform(*np.log(_SCALES))))
-    if random.uniform() < 0.5:
-        body = generator.mutated(body, int(random.integers(2**32)), random.uniform(0.0, _LARGEST_MUTATION))
+    body = generator.mutated(body, int(random.integers(2**32)), random.uniform(*_MUTATIONS))
     return body.replace(name="varied", torso=body.torso.replace(standing_height=None))
 
 

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from networks import of_many_bodies as drawn
 
+from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.learning.transfer import Comparison, Judged
-from arc_suite.robots import ROBOTS
+from arc_suite.models import families
+from arc_suite.robots import ROBOTS, generator
+from arc_suite.tasks import tokens
 
 
 def compared(policy, demonstrator, zero, walked=True):
@@ -32,6 +35,24 @@ def test_families_hold_bodies_that_nobody_trains_with():
     small, large = (transfer.FAMILIES[name][0](0) for name in ("small", "large"))
     ratio = large.torso.solids[0].size[0] / small.torso.solids[0].size[0]
     assert ratio == pytest.approx(40.0)
+
+
+def seen(body):
+    """What a network sees of a body, in units of its size."""
+    description = tokens.described(Setup.of(body).definition)
+    return np.concatenate([description.legs.ravel(), description.torso])
+
+
+@pytest.mark.slow
+def test_no_body_that_tests_equals_one_of_training_up_to_size():
+    """Lengths in h, angles in rad: some number of every test body differs by 0.03 from each training body's."""
+    assert np.abs(seen(generator.scaled(generator.random_body(3), 2.0)) - seen(generator.random_body(3))).max() < 1e-5
+    made = (families.varied_body, range(512)), (generator.random_body, range(128))
+    training = np.array([seen(member(seed)) for member, seeds in made for seed in seeds])
+    for name, (member, count) in transfer.FAMILIES.items():
+        for index in range(count):
+            nearest = np.abs(training - seen(member(index))).max(axis=1).min()
+            assert nearest > 0.03, f"{name}, body {index}"
 
 
 @pytest.mark.slow
