@@ -9,7 +9,6 @@ from arc_suite.evaluation import protocol
 from arc_suite.robots.spec import Body, Link
 
 STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
-MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body has fallen
 FIELDS = ("motor", "damping", "armature")  # of joints, which are sized where a spec leaves them out
 
 

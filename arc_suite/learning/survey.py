@@ -2,7 +2,6 @@
 
 import collections
 import functools
-import math
 import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
@@ -12,15 +11,11 @@ from dm_control.rl import control
 from tqdm import tqdm
 
 from arc_suite import rotations
-from arc_suite.cpg import Demonstrator
+from arc_suite.cpg import Demonstrator, suited_preset
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import protocol
-from arc_suite.evaluation.first_walk import MOST_TILT_COSINE
-from arc_suite.models.sizing import GRAVITY
-from arc_suite.robots.spec import Body
+from arc_suite.evaluation import protocol, walking
 
-_LEAST_FROUDE = 0.02  # of progress; below it a body does not walk
-_MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
+NEAR_TARGET = 0.9  # of the target speed: bodies that reach it are counted, too
 
 
 class Case(NamedTuple):
@@ -40,16 +35,14 @@ class Outcome(NamedTuple):
 
     Attributes:
         case: the walk.
-        froude: mean forward speed in units of sqrt(g h).
-        lengths: forward displacement in body lengths.
-        drift: sideways displacement as a share of the forward one.
+        speed: as a share of the target speed; see `walking.shares`.
+        drift: displacement to the side of the target's direction, as a share of the target path.
         touching: share of the time that the torso touched the ground.
         failures: reasons why it does not count as walking; empty if it does.
     """
 
     case: Case
-    froude: float
-    lengths: float
+    speed: float
     drift: float
     touching: float
     failures: tuple[str, ...]
@@ -66,79 +59,61 @@ class Outcome(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """The torso in a walk; leading axis: control steps, the start included.
+    """The torso in a walk that lasted n control steps.
 
     Attributes:
-        positions: (n, 2) m, x and y.
-        touching: (n,) whether the torso touches the ground.
+        steps: of the whole walk.
+        places: (n + 1, 3) x and y, m, and yaw, rad.
+        targets: (n, 2) target displacements, m.
+        touching: (n + 1,) whether the torso touches the ground.
         ending: "time" at the time limit, else "fall" or "divergence".
     """
 
-    positions: np.ndarray
+    steps: float
+    places: np.ndarray
+    targets: np.ndarray
     touching: np.ndarray
     ending: str
 
 
 def play(case: Case) -> tuple[control.Environment, Trajectory]:
-    """Play the walk of one body.
+    """Play the walk of one body by the demonstrator that suits the task.
 
     Returns:
         The environment as the walk left it, and the walk.
+
+    Raises:
+        ValueError: a task without a target velocity or command.
     """
     environment = case.setup.load(case.seed)
-    demonstrator = Demonstrator(environment, "medium")
-    data = environment.physics.data.ptr
+    task, data = environment.task.definition, environment.physics.data.ptr
+    demonstrator = Demonstrator(environment, suited_preset(task))
     shapes = [environment.physics.model.name2id(solid.name, "geom") for solid in case.setup.body.torso.solids]
     step, ending = environment.reset(), "time"
-    positions, touching = [data.qpos[:2].copy()], [False]
+    places, targets, touching = [_place(data)], [], [False]
     try:
         while not step.last() and ending == "time":
+            targets.append(walking.target(task, step.observation, places[-1]))
             step = environment.step(demonstrator(step))
-            positions.append(data.qpos[:2].copy())
+            places.append(_place(data))
             touching.append(bool(np.isin(data.contact.geom, shapes).any()))
-            if step.discount == 0.0 or rotations.upright(data.qpos[3:7]) < MOST_TILT_COSINE:
+            if step.discount == 0.0 or rotations.upright(data.qpos[3:7]) < walking.MOST_TILT_COSINE:
                 ending = "fall"
     except control.PhysicsError:
         ending = "divergence"
-    return environment, Trajectory(np.array(positions), np.array(touching), ending)
+        places.append(places[-1])
+    return environment, Trajectory(task.step_limit, *map(np.array, (places, targets, touching)), ending)
+
+
+def _place(data) -> np.ndarray:
+    return np.array((*data.qpos[:2], rotations.yaw(data.qpos[3:7])))
 
 
 def assess(case: Case, trajectory: Trajectory) -> Outcome:
-    """Return whether a trajectory is a walk, and if not, why; see `failures`."""
-    body, seconds = case.setup.body, case.setup.task_kwargs["time_limit"]
-    apart, touching = trajectory.positions[-1] - trajectory.positions[0], float(trajectory.touching.mean())
-    forward, sideways = apart.tolist()
-    found = failures(body, apart, seconds, touching, trajectory.ending)
-    drift = abs(sideways) / max(abs(forward), 1e-9)
-    return Outcome(case, _froude(body, forward, seconds), forward / _length(body), drift, touching, found)
-
-
-def failures(body: Body, apart: np.ndarray, seconds: float, touching: float, ending: str = "time") -> tuple[str, ...]:
-    """Return why a motion is no walk: a fall, dragging, slowness or drift; empty for a walk.
-
-    Args:
-        body: that moved, with its standing height.
-        apart: (2,) displacement of the torso, m.
-        seconds: duration of a whole walk.
-        touching: share of the time that the torso touched the ground.
-        ending: see `Trajectory`.
-    """
-    forward, sideways = apart
-    found = {
-        ending: ending != "time",
-        "touch": touching >= _MOST_TOUCHING,
-        "slow": not (forward > _length(body) and _froude(body, forward, seconds) > _LEAST_FROUDE),
-        "drift": not abs(sideways) < abs(forward),
-    }
-    return tuple(name for name, failed in found.items() if failed)
-
-
-def _froude(body: Body, forward: float, seconds: float) -> float:
-    return forward / (seconds * math.sqrt(GRAVITY * body.torso.standing_height))
-
-
-def _length(body: Body) -> float:
-    return 2.0 * body.torso.solids[0].size[0]
+    """Return whether a trajectory is a walk, and if not, why; see `walking.failures`."""
+    moved, touching = np.diff(trajectory.places[:, :2], axis=0), float(trajectory.touching.mean())
+    speed, drift = walking.shares(trajectory.targets, moved, trajectory.steps)
+    return Outcome(case, speed, abs(drift), touching, walking.failures(speed, touching, trajectory.ending))
 
 
 def run(case: Case) -> Outcome:
@@ -174,7 +149,7 @@ def survey(cases: Sequence[Case], processes: int | None = None, progress: Callab
 
 
 def table(outcomes: Sequence[Outcome]) -> str:
-    """Return a table of the bodies that walked and their median speed, by legs and links."""
+    """Return a table of the bodies that walked and their median speed as a share of the target, by legs and links."""
     links = sorted({outcome.links for outcome in outcomes})
     lines = ["legs " + "".join(f"{f'{k} link' + 's' * (k > 1):>18}" for k in links) + f"{'all':>18}"]
     for legs in (*sorted({outcome.legs for outcome in outcomes}), "all"):
@@ -187,16 +162,18 @@ def _cell(outcomes: Sequence[Outcome]) -> str:
     if not outcomes:
         return f"{'-':>18}"
     walked = sum(not outcome.failures for outcome in outcomes)
-    return f"{f'{walked}/{len(outcomes)}':>11}{np.median([outcome.froude for outcome in outcomes]):>7.3f}"
+    return f"{f'{walked}/{len(outcomes)}':>11}{np.median([outcome.speed for outcome in outcomes]):>7.2f}"
 
 
 def summary(outcomes: Sequence[Outcome]) -> str:
     """Return a survey in a few lines of text."""
     walked = sum(not outcome.failures for outcome in outcomes)
     reasons = collections.Counter(reason for outcome in outcomes for reason in outcome.failures)
-    speed, drift = (np.median([getattr(outcome, name) for outcome in outcomes]) for name in ("froude", "drift"))
+    fast = np.mean([outcome.speed >= NEAR_TARGET for outcome in outcomes])
+    speed, drift = (np.median([getattr(outcome, name) for outcome in outcomes]) for name in ("speed", "drift"))
     return (
         f"{walked} of {len(outcomes)} bodies walk ({100.0 * walked / len(outcomes):.1f} %)\n"
         f"failures: {', '.join(f'{name} {count}' for name, count in reasons.items()) or 'none'}\n"
-        f"median speed {speed:.3f} sqrt(g h), median drift {drift:.3f}"
+        f"{100.0 * fast:.1f} % reach {NEAR_TARGET} of the target speed; "
+        f"median speed {speed:.2f} of it, median drift {drift:.2f}"
     )

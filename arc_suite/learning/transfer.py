@@ -6,6 +6,7 @@ still, 0, to the body's own demonstrator, 1.
 """
 
 import contextlib
+import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
@@ -15,8 +16,7 @@ from gymnasium.vector import AutoresetMode
 from tqdm import tqdm
 
 from arc_suite.envs.bodies import BodiesEnv
-from arc_suite.evaluation import protocol
-from arc_suite.learning import survey
+from arc_suite.evaluation import protocol, walking
 from arc_suite.learning.teachers import Teacher
 from arc_suite.models.families import varied_body
 from arc_suite.policies import Policy, Script
@@ -58,8 +58,7 @@ class Judged(NamedTuple):
 
     Attributes:
         total: its return.
-        walked: whether the body walked by the rule of `evaluation.survey`: no fall, speed, straightness, torso off the
-            ground.
+        walked: whether the body walked: no fall, speed, torso off the ground; see `walking.failures`.
         tracking: how well it followed the command, 1 at best; NaN in tasks without this metric.
     """
 
@@ -167,30 +166,22 @@ def _episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
     """Play an episode in every environment, from the seed of its index, and judge the walks."""
     count = environment.num_envs
     touching, fell = np.zeros(count), np.zeros(count, bool)
-    starts, ends = np.zeros((count, 2)), np.zeros((count, 2))
+    places, targets = [], []  # of every control step
 
     def watch(playing, terminated):
-        positions = environment.positions()[:, :2]
-        if not playing.any():
-            starts[:] = positions
-        ends[playing] = positions[playing]
-        touching[playing & _torso_touches(environment)] += 1.0
+        own = zip(environment.tasks, environment.own_observations(), strict=True)
+        blocks = [task.split(vector) for task, vector in own]
+        places.append(environment.places())
+        targets.append([walking.target(*each) for each in zip(environment.tasks, blocks, places[-1], strict=True)])
+        touching[playing] += [each["contact_forces"][:6].any() for each in itertools.compress(blocks, playing)]
         fell[terminated] = True
 
     played, found = protocol.episodes_in_batch(environment, policy, range(count), watch), []
-    for index, (episode, task) in enumerate(zip(played, environment.tasks, strict=True)):
-        failures = survey.failures(
-            task.scene.body,
-            ends[index] - starts[index],
-            STEPS * task.scene.control_timestep,
-            touching[index] / episode.length,
-            "fall" if fell[index] else "time",
-        )
+    moved = np.diff(np.array(places)[..., :2], axis=0)
+    for index, episode in enumerate(played):
+        lasted = slice(episode.length), index
+        speed, _ = walking.shares(np.array(targets)[lasted], moved[lasted], STEPS)
+        ending = "fall" if fell[index] else "time"
+        failures = walking.failures(speed, touching[index] / episode.length, ending)
         found.append(Judged(episode.total, not failures, episode.progress.get("tracking", math.nan)))
     return found
-
-
-def _torso_touches(environment: BodiesEnv) -> np.ndarray:
-    """Whether something pushes the torso (num_envs,)."""
-    own = zip(environment.tasks, environment.own_observations(), strict=True)
-    return np.array([task.split(vector)["contact_forces"][:6].any() for task, vector in own])

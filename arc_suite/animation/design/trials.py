@@ -10,7 +10,7 @@ from arc_suite import checks, evaluation, policies, registry, rotations
 from arc_suite.animation.design.genes import Budget
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation.first_walk import MOST_TILT_COSINE
+from arc_suite.evaluation.walking import LEAST_SHARE, MOST_TILT_COSINE
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.soundness import flaws
 from arc_suite.policies import Policy
@@ -19,7 +19,6 @@ from arc_suite.tasks import energy
 
 _TERMINATING = {"on_divergence": "terminate"}  # counts as a fall
 _SEEDS = 2**32  # of a ground
-LEAST_SHARE = 0.7  # share of what is commanded, below which a cost of transport counts for nothing
 
 
 class WalkMeans(NamedTuple):

@@ -10,7 +10,7 @@ from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from arc_suite import checks, registry
+from arc_suite import checks, registry, rotations
 from arc_suite.envs.bodies.groups import Group, Member, Place, grouped, scatter
 from arc_suite.envs.calls import KnownAttributes, Lock, checked_action, checked_command, one_thread_at_a_time
 from arc_suite.envs.prepare import prepared
@@ -207,9 +207,10 @@ class BodiesEnv(KnownAttributes, Together):
         """
         return self._of_each(lambda group: group._observation.copy())
 
-    def positions(self) -> np.ndarray:
-        """Return the positions (num_envs, 3) of the torsos in the world, m."""
-        return np.array(self._of_each(lambda group: group.batch.data.qpos[:, :3]))
+    def places(self) -> np.ndarray:
+        """Return the places (num_envs, 3) of the torsos in the world: x and y, m, and yaw, rad."""
+        poses = np.array(self._of_each(lambda group: group.batch.data.qpos[:, :7]))
+        return np.column_stack([poses[:, :2], rotations.yaw(poses[:, 3:7])])
 
     def resampled(self) -> np.ndarray:
         """Return in which environments (num_envs,) the latest step began another command; see `VectorEnv.resampled`."""
