@@ -21,6 +21,7 @@ from arc_suite.arenas import FLAT, Arena
 from arc_suite.cli.flags import define_body, define_task, made_body, task
 from arc_suite.cli.summary import summary
 from arc_suite.envs.setup import Setup
+from arc_suite.models.families import sound_body
 from arc_suite.robots import generator, spec_files
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.physics import Physics
@@ -79,7 +80,7 @@ def _body() -> Body:
                 raise ValueError(f"--{name}={FLAGS[name].value}: goes with --legs or --seed, not with --{sources[0]}")
         body = made_body() or registry.body_of(FLAGS.robot)
     elif "seed" in sources:
-        body = generator.random_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
+        body = sound_body(FLAGS.seed, FLAGS.legs, FLAGS.links, FLAGS.layout)
     else:
         body = generator.generate(FLAGS.legs, 3 if FLAGS.links is None else FLAGS.links, FLAGS.layout)
     return body if FLAGS.scale is None else generator.scaled(body, FLAGS.scale)

@@ -18,7 +18,7 @@ from tqdm import tqdm
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.evaluation import protocol, walking
 from arc_suite.learning.teachers import Teacher
-from arc_suite.models.families import varied_body
+from arc_suite.models.families import sound_body, varied_body
 from arc_suite.policies import Policy, Script
 from arc_suite.policies.network import Network
 from arc_suite.robots import ROBOTS, generator
@@ -42,14 +42,14 @@ def _mutant(index: int) -> Body:
 
 # Bodies that test a policy: what makes one of an index from 0 on, and how many there are.
 FAMILIES: dict[str, tuple[Callable[[int], Body], int]] = {
-    "random": (lambda index: generator.random_body(TEST + index), 50),
+    "random": (lambda index: sound_body(TEST + index), 50),
     "varied": (lambda index: varied_body(TEST + index), 50),
     "robots": (_robot, 4),
     "mutants": (_mutant, 20),
-    "many_legs": (lambda index: generator.random_body(TEST + index, legs=9 + index % 4), 20),
-    "four_links": (lambda index: generator.random_body(TEST + index, links=4), 20),
-    "small": (lambda index: generator.scaled(generator.random_body(TEST + index), 0.25), 10),
-    "large": (lambda index: generator.scaled(generator.random_body(TEST + index), 10.0), 10),
+    "many_legs": (lambda index: sound_body(TEST + index, legs=9 + index % 4), 20),
+    "four_links": (lambda index: sound_body(TEST + index, links=4), 20),
+    "small": (lambda index: generator.scaled(sound_body(TEST + index), 0.25), 10),
+    "large": (lambda index: generator.scaled(sound_body(TEST + index), 10.0), 10),
 }
 
 

@@ -1,16 +1,39 @@
 """Families of bodies: a body for every seed, by name of the family."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
 from arc_suite import checks
+from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
-from arc_suite.robots import varied
-from arc_suite.robots.generator import random_body
+from arc_suite.robots import generator, varied
 from arc_suite.robots.spec import Body, SpecError
 
 TRIES = 100  # draws of one seed
+
+
+def sound_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
+    """Return a random body without overlaps, the same for the same arguments; see `generator.drawn`.
+
+    The first draw is `generator.random_body`. Later ones, as of `varied_body`, keep its numbers of legs and links.
+
+    Args:
+        seed: 0 or more.
+        legs: 4 to 12.
+        links: 1 to 4; legs of one link keep the flaw that they do not lift their feet.
+        layout: pairs or radial.
+
+    Returns:
+        The body, `random_<seed>`.
+
+    Raises:
+        ValueError: a value out of range.
+    """
+    first = generator.random_body(seed, legs, links, layout)
+    legs, links = len(first.legs), len(first.legs[0].links)
+    # The generator of (seed, 0) is that of the seed.
+    return sound(lambda random: generator.drawn(random, legs, links, layout), "random", seed, overlaps)
 
 
 def varied_body(seed: int) -> Body:
@@ -31,13 +54,19 @@ def varied_body(seed: int) -> Body:
     return sound(varied.drawn, "varied", seed)
 
 
-def sound(draw: Callable[[np.random.Generator], Body], family: str, seed: int) -> Body:
+def sound(
+    draw: Callable[[np.random.Generator], Body],
+    family: str,
+    seed: int,
+    faults: Callable[[Body], Iterable] = flaws,
+) -> Body:
     """Return the first sound body that is drawn for a seed, `<family>_<seed>`; see `varied_body`.
 
     Args:
         draw: returns a body, or raises a SpecError.
         family: its name.
         seed: 0 or more.
+        faults: returns what is wrong with a body, nothing of a sound one.
 
     Raises:
         ValueError: not a seed, or a family without sound bodies.
@@ -48,24 +77,24 @@ def sound(draw: Callable[[np.random.Generator], Body], family: str, seed: int) -
             body = draw(np.random.default_rng((seed, attempt))).replace(name=f"{family}_{seed}")
         except SpecError:
             continue
-        if not flaws(body):
+        if not any(faults(body)):
             return body
     raise ValueError(f"{family}:{seed}: none of {TRIES} draws stands and can take steps; see arc-suite check")
 
 
 def few_legs(seed: int) -> Body:
-    """Return a random body of 4 to 8 legs, for policies that are tested with more; see `random_body`."""
-    return random_body(seed, legs=4 + checks.seed(seed) % 5).replace(name=f"few_legs_{seed}")
+    """Return a random body of 4 to 8 legs, for policies that are tested with more; see `sound_body`."""
+    return sound_body(seed, legs=4 + checks.seed(seed) % 5).replace(name=f"few_legs_{seed}")
 
 
 def few_links(seed: int) -> Body:
-    """Return a random body of 2 or 3 links a leg, for policies that are tested with 4; see `random_body`."""
-    return random_body(seed, links=2 + checks.seed(seed) % 2).replace(name=f"few_links_{seed}")
+    """Return a random body of 2 or 3 links a leg, for policies that are tested with 4; see `sound_body`."""
+    return sound_body(seed, links=2 + checks.seed(seed) % 2).replace(name=f"few_links_{seed}")
 
 
 # Functions from a seed to a body, by name. `registration.register` adds those of other packages.
 FAMILIES: dict[str, Callable[[int], Body]] = {
-    "random": random_body,
+    "random": sound_body,
     "varied": varied_body,
     "few_legs": few_legs,
     "few_links": few_links,

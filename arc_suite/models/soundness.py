@@ -1,4 +1,4 @@
-"""Flaws that keep a body from standing or walking, found in its standing pose without simulation."""
+"""Flaws that keep a body from standing or walking, found in poses without simulation."""
 
 import math
 from collections.abc import Iterable, Iterator
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.models.outline import solid_corners
+from arc_suite.models.overlap import overlaps
 from arc_suite.models.sizing import sized
 from arc_suite.models.standing import Standing, standing
 from arc_suite.robots.spec import Body, Leg, Link
@@ -19,6 +20,8 @@ _HOPELESS_OVERHANG = 0.05  # of the centre of mass beyond the feet
 
 _LEAST_TILT = 0.15  # margin of stability as a share of the height of the centre of mass; generated bodies have 0.7 to 2
 _LARGEST_TURN = 0.5  # rad, of a joint
+
+_SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # of the legs' mounts, tried against overlaps
 
 
 class Flaw(NamedTuple):
@@ -38,7 +41,7 @@ class Flaw(NamedTuple):
 def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk."""
     pose = standing(body)
-    return [flaw for check in (_height, _support, _motors, _joints) for flaw in check(body, pose)]
+    return [flaw for check in (_height, _support, _motors, _joints, _parts) for flaw in check(body, pose)]
 
 
 def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
@@ -166,3 +169,17 @@ def _reach(leg: Leg, jacobian: np.ndarray) -> tuple[float, float]:
     low, high = np.radians([joint.range_deg for joint in leg.joints]).clip(-_LARGEST_TURN, _LARGEST_TURN).T
     sweep = abs(jacobian[0]) * np.minimum(-low, high)
     return sweep.max(), np.maximum(jacobian[2] * low, jacobian[2] * high).max()
+
+
+def _parts(body: Body, pose: Standing) -> Iterator[Flaw]:
+    """Find legs that overlap, with each other or with the torso."""
+    found = max(overlaps(body), key=lambda each: each.depth, default=None)
+    if found is None:
+        return
+    text = f"{' and '.join(found.names)} overlap by {found.depth:.3g} m in {found.pose}"
+    for spread in _SPREADS:
+        if not any(overlaps(body, spread)):
+            outwards = [(spread - 1.0) * np.array(leg.mount[:2]) for leg in body.legs]
+            yield Flaw(f"{text}: legs mounted {spread:g} times as far out fit", False, _moved(body, outwards))
+            return
+    yield Flaw(f"{text}: shorter or thinner links fit", False)

@@ -51,7 +51,7 @@ def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
         body: the spec.
         angles: of the joints, rad, in place of zero for all of them; the torso stays where it is.
     """
-    model = _model(body)
+    model = compiled(body)
     data = mujoco.MjData(model)
     if angles is not None:
         data.qpos[7:] = angles
@@ -85,8 +85,8 @@ def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
 
 
 @functools.lru_cache(maxsize=256)
-def _model(body: Body) -> mujoco.MjModel:
-    """Compile the body of `builder.build` without motors, contacts and constants.
+def compiled(body: Body) -> mujoco.MjModel:
+    """Return the body of `builder.build` without motors, contacts and constants; geoms are ordered as in the spec.
 
     MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model.
     """

@@ -96,7 +96,7 @@ def _towards(jacobian, displacement, weights, below, above) -> np.ndarray:
     """
     wanted = np.array(weights) * displacement
     weighted = np.diag(weights) @ jacobian
-    damping = _DAMPING * abs(jacobian).max()
+    damping = _DAMPING * abs(jacobian).max() or 1.0  # of a leg that nothing moves
     square = weighted.T @ weighted + damping**2 * np.eye(jacobian.shape[1])
     angles = np.linalg.solve(square, weighted.T @ wanted)
     moved = weighted @ angles

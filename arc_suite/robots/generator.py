@@ -95,7 +95,28 @@ def generate(legs: int, links: int, layout: str | None = None) -> Body:
 
 
 def random_body(seed: int, legs: int | None = None, links: int | None = None, layout: str | None = None) -> Body:
-    """Make a random body, the same for the same arguments.
+    """Make a random body, the same for the same arguments; its legs may overlap, unlike `models.families.sound_body`'s.
+
+    Args:
+        seed: 0 or more.
+        legs: 4 to 12.
+        links: 1 to 4.
+        layout: pairs or radial.
+
+    Returns:
+        The body, `random_<seed>`; see `drawn`.
+
+    Raises:
+        ValueError: a value out of range.
+    """
+    random = np.random.default_rng(checks.seed(seed))
+    return drawn(random, legs, links, layout).replace(name=f"random_{seed}")
+
+
+def drawn(
+    random: np.random.Generator, legs: int | None = None, links: int | None = None, layout: str | None = None
+) -> Body:
+    """Draw a body, `random`.
 
     Draws, where not given, 4 to 12 legs, 2 to 4 links and, for an even number of legs, the layout,
     radial for three in ten. Always draws:
@@ -111,18 +132,14 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
       pair (radial: each leg) reaches 0.75 to 1.3 times that.
 
     Args:
-        seed: 0 or more.
+        random: to draw from.
         legs: 4 to 12.
         links: 1 to 4.
         layout: pairs or radial.
 
-    Returns:
-        The body, `random_<seed>`.
-
     Raises:
         ValueError: a value out of range.
     """
-    random = np.random.default_rng(checks.seed(seed))
     drawn_legs, drawn_links = (int(random.integers(low, high + 1)) for low, high in (LEGS, (2, LINKS[1])))
     legs, links = drawn_legs if legs is None else legs, drawn_links if links is None else links
     legs, links = checks.integer("legs", legs, *LEGS), checks.integer("links", links, *LINKS)
@@ -145,7 +162,7 @@ def random_body(seed: int, legs: int | None = None, links: int | None = None, la
         ],
         reaches=tuple(map(float, reaches)),
     )
-    return proportioned(f"random_{seed}", legs, layout, proportions)
+    return proportioned("random", legs, layout, proportions)
 
 
 def scaled(body: Body, factor: float) -> Body:

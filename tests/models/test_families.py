@@ -12,6 +12,7 @@ from arc_suite import registry
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import transfer
 from arc_suite.models import families
+from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import SpecError
@@ -60,11 +61,11 @@ def test_draws_that_are_unsound_are_drawn_again_by_seed_and_attempt():
         asked.append(random.integers(1000))
         if len(asked) == 1:
             raise SpecError("too small")
-        body = generator.random_body(3)
+        body = generator.generate(6, 3)
         return body if len(asked) > 2 else body.replace(torso=body.torso.replace(standing_height=9.0))
 
     body = families.sound(draw, "late", 5)
-    assert body == generator.random_body(3).replace(name="late_5")
+    assert body == generator.generate(6, 3).replace(name="late_5")
     assert asked == [np.random.default_rng((5, attempt)).integers(1000) for attempt in range(3)]
 
 
@@ -78,9 +79,34 @@ def test_a_family_without_sound_bodies_is_one_line():
 def test_seeds_stand_for_the_same_bodies_for_good():
     """A change of this digest changes the results of studies that name bodies by their seeds."""
     text = "".join(
-        body_to_json(make(seed)) for make in (generator.random_body, families.varied_body) for seed in range(8)
+        body_to_json(make(seed)) for make in (families.sound_body, families.varied_body) for seed in range(8)
     )
-    assert hashlib.sha256(text.encode()).hexdigest()[:16] == "a3e393c736d9465d"
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == "2bf1992b2f75d2e4"
+
+
+@pytest.mark.parametrize("family", families.FAMILIES)
+@pytest.mark.parametrize("seeds", [range(20), pytest.param(range(20, 200), marks=pytest.mark.long)], ids=str)
+def test_bodies_of_every_family_are_sound(family, seeds):
+    assert [seed for seed in seeds if flaws(families.FAMILIES[family](seed))] == []
+
+
+def test_a_sound_first_draw_is_the_body_and_later_ones_keep_legs_and_links():
+    kept = 0
+    for seed in range(40):
+        first, body = generator.random_body(seed), families.sound_body(seed)
+        assert body.name == first.name
+        assert (len(body.legs), len(body.legs[0].links)) == (len(first.legs), len(first.legs[0].links))
+        assert (body == first) == (not any(overlaps(first)))
+        kept += body == first
+    assert 10 < kept < 40
+
+
+def test_what_is_asked_of_a_sound_body():
+    body = families.sound_body(10, legs=8, links=4, layout="pairs")
+    assert [len(body.legs), len(body.legs[0].links), body.legs[0].name] == [8, 4, "l1"] and not flaws(body)
+    assert len(families.sound_body(11, 4, 1).legs[0].links) == 1
+    with refused("legs: expected an integer from 4 to 12, got 13"):
+        families.sound_body(0, legs=13)
 
 
 def test_restricted_families_leave_out_what_tests_have():
@@ -93,7 +119,7 @@ def test_restricted_families_leave_out_what_tests_have():
 
 
 def test_names_of_families():
-    assert registry.body_of("random:7") == generator.random_body(7)
+    assert registry.body_of("random:7") == families.sound_body(7)
     assert registry.body_of("varied:7") == families.varied_body(7)
     assert registry.bodies_of("varied:3-5") == tuple(families.varied_body(seed) for seed in (3, 4, 5))
     assert registry.bodies_of("queen") == (registry.body_of("queen"),)

@@ -1,13 +1,17 @@
 """What keeps a body from standing or walking is told in one line, with the value that would fit."""
 
+import math
+
 import pytest
 from refusals import refused
 
 import arc_suite
 from arc_suite.cpg import Demonstrator
+from arc_suite.models.families import sound_body
+from arc_suite.models.overlap import overlaps
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
-from arc_suite.robots.spec import Motor, Solid
+from arc_suite.robots.spec import Body, Foot, Joint, Leg, Link, Motor, Solid, Torso
 from arc_suite.robots.spec_files import EXAMPLES, load_body
 
 BODY = generator.generate(6, 3)
@@ -71,13 +75,29 @@ def lifted(name, by):
     return BODY.replace(legs=tuple(map(leg, BODY.legs)))
 
 
+def square(mounts, out, deep=0.05, range_deg=(-45.0, 45.0)):
+    """A body of legs that go `out` to the sides, m, and down; their hips turn about the vertical."""
+    hip = Joint(name="hip", axis=(0.0, 0.0, 1.0), range_deg=range_deg)
+    knee = Joint(name="knee", axis=(-1.0, 0.0, 0.0), range_deg=(-80.0, 80.0))
+    links = (
+        Link(name="upper", end=(0.0, out, 0.0), radius=0.02, joint=hip),
+        Link(name="lower", end=(0.0, 0.0, -0.3), radius=0.02, joint=knee),
+    )
+    left = [
+        Leg(name=f"l{number}", mount=(x, 0.1, 0.0), links=links, foot=Foot(radius=0.02))
+        for number, x in enumerate(mounts, 1)
+    ]
+    legs = (*left, *(leg.mirrored(leg.name.replace("l", "r")) for leg in left))
+    chassis = Solid(name="chassis", shape="box", size=(0.4, 0.2, deep))
+    return Body(name="square", torso=Torso(standing_height=0.32, solids=(chassis,)), legs=legs)
+
+
 SOUND = [
     *(ROBOTS[name] for name in ("queen", "bastion", "tick")),
     *map(load_body, EXAMPLES),
-    *(generator.generate(legs, links) for legs in (4, 5, 12) for links in (2, 4)),
-    *map(generator.random_body, range(20)),
+    *(generator.generate(legs, links) for legs in (4, 5, 9) for links in (2, 4)),
+    *map(sound_body, range(20)),
     *(generator.scaled(BODY, scale) for scale in (0.05, 50.0)),
-    narrow(0.2),
     high(0.43),
     with_gear(WEAK, range_deg=(0.0, 40.0)),  # the limit holds what the motor cannot
     with_gear(1e-6, ("hip",)),  # which carries nothing
@@ -163,3 +183,69 @@ def test_the_body_stands_on_motors_of_the_gear_that_fits_and_sinks_on_those_that
             break
     height = timestep.observation["posture"][0]
     assert height > 0.38 if stands else height < 0.25
+
+
+def test_feet_near_the_middle_are_enough():
+    assert not any("tower" in flaw.text for flaw in flaws(narrow(0.2)))
+
+
+@pytest.mark.parametrize(
+    ("body", "text", "cured"),
+    [
+        (
+            square((0.1, -0.1), out=0.05, deep=0.2, range_deg=(0.0, 45.0)),
+            "chassis and l1_lower overlap by 0.07 m in the standing pose: legs mounted 1.75 times as far out fit",
+            True,
+        ),
+        (
+            square((0.3, 0.0, 0.0), out=0.4, range_deg=(0.0, 45.0)),
+            "l2_upper and l3_lower overlap by 0.04 m in the standing pose: shorter or thinner links fit",
+            False,
+        ),
+    ],
+    ids=["torso", "legs"],
+)
+def test_overlaps_are_told_with_what_fits(body, text, cured):
+    *_, flaw = flaws(body)
+    assert (flaw.text, flaw.hopeless, flaw.cure is not None) == (text, False, cured)
+    assert not cured or not any(overlaps(flaw.cure))
+
+
+def test_depths_of_overlaps():
+    found = list(overlaps(square((0.4, 0.015, -0.015, -0.4), out=0.4)))
+    depths = {each.names: each.depth for each in found if each.pose == "the standing pose"}
+    near = [("upper", "lower"), ("lower", "upper"), ("lower", "lower"), ("lower", "foot"), ("foot", "lower")]
+    pairs = {(f"{side}2_{one}", f"{side}3_{other}") for side in "lr" for one, other in [*near, ("foot", "foot")]}
+    assert depths == dict.fromkeys(pairs, pytest.approx(0.01, abs=1e-6))
+    assert 0.02 < max(each.depth for each in found) < 0.04 + 1e-6  # as legs cross
+
+
+@pytest.mark.parametrize(("apart", "overlap"), [(0.0362, True), (0.0364, True), (0.0369, False), (0.0401, False)])
+def test_a_hundredth_of_the_height_may_overlap(apart, overlap):
+    body = square((0.3, apart, 0.0, -0.3), out=0.4, range_deg=(0.0, 45.0))
+    assert any(overlaps(body)) == overlap
+
+
+def test_hips_may_overlap_and_rigid_links_before_them():
+    body = generator.generate(5, 3)
+    drawn_in = (leg.replace(mount=tuple(0.1 * part for part in leg.mount)) for leg in body.legs)
+    body = body.replace(legs=tuple(drawn_in), torso=deep(0.02).torso)
+    assert max(math.hypot(*leg.mount) for leg in body.legs) < body.legs[0].links[0].radius
+    assert not any(overlaps(body))
+    assert not any(overlaps(ROBOTS["leaper"]))
+
+
+def test_neighbours_overlap_at_different_ends_of_their_strides():
+    """Bastion walks in a gait of its own; in the one that suits its body, its legs reach into each other."""
+    body = generator.scaled(ROBOTS["bastion"], 1.0)
+    assert {each.pose for each in overlaps(body)} == {"a stride"}
+    assert ("l1_upper", "l2_lower") in {each.names for each in overlaps(body)}
+    assert not any(overlaps(ROBOTS["bastion"]))
+
+
+def test_overlaps_scale_with_the_body():
+    body = generator.generate(12, 2, "radial")
+    depths = [[each.depth for each in overlaps(generator.scaled(body, scale))] for scale in (0.5, 1.0, 2.0)]
+    assert len(depths[1]) > 0
+    assert depths[1] == pytest.approx([2.0 * depth for depth in depths[0]], rel=1e-3)
+    assert depths[2] == pytest.approx([2.0 * depth for depth in depths[1]], rel=1e-3)

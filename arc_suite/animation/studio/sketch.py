@@ -7,6 +7,7 @@ from typing import Any
 
 from arc_suite import checks, registry
 from arc_suite.envs.setup import Setup
+from arc_suite.models import families
 from arc_suite.robots import ROBOTS, generator, palettes
 from arc_suite.robots.shaping import Shape, link_names, shaped
 from arc_suite.robots.spec import Body
@@ -78,7 +79,7 @@ def source_body(sketch: Sketch) -> Body:
     if sketch.source == LEGS:
         return generator.generate(sketch.legs, sketch.links, _given(sketch.layout))
     if sketch.source == RANDOM:
-        return generator.random_body(sketch.seed)
+        return families.sound_body(sketch.seed)
     if sketch.source == FILE:
         return body_from_json(sketch.file)
     name = checks.name(sketch.source, sources(), "source", near=(FILE,))
@@ -145,25 +146,27 @@ def file_name(made: Body) -> str:
 
 def python_lines(sketch: Sketch) -> str:
     """Return Python that opens the same environment and policy; a body from a file is read from `file_name`."""
-    made = source_body(sketch)
+    made, models, robots = source_body(sketch), [], []
     if sketch.source == LEGS:
         layout = "" if sketch.layout == OWN else f', "{sketch.layout}"'
-        modules, code = ["generator"], f"generator.generate({sketch.legs}, {sketch.links}{layout})"
+        robots, code = ["generator"], f"generator.generate({sketch.legs}, {sketch.links}{layout})"
     elif sketch.source == RANDOM:
-        modules, code = ["generator"], f"generator.random_body({sketch.seed})"
+        models, code = ["families"], f"families.sound_body({sketch.seed})"
     elif sketch.source in ROBOTS:
-        modules, code = ["ROBOTS"], f'ROBOTS["{sketch.source}"]'
+        robots, code = ["ROBOTS"], f'ROBOTS["{sketch.source}"]'
     else:
         name = file_name(made) if sketch.source == FILE else sketch.source
-        modules, code = ["spec_files"], f'spec_files.load_body("{name}")'
+        robots, code = ["spec_files"], f'spec_files.load_body("{name}")'
     if shape := _shape(sketch, made):
         changes = ", ".join(f"{name}={value!r}" for name, value in shape.items())
-        modules, code = [*modules, "shaping"], f"shaping.shaped({code}, {changes})"
+        robots, code = [*robots, "shaping"], f"shaping.shaped({code}, {changes})"
     if sketch.palette != OWN:
         code = f"{code}.replace(palette={palettes.parsed(sketch.palette)!r})"
     options = settings(sketch, body(sketch))
+    packages = (("arc_suite", ["policies"]), ("arc_suite.models", models), ("arc_suite.robots", robots))
+    imports = "".join(f"from {package} import {', '.join(names)}\n" for package, names in packages if names)
     return (
-        f"import arc_suite\nfrom arc_suite import policies\nfrom arc_suite.robots import {', '.join(modules)}\n\n"
+        f"import arc_suite\n{imports}\n"
         f"body = {code}\n"
         f'environment = arc_suite.load(body, "{sketch.task}"{f", {options!r}" if options else ""})\n'
         f"policy = policies.policy({sketch.policy!r}, body, {preset(sketch)!r}, task=environment.task.definition)\n"

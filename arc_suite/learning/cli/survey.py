@@ -20,7 +20,7 @@ from arc_suite.cli.flags import MOST, define_task, task
 from arc_suite.cli.program import progress
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import survey
-from arc_suite.models.families import FAMILIES
+from arc_suite.models.families import FAMILIES, sound_body
 from arc_suite.robots import generator
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import films
@@ -60,7 +60,7 @@ def member(seed: int) -> Body:
         ValueError: an unknown family, or a number of legs or links for another than `random`.
     """
     if FLAGS.family == "random":
-        return generator.random_body(seed, FLAGS.legs, FLAGS.links)
+        return sound_body(seed, FLAGS.legs, FLAGS.links)
     for name in ("legs", "links"):
         if FLAGS[name].value is not None:
             raise ValueError(f"--{name}={FLAGS[name].value}: goes with the family random, not with {FLAGS.family}")

@@ -10,6 +10,7 @@ from refusals import refused
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.creature import opened
 from arc_suite.animation.studio.sketch import FILE, RANDOM, Sketch
+from arc_suite.models.families import sound_body
 from arc_suite.models.soundness import flaws
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json, load_body
@@ -20,7 +21,7 @@ HIGH = HIGH.replace(torso=HIGH.torso.replace(standing_height=0.5))
 SKETCHES = {
     "legs": Sketch(legs=6, links=2),
     "layout": Sketch(legs=6, layout="radial", gait="wave"),
-    "shaped": Sketch(scale=2.0, fan=5.0, lengths=(("lower", 1.3), ("upper", 1.0)), speed=0.8),
+    "shaped": Sketch(legs=6, scale=2.0, fan=5.0, lengths=(("lower", 1.3), ("upper", 1.0)), speed=0.8),
     "robot": Sketch(source="queen", ground="bumps", kicks=0.5, task="walk", preset="tuned"),
     "shaped robot": Sketch(source="tick", width=1.2, palette="moss"),
     "example": Sketch(source="spider", task="stairs", settings='{"difficulty": 0.5}'),
@@ -36,7 +37,7 @@ SKETCHES = {
         ("layout", generator.generate(6, 3, "radial")),
         ("robot", ROBOTS["queen"]),
         ("example", load_body("spider")),
-        ("random", generator.random_body(7).replace(palette=7)),
+        ("random", sound_body(7).replace(palette=7)),
         ("file", HIGH),
     ],
 )
