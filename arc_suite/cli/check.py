@@ -5,11 +5,14 @@
   arc-suite check --task crouching:crouch --robot tick
 
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
-nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps; where it falls,
-the line names the fields to leave out, which are then sized to suit the body. MJCF and URDF are not read.
+nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps. Where it falls,
+or stays below 0.7 of the target speed, the line names the fields to leave out, which are then sized to suit
+the body. MJCF and URDF are not read.
 
 A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
-the line names the terms, metrics and blocks that differ. Exit status 1 if there is any flaw, fall or difference.
+the line names the terms, metrics and blocks that differ.
+
+Exit status 1 if there is any flaw, fall, slow walk or difference.
 """
 
 from absl import flags
@@ -49,21 +52,23 @@ def _check_body(spec: str) -> int:
 
 def _check_walk(spec: str, body: Body) -> int:
     tried = first_walk.walk(body)
-    if not tried.fell:
+    if tried.quality == 2:
         print(f"{spec}: {_said(tried)}")
         return 0
-    cure = first_walk.left_out(body)
+    cure = first_walk.left_out(body, tried.quality)
     advice = (
         f"leaving out {', '.join(first_walk.FIELDS)} of its joints does not help"
         if cure is None
         else f"leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
     )
-    print(f"{spec}: {body.name} falls after {tried.length} control steps: {advice}")
+    flaw = f"falls after {tried.length} control steps" if tried.fell else f"is slow: {_said(tried)}"
+    print(f"{spec}: {body.name} {flaw}: {advice}")
     return 1
 
 
 def _said(tried: first_walk.FirstWalk) -> str:
-    return f"walks {tried.length} control steps at {tried.speed:.2f} m/s (target {tried.target:.2f})"
+    speed = f"{tried.speed:.2f} m/s ({tried.share:.2f} of the target {tried.target:.2f})"
+    return f"walks {tried.length} control steps at {speed}"
 
 
 def _check_task() -> int:

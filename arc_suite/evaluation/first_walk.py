@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import protocol
+from arc_suite.evaluation import protocol, walking
 from arc_suite.robots.spec import Body, Link
 
 STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
@@ -30,6 +30,16 @@ class FirstWalk(NamedTuple):
         """Whether the walk ended in a fall."""
         return self.length < STEPS
 
+    @property
+    def share(self) -> float:
+        """The speed as a share of the target."""
+        return self.speed / self.target
+
+    @property
+    def quality(self) -> int:
+        """2 for a walk at `walking.LEAST_SHARE` of the target or more, 1 for a slower one, 0 for a fall."""
+        return 0 if self.fell else 1 + (self.share >= walking.LEAST_SHARE)
+
 
 def walk(body: Body) -> FirstWalk:
     """Let the demonstrator `medium` walk a body.
@@ -42,18 +52,22 @@ def walk(body: Body) -> FirstWalk:
     return FirstWalk(episode.length, episode.progress["speed"], environment.task.definition.parameters.target_velocity)
 
 
-def left_out(body: Body) -> tuple[tuple[str, ...], FirstWalk] | None:
-    """Return the fewest fields of joints without which a body does not fall, and that walk; None if none help.
+def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | None:
+    """Return the fields of joints without which a body walks best, and that walk.
 
-    Of several sets of as many fields it is the one with the fastest walk.
+    The best walk has the highest quality; among equals, the fewest fields are left out, then the speed counts.
+
+    Args:
+        body: to leave fields out of.
+        quality: of its own walk; None is returned if no other has a higher one.
     """
     joints = [joint for leg in body.legs for joint in leg.joints]
     given = [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
-    for count in range(1, len(given) + 1):
-        walks = {names: walk(_leaving_out(body, names)) for names in itertools.combinations(given, count)}
-        if upright := {names: each for names, each in walks.items() if not each.fell}:
-            return max(upright.items(), key=lambda item: item[1].speed)
-    return None
+    counts = range(1, len(given) + 1)
+    sets = itertools.chain.from_iterable(itertools.combinations(given, count) for count in counts)
+    walks = {names: walk(_leaving_out(body, names)) for names in sets}
+    better = {names: each for names, each in walks.items() if each.quality > quality}
+    return max(better.items(), key=lambda item: (item[1].quality, -len(item[0]), item[1].share), default=None)
 
 
 def _leaving_out(body: Body, names: tuple[str, ...]) -> Body:

@@ -110,11 +110,27 @@ def test_a_body_that_falls_is_told_what_to_leave_out(path):
     assert (done.returncode, stands) == (1, f"{path}: quadruped stands and can take steps")
     found = re.fullmatch(
         rf"{path}: quadruped falls after (\d+) control steps: leave out (.*) of its joints: "
-        r"it then walks 100 control steps at -?[\d.]+ m/s \(target 0\.37\)",
+        r"it then walks 100 control steps at [\d.]+ m/s \([\d.]+ of the target 0\.37\)",
         falls,
     )
     assert int(found[1]) < 100 and set(found[2].split(" and ")) <= {"motor", "damping", "armature"}
-    path.write_text(_quadruped())
+
+
+def test_a_walk_is_judged_by_its_share_of_the_target_speed():
+    done = check("--walk", "spider")
+    line = r"spider: walks 100 control steps at 0\.\d\d m/s \((0\.9|1\.0)\d of the target 0\.31\)"
+    assert done.returncode == 0 and re.fullmatch(line, done.stdout.splitlines()[1])
+
+
+@pytest.mark.slow
+def test_a_slow_body_is_told_what_to_leave_out(path):
+    spec = json.loads(spec_files.body_to_json(spec_files.load_body("spider")))
+    for leg in spec["legs"]:
+        for link in leg["links"]:
+            link["joint"]["damping"] = 0.5
+    path.write_text(json.dumps(spec))
     done = check("--walk", path)
-    assert done.returncode == 0
-    assert done.stdout.splitlines()[1].startswith(f"{path}: walks 100 control steps at 0.")
+    walks = r"walks 100 control steps at -?0\.\d\d m/s \({} of the target 0\.31\)"
+    slow, fast = walks.format(r"-?0\.[0-6]\d"), walks.format(r"(0\.9|1\.0)\d")
+    line = rf"{path}: spider is slow: {slow}: leave out damping of its joints: it then {fast}"
+    assert done.returncode == 1 and re.fullmatch(line, done.stdout.splitlines()[1])
