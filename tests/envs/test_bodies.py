@@ -19,7 +19,7 @@ from arc_suite.envs import stacked
 from arc_suite.envs.bodies import BodiesEnv
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
-from arc_suite.models.families import varied_body
+from arc_suite.models.families import sound_body, varied_body
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import command, tokens
 from arc_suite.tasks.walk import Walk
@@ -143,7 +143,7 @@ def test_bodies_of_one_layout_share_a_batch():
     again = make(FEW[:2], num_envs=5)
     assert [body.name for body in again.bodies] == [FEW[index % 2].name for index in range(5)]
     assert [place.indices.tolist() for place in again._places] == [[0, 1, 2, 3, 4]]
-    assert make("random:3-4", num_envs=2).bodies == (generator.random_body(3), generator.random_body(4))
+    assert make("random:3-4", num_envs=2).bodies == (sound_body(3), sound_body(4))
     assert len(make(["varied:0-1", "queen", FEW[0]], num_envs=4).bodies) == 4
 
 
