@@ -59,11 +59,13 @@ class Judged(NamedTuple):
     Attributes:
         total: its return.
         walked: whether the body walked: no fall, speed, torso off the ground; see `walking.failures`.
+        speed: as a share of the target speed; see `walking.shares`.
         tracking: how well it followed the command, 1 at best; NaN in tasks without this metric.
     """
 
     total: float
     walked: bool
+    speed: float
     tracking: float
 
 
@@ -96,6 +98,7 @@ class TransferResult(NamedTuple):
         count: of the bodies.
         walk: share of the bodies that walk.
         demonstrated: share of the bodies that their demonstrators walk.
+        speed: mean of the policy's speeds, as shares of the target speed.
         score: gain of the policy over standing still, as a share of the demonstrators': sums over bodies.
         worst: the same of the tenth of the bodies with the lowest scores.
         tracking: mean tracking as a share of the demonstrators' mean; NaN in tasks without this metric.
@@ -104,6 +107,7 @@ class TransferResult(NamedTuple):
     count: int  # type: ignore[assignment]  # hides the method of tuples
     walk: float
     demonstrated: float
+    speed: float
     score: float
     worst: float
     tracking: float
@@ -147,6 +151,7 @@ def result(played: list[Comparison]) -> TransferResult:
         count=len(played),
         walk=float(np.mean([each.policy.walked for each in played])),
         demonstrated=float(np.mean([each.demonstrator.walked for each in played])),
+        speed=float(np.mean([each.policy.speed for each in played])),
         score=_gain(scored),
         worst=_gain(worst),
         tracking=float(policy / demonstrator),
@@ -183,5 +188,5 @@ def _episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
         speed, _ = walking.shares(np.array(targets)[lasted], moved[lasted], STEPS)
         ending = "fall" if fell[index] else "time"
         failures = walking.failures(speed, touching[index] / episode.length, ending)
-        found.append(Judged(episode.total, not failures, episode.progress.get("tracking", math.nan)))
+        found.append(Judged(episode.total, not failures, speed, episode.progress.get("tracking", math.nan)))
     return found

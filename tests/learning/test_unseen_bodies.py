@@ -14,17 +14,18 @@ from arc_suite.robots import ROBOTS, generator
 from arc_suite.tasks import tokens
 
 
-def compared(policy, demonstrator, zero, walked=True):
-    played = ((policy, walked, math.nan), (demonstrator, True, math.nan), (zero, 0, 0))
+def compared(policy, demonstrator, zero, walked=True, speed=1.0):
+    played = ((policy, walked, speed, math.nan), (demonstrator, True, 0.8, math.nan), (zero, False, 0.0, math.nan))
     return Comparison("body", *(Judged(*each) for each in played))
 
 
 def test_a_score_is_the_way_from_standing_to_the_demonstrator():
     assert compared(15.0, 20.0, 10.0).score == 0.5
     assert math.isnan(compared(15.0, 10.0, 10.0).score)
-    result = transfer.result([compared(15.0, 20.0, 10.0), compared(10.0, 30.0, 10.0, False), compared(0.0, 1.0, 2.0)])
+    slow = compared(10.0, 30.0, 10.0, False, 0.4)
+    result = transfer.result([compared(15.0, 20.0, 10.0), slow, compared(0.0, 1.0, 2.0)])
     assert (result.count, result.score, result.worst) == (3, pytest.approx(5.0 / 30.0), 0.0)
-    assert (result.walk, result.demonstrated) == (pytest.approx(2 / 3), 1.0)
+    assert (result.walk, result.demonstrated, result.speed) == (pytest.approx(2 / 3), 1.0, pytest.approx(0.8))
 
 
 def test_families_hold_bodies_that_nobody_trains_with():
@@ -63,6 +64,7 @@ def test_demonstrators_walk_and_drawn_weights_do_not(monkeypatch):
     small, large = transfer.compare(drawn(), bodies, "walk")
     assert small.demonstrator.walked and large.demonstrator.walked
     assert not small.policy.walked and not small.zero.walked
+    assert small.demonstrator.speed > 0.7 and abs(small.zero.speed) < 0.1
     assert small.demonstrator.total > small.zero.total > 0.0
     for one, other in ((small.demonstrator, large.demonstrator), (small.zero, large.zero)):
         assert one.total == pytest.approx(other.total, rel=0.05)

@@ -1,9 +1,13 @@
 """Score a policy of many bodies on bodies that it has not seen, by family.
 
 A score is (return - standing still) / (demonstrator - standing still), each body with its own demonstrator: 0 is
-standing still, 1 the demonstrator. Each body plays 400 control steps. `walk` is the share of bodies that walk, by the
-rule of arc-suite survey. Families: random and varied, 50 bodies of seeds that no run trains with; the four robots with
-motors sized anew; 20 mutants of them; and 10 random bodies a quarter, and ten times, as large.
+standing still, 1 the demonstrator. A demonstrator that hardly walks makes any score large, so speeds are shown, too.
+Each body plays 400 control steps.
+
+`walk` is the share of bodies that walk, by the rule of arc-suite survey, `speed` the policy's mean share of the target
+speed, and `tracking`, in tasks with a command, a share of the demonstrators'. Families: random and varied, 50 bodies of
+seeds that no run trains with; the four robots with motors sized anew; 20 mutants of them; and 10 random bodies a
+quarter, and ten times, as large.
 
   arc-suite transfer --policy runs/varied.0-127-walk-dagger_bodies-0
   arc-suite transfer --policy universal --task steer --families varied,robots -o bodies.csv

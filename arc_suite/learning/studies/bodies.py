@@ -9,7 +9,7 @@ from arc_suite.learning.studies import csv_files
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.learning.transfer import Comparison, Judged
 
-COLUMNS = ("policy", "task", "family", "body", "who", "return", "walked", "tracking")
+COLUMNS = ("policy", "task", "family", "body", "who", "return", "walked", "speed", "tracking")
 WHO = ("policy", "demonstrator", "zero")
 
 
@@ -25,8 +25,9 @@ def write(path: Path, policy: str, task: str, played: Mapping[str, Sequence[Comp
     for family, compared in played.items():
         for each in compared:
             for who in WHO:
-                total, walked, tracking = getattr(each, who)
-                numbers = {"return": round(total, 3), "walked": int(walked), "tracking": round(tracking, 4)}
+                total, walked, speed, tracking = getattr(each, who)
+                numbers = {"return": round(total, 3), "walked": int(walked)}
+                numbers |= {"speed": round(speed, 4), "tracking": round(tracking, 4)}
                 rows.append(owner | {"family": family, "body": each.body, "who": who} | numbers)
     csv_files.write(path, COLUMNS, rows)
 
@@ -42,16 +43,21 @@ def read(path: Path) -> dict[tuple[str, str], dict[str, list[Comparison]]]:
     found: dict[tuple[str, str], dict[str, list[Comparison]]] = {}
     for three in zip(*[iter(rows)] * len(WHO), strict=True):
         policy, task, family, body, *_ = three[0].values()
-        judged = [Judged(float(row["return"]), row["walked"] == "1", float(row["tracking"])) for row in three]
+        judged = map(_judged, three)
         found.setdefault((policy, task), {}).setdefault(family, []).append(Comparison(body, *judged))
     return found
+
+
+def _judged(row: Mapping[str, str]) -> Judged:
+    return Judged(float(row["return"]), row["walked"] == "1", float(row["speed"]), float(row["tracking"]))
 
 
 def text(path: Path) -> str:
     """Return the table of all policies in Markdown.
 
-    A cell holds the share of bodies that walk, the score and, in brackets, that of the worst tenth. In tasks with a
-    command it holds the score and the tracking as a share of the demonstrators'.
+    A cell holds the share of bodies that walk, the score and, in brackets, that of the worst tenth; then the speed as a
+    share of the target, where it was measured. In tasks with a command it holds the score and the tracking as a share
+    of the demonstrators'.
 
     Raises:
         ValueError: no table of episodes, or a damaged one.
@@ -70,5 +76,6 @@ def _cell(result: transfer.TransferResult | None) -> str:
     if result is None:
         return "not run"
     if math.isnan(result.tracking):
-        return f"{result.walk:.0%}, {result.score:.2f} ({result.worst:.2f})"
+        speed = "" if math.isnan(result.speed) else f", speed {result.speed:.2f}"
+        return f"{result.walk:.0%}, {result.score:.2f} ({result.worst:.2f}){speed}"
     return f"{result.score:.2f}, tracking {result.tracking:.2f}"

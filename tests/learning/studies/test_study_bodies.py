@@ -15,8 +15,9 @@ ROOT = pathlib.Path(__file__).parents[3]
 STUDY = ROOT / "studies" / "bodies.csv"
 
 
-def compared(policy, tracking=math.nan):
-    return Comparison("body", Judged(policy, True, tracking), Judged(20.0, True, 0.8), Judged(10.0, False, 0.1))
+def compared(policy, tracking=math.nan, speed=0.9):
+    demonstrator, zero = Judged(20.0, True, 1.0, 0.8), Judged(10.0, False, 0.0, 0.1)
+    return Comparison("body", Judged(policy, True, speed, tracking), demonstrator, zero)
 
 
 def test_episodes_are_read_as_they_were_written(tmp_path):
@@ -32,6 +33,9 @@ def test_episodes_are_read_as_they_were_written(tmp_path):
         "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | not run | not run | 0.00, tracking 0.25 |"
         " not run |"
     )
+    bodies.write(path, "one", "walk", {"robots": [compared(15.0)], "small": [compared(15.0, speed=math.nan)]})
+    assert "| one | walk | not run | not run | 100%, 0.50 (0.50), speed 0.90 | not run |" in bodies.text(path)
+    assert "| 100%, 0.50 (0.50) | not run |" in bodies.text(path), "the speed was not measured"
     path.write_text("family,body\n")
     with pytest.raises(ValueError, match=r"bodies\.csv: expected lines of policy, task, family, "):
         bodies.text(path)
