@@ -1,6 +1,7 @@
 """What the widgets say: the body, task and policy that it makes, and lines that make the same; no viser."""
 
 import dataclasses
+import re
 import shlex
 
 import programs
@@ -117,6 +118,15 @@ def test_what_check_says_can_be_applied():
     mended = sketches.cured(sketch, flaw.cure)
     assert (mended.source, mended.gait, mended.kicks, mended.scale) == (FILE, "ripple", 0.2, 1.0)
     assert sketches.body(mended).torso.standing_height == 0.4 and flaws(sketches.body(mended)) == []
+
+
+def test_legs_that_overlap_are_moved_apart():
+    sketch = Sketch(legs=12, links=2, layout="radial")
+    (flaw,) = opened(sketch).flaws
+    assert re.fullmatch(
+        r"leg\d+_\w+ and leg\d+_\w+ overlap by .* m in a stride: legs mounted .* as far out fit", flaw.text
+    )
+    assert opened(sketches.cured(sketch, flaw.cure)).flaws == ()
 
 
 @pytest.mark.parametrize(
