@@ -26,7 +26,7 @@ from arc_suite.animation import pages
 from arc_suite.animation.design import axes, gallery
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Around, Budget, Made, extent
-from arc_suite.animation.design.search import BATCH, Candidates, Search
+from arc_suite.animation.design.search import BATCH, RANDOM, Candidates, Search
 from arc_suite.animation.design.trials import GOALS, Outcome, Trial, evaluate, walk
 from arc_suite.cli.flags import MOST, ROBOT_HELP, named_values
 from arc_suite.cli.program import progress, resumable, say, use_one_thread
@@ -56,6 +56,13 @@ flags.DEFINE_list(
 )
 flags.DEFINE_integer(
     "bodies", 260, f"Bodies to evaluate, rounded up to batches of {BATCH}; more make a finished search go on.", 1, MOST
+)
+flags.DEFINE_integer(
+    "random",
+    RANDOM,
+    "Bodies of random genes, with which it begins; as many as --bodies for a control.",
+    1,
+    MOST,
 )
 flags.DEFINE_integer("steps", 200, "Control steps of the first evaluation; the second takes twice as many.", 10, 500)
 flags.DEFINE_integer("seed", 0, "Seed of the search.", 0, 2**32 - 1)
@@ -96,7 +103,7 @@ def settled(trial: Trial, cells: Map, around: Body | None) -> dict[str, Any]:
     values = {"task": trial.task, "goal": trial.goal}
     values |= {name: getattr(trial, name)._asdict() for name in ("budget", "first", "second")}
     values |= {"map": cells._asdict(), "around": around and body_to_json(around), "amount": around and FLAGS.amount}
-    values |= {"seed": FLAGS.seed, "versions": versions.recorded()}
+    values |= {"seed": FLAGS.seed, "random": FLAGS.random, "versions": versions.recorded()}
     return json.loads(json.dumps(values))
 
 
@@ -131,7 +138,7 @@ def main() -> None:
     task, settings = FLAGS.task or goal.task, named_values("set", FLAGS["set"].value)
     trial = Trial.of(task, settings, FLAGS.goal, budget(around), FLAGS.steps)
     stem = "design" if around is None else around.name[:_STEM]
-    course = Search(space, cells, trial, FLAGS.seed, stem)
+    course = Search(space, cells, trial, FLAGS.seed, stem, FLAGS.random)
     check(trial, course.middle())
     if FLAGS.pages:
         pages.viewer()  # finds out at once whether there is one

@@ -17,7 +17,7 @@ from arc_suite.animation.design.trials import GOALS, Outcome, Trial, WalkMeans
 from arc_suite.robots.spec import Body
 
 BATCH = 20
-RANDOM = 40  # bodies of random genes, with which a search begins
+RANDOM = 40  # bodies of random genes, with which a search begins if not said otherwise
 ISOTROPIC, LINE = 0.05, 0.2  # standard deviations of the moves, shares of a gene's range and of the distance
 REDRAWN = 0.05  # probability that a gene is drawn anew, by which counts change too
 
@@ -64,7 +64,7 @@ class Search:
         elites: by cell, the index of the best in `candidates`.
     """
 
-    def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str):
+    def __init__(self, space: Genes, cells: Map, trial: Trial, seed: int, stem: str, random: int = RANDOM):
         """Start a search.
 
         Args:
@@ -73,9 +73,11 @@ class Search:
             trial: by which bodies are evaluated.
             seed: of the genes.
             stem: of the names of bodies, `<stem>_<index>`.
+            random: bodies of random genes, with which the search begins.
         """
         self.genes = space.names
         self._space, self._cells, self._trial, self._seed, self._stem = space, cells, trial, seed, stem
+        self._random = random
         self.candidates: list[Candidate] = []
         self.elites: dict[tuple[int, ...], int] = {}
 
@@ -117,7 +119,7 @@ class Search:
         random = np.random.default_rng((self._seed, len(self.candidates)))
         drawn = random.uniform(size=(BATCH, len(self._space.names)))
         parents = [self.candidates[index].genes for index in self.elites.values()]
-        if len(self.candidates) >= RANDOM and parents:
+        if len(self.candidates) >= self._random and parents:
             first, second = np.array(parents)[random.integers(len(parents), size=(2, BATCH))]
             moved = first + ISOTROPIC * random.standard_normal(drawn.shape)
             moved += LINE * random.standard_normal((BATCH, 1)) * (second - first)

@@ -2,8 +2,6 @@
 
 import json
 
-import numpy as np
-
 from arc_suite.animation.design.axes import Map
 from arc_suite.animation.design.genes import Budget, Made
 from arc_suite.animation.design.search import BATCH, RANDOM, Candidates, Search
@@ -28,8 +26,8 @@ def evaluated(jobs):
     return found
 
 
-def search(seed=3, goes=10):
-    course = Search(Made(), Map.of(["legs", "links"]), TRIAL, seed, "body")
+def search(seed=3, goes=10, random=RANDOM):
+    course = Search(Made(), Map.of(["legs", "links"]), TRIAL, seed, "body", random)
     return course, [course.batch(evaluated) for _ in range(goes)]
 
 
@@ -64,11 +62,10 @@ def test_elites_are_the_best_of_their_cells():
 
 
 def test_a_search_beats_as_many_random_bodies():
-    course, _ = search(goes=15)
-    random = Search(Made(), Map.of(["legs", "links"]), TRIAL, 3, "body")
-    drawn = np.random.default_rng(0).uniform(size=(len(course.candidates), len(random.genes)))
-    assert min(costs(course)) < 0.97 * min(fake(random.body(genes, 0)).cost_of_transport for genes in drawn)
-    assert len(course.candidates) > RANDOM
+    (course, _), (control, _) = search(goes=15), search(goes=15, random=15 * BATCH)
+    assert course.candidates[:RANDOM] == control.candidates[:RANDOM]
+    assert len(course.candidates) == len(control.candidates) > RANDOM
+    assert min(costs(course)) < 0.97 * min(costs(control))
 
 
 def test_one_that_is_excluded_the_second_time_takes_no_cell():
