@@ -9,7 +9,7 @@ import numpy as np
 
 from arc_suite.models.standing import compiled, standing
 from arc_suite.models.stride import GAIT_FREQUENCY, TARGET_FROUDE, fitted_gait, swept
-from arc_suite.robots import is_robot
+from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
 _ALLOWED = 0.01  # depth of an overlap, of the standing height
@@ -61,7 +61,7 @@ def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
     """Yield poses by name, (joints,) rad: the standing one, and those of a stride at which legs are nearest."""
     pose = standing(body)
     yield "the standing pose", np.zeros(len(pose.inertias))
-    if is_robot(body):  # which walks in a gait of its own
+    if body.name in ROBOTS:  # which has a gait of its own
         return
     gait = fitted_gait(body)
     reach = _LENGTHENED * 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * pose.height
