@@ -3,7 +3,8 @@
 Bodies come in batches, and a batch depends on the seed, its number and the bodies before it alone. So a search does not
 depend on the number of processes, and one that was broken off resumes from the outcomes in its journal. New genes are
 those of an elite, moved at random and along the line to another elite (Vassiliades and Mouret, "Discovering the elite
-hypervolume by leveraging interspecies correlation", 2018).
+hypervolume by leveraging interspecies correlation", 2018). Better elites are chosen more often, as a search has few
+bodies for a cell.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -18,7 +19,8 @@ from arc_suite.robots.spec import Body
 
 BATCH = 20
 RANDOM = 40  # bodies of random genes, with which a search begins if not said otherwise
-ISOTROPIC, LINE = 0.05, 0.2  # standard deviations of the moves, shares of a gene's range and of the distance
+ISOTROPIC, LINE = 0.15, 0.2  # standard deviations of the moves, shares of a gene's range and of the distance
+BIAS = 3.0  # towards good elites: the rank of a parent, by their number, is a uniform number to this power
 REDRAWN = 0.05  # probability that a gene is drawn anew, by which counts change too
 
 
@@ -118,9 +120,11 @@ class Search:
         """Return the genes (BATCH, n) of the next batch, rounded as files hold them."""
         random = np.random.default_rng((self._seed, len(self.candidates)))
         drawn = random.uniform(size=(BATCH, len(self._space.names)))
-        parents = [self.candidates[index].genes for index in self.elites.values()]
+        best = sorted(self.elites, key=self._value, reverse=True)
+        parents = [self.candidates[self.elites[cell]].genes for cell in best]
         if len(self.candidates) >= self._random and parents:
-            first, second = np.array(parents)[random.integers(len(parents), size=(2, BATCH))]
+            ranks = len(parents) * random.uniform(size=(2, BATCH)) ** BIAS
+            first, second = np.array(parents)[ranks.astype(int)]
             moved = first + ISOTROPIC * random.standard_normal(drawn.shape)
             moved += LINE * random.standard_normal((BATCH, 1)) * (second - first)
             drawn = np.where(random.uniform(size=drawn.shape) < REDRAWN, drawn, moved.clip(0.0, 1.0))
