@@ -2,6 +2,7 @@
 
 import csv
 
+import numpy as np
 import programs
 import pytest
 from networks import of_many_bodies as drawn
@@ -25,7 +26,7 @@ def transfer(*arguments):
 def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
     done = transfer(f"--policy={policy}", "--families=robots", "-o", tmp_path / "table.csv", "--name=mine")
     heads, row = (line.split() for line in programs.passed(done).splitlines())
-    assert heads[:4] == ["family", "count", "walk", "demonstrated"] and row[:4] == ["robots", "4", "0", "1"]
+    assert heads[:5] == ["family", "count", "walk", "demonstrated", "speed"] and row[:3] == ["robots", "4", "0"]
     with (tmp_path / "table.csv").open() as file:
         lines = list(csv.DictReader(file))
     assert (
@@ -33,7 +34,12 @@ def test_a_row_for_each_family_and_a_table_of_episodes(policy, tmp_path):
         and {(line["policy"], line["task"]) for line in lines} == {("mine", "walk")}
         and {line["who"] for line in lines} == {"policy", "demonstrator", "zero"}
     )
-    assert all(line["walked"] == str(int(line["who"] == "demonstrator")) for line in lines)
+    speeds = {who: [float(line["speed"]) for line in lines if line["who"] == who] for who in ("policy", "demonstrator")}
+    assert float(row[4]) == pytest.approx(np.mean(speeds["policy"]), abs=1e-3)
+    assert max(map(abs, speeds["policy"])) < 0.1 < min(speeds["demonstrator"])
+    walked = [line["walked"] for line in lines if line["who"] == "demonstrator"]
+    assert walked == [str(int(speed >= 0.7)) for speed in speeds["demonstrator"]]
+    assert float(row[3]) == walked.count("1") / 4
 
 
 @pytest.mark.parametrize(
