@@ -9,7 +9,7 @@ import numpy as np
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import proprioception, torques
 from arc_suite.models.sizing import position_gains, sized
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import posed
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import velocity_units
 
@@ -86,7 +86,7 @@ class CommandLaw(ABC):
             ValueError: a gait without a cycle, or without stance or swing.
         """
         gait, self.parameters, self.body = gait_of(task), parameters, sized(task.scene.body)
-        self.pose, self.step = standing(self.body, angles), task.scene.control_timestep
+        self.pose, self.step = posed(self.body, angles), task.scene.control_timestep
         self.cycles, self.duty_factor = gait.frequency * self.step, gait.duty_factor
         self.smoothing, self.onset = min(1.0, self.cycles / _SMOOTHING), self.cycles / _ONSET
         self.stance, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead

@@ -16,7 +16,7 @@ from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.kinematics import flows, rises, weights
 from arc_suite.models.sizing import sized
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import posed
 from arc_suite.models.stride import lifted
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -191,7 +191,7 @@ def _neutral(body: Body, share: float) -> np.ndarray:
     low, high = low + share * (high - low), high - share * (high - low)
     angles = np.zeros_like(low).clip(low, high)
     for _ in range(50):
-        pose, first = standing(body, tuple(angles)), 0
+        pose, first = posed(body, angles), 0
         aim = np.median(pose.soles[:, 2])
         for leg, jacobian, sole in zip(body.legs, pose.jacobians, pose.soles, strict=True):
             last, rise = first + len(leg.joints), jacobian[2]

@@ -15,12 +15,10 @@ from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Clocked, Pattern, joint_targets, torques
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
-from arc_suite.models.stride import lifted, swept, target_ranges
+from arc_suite.models.stride import LIFT, lifted, swept, target_ranges
 from arc_suite.tasks.contract import Task
 
 _LEAST_FROUDE = 1e-3
-
-LIFT = 0.2  # of the standing height: how far a foot is lifted in mid-swing
 
 # A leg that cannot sweep, such as a radial one in front, would brake: it is held this share of the
 # standing height off the ground in stance too, and carries only when the others sink or tilt.
@@ -39,6 +37,7 @@ class Stride(NamedTuple):
         control_timestep: s.
         stiffness: (joints,) action per rad.
         damping: (joints,) action per rad/s.
+        held: (joints,) action that a standing leg adds, by which it holds its share of the weight.
         steering: (joints,) by which share the sweep of the joint's leg answers to a yaw of 1 rad.
     """
 
@@ -46,6 +45,7 @@ class Stride(NamedTuple):
     control_timestep: float
     stiffness: np.ndarray
     damping: np.ndarray
+    held: np.ndarray
     steering: np.ndarray
 
     @classmethod
@@ -97,6 +97,7 @@ class Stride(NamedTuple):
             control_timestep=task.scene.control_timestep,
             stiffness=stiffness,
             damping=damping,
+            held=pose.loads / (gait.duty_factor * np.array([joint.motor.gear for joint in joints])),
             steering=math.copysign(STEERING, speed) * np.repeat(lateral, counts),
         )
 
@@ -112,7 +113,9 @@ class Stride(NamedTuple):
         targets = onset * joint_targets(pattern, time)
         following = onset * joint_targets(pattern, time + self.control_timestep)
         target_velocities = (following - targets) / self.control_timestep
-        return torques(targets, angles, velocities - target_velocities, self.stiffness, self.damping)
+        cycle = (pattern.frequency * time[..., None] + pattern.offset) % 1.0
+        held = self.held * (cycle < pattern.duty_factor)
+        return torques(targets, angles, velocities - target_velocities, self.stiffness, self.damping, held)
 
 
 class StrideLaw(Clocked):

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
-from arc_suite.evaluation import protocol, walking
+from arc_suite.evaluation import protocol
+from arc_suite.models.stride import LEAST_SHARE
 from arc_suite.robots.spec import Body, Link
 
 STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
@@ -37,8 +38,8 @@ class FirstWalk(NamedTuple):
 
     @property
     def quality(self) -> int:
-        """2 for a walk at `walking.LEAST_SHARE` of the target or more, 1 for a slower one, 0 for a fall."""
-        return 0 if self.fell else 1 + (self.share >= walking.LEAST_SHARE)
+        """2 for a walk at `LEAST_SHARE` of the target or more, 1 for a slower one, 0 for a fall."""
+        return 0 if self.fell else 1 + (self.share >= LEAST_SHARE)
 
 
 def walk(body: Body) -> FirstWalk:

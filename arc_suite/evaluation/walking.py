@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from arc_suite import rotations
+from arc_suite.models.stride import LEAST_SHARE
 from arc_suite.tasks import Task
 
-LEAST_SHARE = 0.7  # of the target speed; a body that moves at this speed heads within 45 degrees of the target's
 MOST_TOUCHING = 0.01  # share of the time that the torso may touch the ground
 MOST_TILT_COSINE = 0.5  # of the torso; tilted by more than 60 degrees a body has fallen
 

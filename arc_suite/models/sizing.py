@@ -1,8 +1,8 @@
 """Sizing of the open fields of a body: motors, armature, damping, simulation constants, camera.
 
-Everything follows from the standing pose by rules without dimension, so that bodies of one shape
-and different size are dynamically similar: lengths scale with the height h, times with
-sqrt(h / g), and a mite and a giant walk alike.
+Everything follows from the standing pose and from a stride in the fitted gait by rules without
+dimension, so that bodies of one shape and different size are dynamically similar: lengths scale
+with the height h, times with sqrt(h / g), and a mite and a giant walk alike.
 """
 
 import functools
@@ -10,19 +10,19 @@ import math
 
 import numpy as np
 
-from arc_suite.models.standing import Standing, standing
+from arc_suite.models import stride
+from arc_suite.models.standing import GRAVITY, Standing, standing
 from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
 
-GRAVITY = 9.81  # m/s^2
 SUBSTEPS = 25  # of a control step
 
 # A body of this height has MuJoCo's own constants; others are scaled from it.
 _REFERENCE_HEIGHT = 0.3  # m
 
-# Motors hold ten times their share of the standing body: few legs carry it at times, and only what
-# is left moves it. A joint without load still gets a quarter of its leg's strongest motor, to swing
-# the leg, and a leg in which no joint carries is sized as if its share pulled at a short lever.
-_STRENGTH = 10.0
+# Motors give thirty times the largest load of a stride: position control brakes and pushes a body about its path with
+# what is left. A joint without load still counts as if it bore a quarter of its leg's largest one, to swing the leg,
+# and a leg in which no joint bears any as if its share of the weight pulled at a short lever.
+_STRENGTH = 30.0
 _LEAST_SHARE = 0.25
 _LEAST_LEVER = 0.1  # of the standing height
 
@@ -30,9 +30,9 @@ _LEAST_LEVER = 0.1  # of the standing height
 # of 1 / T, below which a critically damped loop on sampled states settles without ringing.
 _STIFFNESS = 0.5  # w T
 
-# An error of this angle calls for a motor's whole torque. It fixes the inertia to be moved, and so
-# the armature: (I + armature) w^2 = torque / angle.
-_FULL_TORQUE_ERROR = 0.35  # rad
+# By this angle a joint sags under the largest load of a stride. It fixes the stiffness, and so the inertia to be
+# moved: (I + armature) w^2 = load / angle.
+_SAG = 0.035  # rad
 
 # Armature is never less than this share of the link's own inertia.
 _LEAST_ARMATURE = 0.3
@@ -91,13 +91,11 @@ def sized(body: Body) -> Body:
     complete = all(None not in (j.armature, j.damping, j.motor) for leg in body.legs for j in leg.joints)
     if complete and body.simulation and body.camera:
         return body
-    pose = standing(body)
-    frequency = natural_frequency(body)
-    least_load = _LEAST_LEVER * pose.height * pose.mass * GRAVITY / len(body.legs)
-    legs, loads, first = [], abs(pose.loads), 0
+    pose, first, legs = standing(body), 0, []
+    borne, frequency = loads(body), natural_frequency(body)
     for leg in body.legs:
         last = first + len(leg.joints)
-        legs.append(_sized_leg(leg, pose.inertias[first:last], loads[first:last], least_load, frequency))
+        legs.append(_sized_leg(leg, body.agility, pose.inertias[first:last], borne[first:last], frequency))
         first = last
     return body.replace(
         legs=tuple(legs),
@@ -106,18 +104,30 @@ def sized(body: Body) -> Body:
     )
 
 
-def _sized_leg(leg: Leg, inertias, loads, least_load: float, frequency: float) -> Leg:
-    torques = _STRENGTH * loads.clip(min=_LEAST_SHARE * max(*loads, least_load))
+def loads(body: Body) -> np.ndarray:
+    """Return the torques (joints,) that joints are sized for, N m: the largest of a stride, and never nothing."""
+    pose, first, found = standing(body), 0, []
+    every = np.maximum(stride.loads(body), pose.inertias * stride.accelerations(body))
+    least = _LEAST_LEVER * pose.height * pose.mass * GRAVITY / len(body.legs)
+    for leg in body.legs:
+        last = first + len(leg.joints)
+        own = every[first:last]
+        found.append(own.clip(min=_LEAST_SHARE * max(*own, least)))
+        first = last
+    return np.concatenate(found)
+
+
+def _sized_leg(leg: Leg, agility: float, inertias: np.ndarray, loads: np.ndarray, frequency: float) -> Leg:
     sized_joints = iter(
-        _sized_joint(joint, float(inertia), float(torque), frequency)
-        for joint, inertia, torque in zip(leg.joints, inertias, torques, strict=True)
+        _sized_joint(joint, agility, float(inertia), float(load), frequency)
+        for joint, inertia, load in zip(leg.joints, inertias, loads, strict=True)
     )
     return leg.replace(links=tuple(link.joint and link.replace(joint=next(sized_joints)) or link for link in leg.links))
 
 
-def _sized_joint(joint: Joint, inertia: float, torque: float, frequency: float) -> Joint:
-    motor = joint.motor or Motor(gear=torque)
-    wanted = motor.gear / (_FULL_TORQUE_ERROR * frequency**2)
+def _sized_joint(joint: Joint, agility: float, inertia: float, load: float, frequency: float) -> Joint:
+    motor = joint.motor or Motor(gear=agility * _STRENGTH * load)
+    wanted = load / (_SAG * frequency**2)
     armature = max(_LEAST_ARMATURE * inertia, wanted - inertia) if joint.armature is None else joint.armature
     # The control damps the joint; a little friction of its own calms one that nobody controls.
     damping = 0.1 * frequency * (inertia + armature) if joint.damping is None else joint.damping

@@ -6,10 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.models import sizing, stride
 from arc_suite.models.outline import solid_corners
 from arc_suite.models.overlap import overlaps
-from arc_suite.models.sizing import sized
 from arc_suite.models.standing import Standing, standing
+from arc_suite.models.stride import LEAST_SHARE
 from arc_suite.robots.spec import Body, Leg, Link
 
 # Shares of the standing height.
@@ -20,6 +21,11 @@ _HOPELESS_OVERHANG = 0.05  # of the centre of mass beyond the feet
 
 _LEAST_TILT = 0.15  # margin of stability as a share of the height of the centre of mass; generated bodies have 0.7 to 2
 _LARGEST_TURN = 0.5  # rad, of a joint
+
+# A body walks about as fast, of the target speed, as its motors give of this many times the loads of a stride: medians
+# of 16 `varied` bodies with 1, 2, 3, 4, 6 and 10 times the loads are 0.12, 0.25, 0.47, 0.59, 0.83 and 1.03. Over 161
+# bodies with random motors the mean error is 0.19.
+_BRISK = 7.0
 
 _SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # of the legs' mounts, tried against overlaps
 
@@ -109,19 +115,44 @@ def _displacement(x: float, y: float) -> str:
 
 
 def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
-    """Find motors too weak to hold the standing pose, where no joint limit holds it."""
+    """Find motors too weak to hold the standing pose where no joint limit holds it, or too weak for a stride."""
     joints = [joint for leg in body.legs for joint in leg.joints]
-    low, high = np.transpose([joint.range_deg for joint in joints])
-    needed = np.where(np.where(pose.loads > 0.0, low, high) == 0.0, 0.0, abs(pose.loads))
     given = np.array([np.inf if joint.motor is None else joint.motor.gear for joint in joints])
-    weak = int((given < needed).sum())
-    if weak:
-        worst = int((needed / given).argmax())
-        lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that hold the body up"
-        others = f", as do those of {weak - 1} more joints" * (weak > 1)
-        cure = _unpowered(body, given < needed)
-        fits = [joint.motor.gear for leg in sized(cure).legs for joint in leg.joints][worst]
-        yield Flaw(f"the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure)
+    if np.isinf(given).all():
+        return
+    low, high = np.transpose([joint.range_deg for joint in joints])
+    held = np.where(np.where(pose.loads > 0.0, low, high) == 0.0, 0.0, abs(pose.loads))
+    if (given < held).any():
+        yield _short(body, given, held, "hold the body up")
+        return
+    loads = _BRISK * sizing.loads(body)
+    if (reached := _reached(body, (given / loads).clip(max=1.0))) < LEAST_SHARE:
+        flaw = _short(body, given, loads, "a brisk stride takes")
+        yield flaw._replace(text=f"weak: reaches about {reached:.1f} of the target speed, as {flaw.text}")
+
+
+def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str) -> Flaw:
+    """Return the flaw of motors that give less than what is needed, (joints,) N m."""
+    weak, worst = int((given < needed).sum()), int((needed / given).argmax())
+    lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that {purpose}"
+    others = f", as do those of {weak - 1} more joints" * (weak > 1)
+    cure = _unpowered(body, given < needed)
+    fits = [joint.motor.gear for leg in sizing.sized(cure).legs for joint in leg.joints][worst]
+    return Flaw(f"the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure)
+
+
+def _reached(body: Body, shares: np.ndarray) -> float:
+    """Return about which share of the target speed a body reaches whose motors give shares (joints,) of what it takes.
+
+    In each leg the joint that bears most and the one that sweeps most decide; the others hardly matter.
+    """
+    borne, first, reached = stride.loads(body), 0, []
+    for leg, (sweep, _) in zip(body.legs, stride.strokes(body), strict=True):
+        last = first + len(leg.joints)
+        deciding = [int(borne[first:last].argmax()), int(abs(sweep).argmax())]
+        reached.append(shares[first:last][deciding].min())
+        first = last
+    return float(np.mean(reached))
 
 
 def _unpowered(body: Body, joints: np.ndarray) -> Body:

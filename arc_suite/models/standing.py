@@ -9,6 +9,8 @@ import numpy as np
 
 from arc_suite.robots.spec import Ballast, Body
 
+GRAVITY = 9.81  # m/s^2
+
 GEOMS = {
     "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
@@ -28,7 +30,7 @@ class Standing(NamedTuple):
         soles: (legs, 3) the lowest points of the feet.
         jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
         inertias: (joints,) diagonal of the mass matrix without armature.
-        loads: (joints,) torques of the joints that hold the pose while all feet carry.
+        loads: (joints,) torques of the joints that hold the pose while the feet that carry do so.
         margin: static stability: distance of the centre of mass, on the floor, from the nearest
             edge of the polygon of the soles; negative outside.
     """
@@ -44,12 +46,18 @@ class Standing(NamedTuple):
 
 
 @functools.lru_cache(maxsize=256)
-def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
-    """Return the mechanics of a body's standing pose; armature, damping, motors and constants do not matter.
+def standing(body: Body) -> Standing:
+    """Return the mechanics of a body's standing pose; armature, damping, motors and constants do not matter."""
+    return posed(body)
+
+
+def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None = None) -> Standing:
+    """Return the mechanics of a pose, as of the standing one.
 
     Args:
         body: the spec.
-        angles: of the joints, rad, in place of zero for all of them; the torso stays where it is.
+        angles: (joints,) rad, in place of zero for all of them; the torso stays where it is.
+        feet: (legs,) whether each foot carries; None for all of them.
     """
     model = compiled(body)
     data = mujoco.MjData(model)
@@ -70,7 +78,9 @@ def standing(body: Body, angles: tuple[float, ...] | None = None) -> Standing:
     mass = float(model.body_mass.sum())
     matrix = np.empty((model.nv, model.nv))
     mujoco.mj_fullM(model, data, matrix)
-    loads = _foot_loads(mass * -model.opt.gravity[2], soles[:, :2] - centre[:2])
+    loads, carrying = np.zeros(len(soles)), np.ones(len(soles), bool) if feet is None else feet
+    if carrying.any():
+        loads[carrying] = _foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - centre[:2])
     held = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
     return Standing(
         height=body.torso.standing_height,

@@ -421,6 +421,7 @@ class Body(_Spec):
         ballast: further weight on the torso.
         density: of solids, links and feet, kg/m^3.
         simulation: its constants; None: scaled to the body.
+        agility: factor on the motors that are sized, for bodies that leap.
         palette: of its colours, one of `PALETTES` or a seed; None: the robot's own, or grey.
     """
 
@@ -431,6 +432,7 @@ class Body(_Spec):
     density: float = _number(1e-9, _DENSEST, default=10.0)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
+    agility: float = _number(0.1, 10.0, default=1.0)
     palette: str | int | None = _field(_check_palette, default=None, optional=True)
 
     def _check_whole(self):

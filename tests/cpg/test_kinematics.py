@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from arc_suite.cpg.kinematics import Legs
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import posed
 from arc_suite.robots import ROBOTS, generator
 
 BODIES = [*ROBOTS.values(), *map(generator.random_body, (1, 2, 8))]
@@ -15,7 +15,7 @@ BODIES = [*ROBOTS.values(), *map(generator.random_body, (1, 2, 8))]
 def test_soles_and_jacobians_are_those_of_the_model(body):
     legs = Legs.of(body)
     angles = np.random.RandomState(0).uniform(-0.5, 0.5, len(body.joint_names))
-    pose, (soles, jacobians) = standing(body, tuple(angles)), legs.soles(legs.by_leg(angles))
+    pose, (soles, jacobians) = posed(body, angles), legs.soles(legs.by_leg(angles))
     assert_allclose(soles, pose.soles, atol=1e-12)
     for leg, expected in enumerate(pose.jacobians):
         assert_allclose(jacobians[leg][:, legs.moves[leg]], expected, atol=1e-12)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from arc_suite import models
+from arc_suite.models import stride
 from arc_suite.models.sizing import control_timestep, natural_frequency, sized
-from arc_suite.models.standing import stability_margin, standing
+from arc_suite.models.standing import posed, stability_margin, standing
 from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec import Motor, Simulation
 
@@ -42,24 +43,59 @@ def test_constants_scale_with_the_height():
 def test_motors_armature_and_damping_follow_the_rules():
     model = compiled(BODY)
     data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    # Torques by which six feet, each under a sixth of the weight, press on their own leg.
     weight = 9.81 * model.body_mass.sum()
-    loads = []
-    for leg in BODY.legs:
-        jacobian = np.empty((3, model.nv))
-        mujoco.mj_jacBody(model, data, jacobian, None, model.body(f"{leg.name}_foot").id)
-        dofs = [model.joint(f"{leg.name}_{joint}").dofadr[0] for joint in ("hip", "knee", "ankle")]
-        loads.append(abs(data.qfrc_bias[dofs] - weight / 6.0 * jacobian[2, dofs]))
-    gears = model.actuator_gear[:, 0].reshape(6, 3)
-    for load, gear in zip(loads, gears, strict=True):
-        assert gear == pytest.approx(10.0 * np.maximum(load, 0.25 * load.max()), rel=1e-6)
+    largest = np.zeros(18)
+    for angles, stands in stride.poses(BODY):
+        data.qpos[7:] = angles
+        mujoco.mj_forward(model, data)
+        feet = [model.body(f"{leg.name}_foot").id for leg in BODY.legs]
+        # The least forces under the feet that stand which carry the weight, and no moment about its centre.
+        places = data.xpos[feet][stands, :2] - data.subtree_com[1, :2]
+        balance = np.vstack([np.ones(len(places)), places.T])
+        forces = np.linalg.pinv(balance) @ [weight, 0.0, 0.0]
+        forces = np.maximum(forces, 0.25 * weight / len(places))
+        torques = data.qfrc_bias[6:].copy()
+        for foot, force in zip(np.array(feet)[stands], forces, strict=True):
+            jacobian = np.empty((3, model.nv))
+            mujoco.mj_jacBody(model, data, jacobian, None, foot)
+            torques -= force * jacobian[2, 6:]
+        largest = np.maximum(largest, abs(torques))
+    inertias = standing(BODY).inertias
+    loads = np.maximum(largest, inertias * stride.accelerations(BODY)).reshape(6, 3)
+    loads = np.maximum(loads, 0.25 * loads.max(axis=1, keepdims=True)).ravel()
+    assert model.actuator_gear[:, 0] == pytest.approx(30.0 * loads, rel=1e-6)
     frequency = natural_frequency(BODY)
     assert frequency == pytest.approx(0.5 / control_timestep(BODY), rel=1e-12)
-    inertias = standing(BODY).inertias
-    armature = np.maximum(0.3 * inertias, gears.ravel() / (0.35 * frequency**2) - inertias)
-    assert model.dof_armature[6:] == pytest.approx(armature, rel=1e-9)
-    assert model.dof_damping[6:] == pytest.approx(0.1 * frequency * (inertias + armature), rel=1e-9)
+    armature = np.maximum(0.3 * inertias, loads / (0.035 * frequency**2) - inertias)
+    assert model.dof_armature[6:] == pytest.approx(armature, rel=1e-6)
+    assert model.dof_damping[6:] == pytest.approx(0.1 * frequency * (inertias + model.dof_armature[6:]), rel=1e-9)
+
+
+def test_loads_are_those_of_a_stride():
+    """Of six legs of three joints, at the target velocity: 0.65 of a cycle on the ground, at 0.27 sqrt(g / h)."""
+    poses = list(stride.poses(BODY))
+    stands = np.array([feet for _, feet in poses])
+    assert stands.mean() == pytest.approx(0.65, abs=0.02)
+    assert stands.sum(axis=1).min() == 3
+    ahead = stride.half_stroke(BODY, stride.fitted_gait(BODY))
+    assert ahead == pytest.approx(0.5 * 0.2 / 0.27 * 0.65 * 0.4)
+    soles = np.array([posed(BODY, angles).soles for angles, _ in poses]) - standing(BODY).soles
+    assert abs(soles[stands][:, 0]).max() == pytest.approx(ahead, rel=0.1)
+    assert soles[~stands][:, 2].max() == pytest.approx(0.12 * 0.4, rel=0.3)
+    # On three feet each bears twice as much as on six, and two to three times on the single one of its side.
+    share = stride.loads(BODY).reshape(6, 3)[:, 1:] / abs(standing(BODY).loads.reshape(6, 3)[:, 1:])
+    assert share.min() > 2.0 and share.max() < 3.1
+
+
+def test_armature_follows_from_the_load_and_not_from_a_motor_that_is_given():
+    legs = sized(BODY).legs
+    strong = tuple(
+        leg.replace(links=tuple(link.replace(joint=link.joint.replace(motor=Motor(gear=99.0))) for link in leg.links))
+        for leg in BODY.legs
+    )
+    for leg, other in zip(legs, sized(BODY.replace(legs=strong)).legs, strict=True):
+        assert [joint.armature for joint in leg.joints] == [joint.armature for joint in other.joints]
+        assert {joint.motor.gear for joint in other.joints} == {99.0}
 
 
 def test_what_a_body_says_is_kept():
@@ -97,7 +133,6 @@ def test_sizing_finds_no_number_that_a_spec_refuses(scale, density):
 def test_a_leg_in_which_nothing_carries_gets_motors_too():
     body = sized(generator.generate(6, 1))
     gears = {round(leg.joints[0].motor.gear / standing(body).mass, 6) for leg in body.legs}
-    assert len(gears) == 1
     assert min(gears) > 0.01
 
 
