@@ -17,7 +17,7 @@ class FirstWalk(NamedTuple):
     """A walk of the demonstrator from seed 0 in the task walk.
 
     Attributes:
-        length: control steps until a fall, `STEPS` without one.
+        length: control steps until a fall or divergence, `STEPS` without one.
         speed: m/s forward.
         target: m/s that the task wants.
     """
@@ -48,7 +48,7 @@ def walk(body: Body) -> FirstWalk:
     Raises:
         ValueError: a body that cannot walk whatever the demonstrator does.
     """
-    environment = Setup.of(body).load()
+    environment = Setup.of(body, "walk", {"on_divergence": "terminate"}).load()
     episode = protocol.run(environment, Demonstrator(environment, "medium"), 0, STEPS)
     return FirstWalk(episode.length, episode.progress["speed"], environment.task.definition.parameters.target_velocity)
 
