@@ -6,13 +6,14 @@ so that neither search nor inverse kinematics is needed.
 """
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from arc_suite import checks, rotations
 from arc_suite.cpg.gait import gait_of
-from arc_suite.cpg.law import Clocked, Pattern, joint_targets, torques
+from arc_suite.cpg.law import Pattern, joint_targets, proprioception, torques
 from arc_suite.models.sizing import GRAVITY, position_gains, sized
 from arc_suite.models.standing import standing
 from arc_suite.models.stride import LIFT, lifted, swept, target_ranges
@@ -28,12 +29,17 @@ ONSET = 1.0  # cycles over which the gait grows to its full size
 STEERING = 1.5  # share of the sweep per rad of yaw, for the outermost feet
 LARGEST_YAW = 0.5  # rad, that is answered to
 
+# Strides grow by as much as the body is too slow, in shares of its speed, and within bounds.
+STRETCH = (0.5, 1.8)
+SMOOTHING = 0.4  # cycles over which the speed is averaged
+
 
 class Stride(NamedTuple):
     """Control of a body by position: each joint follows its target and the target's velocity.
 
     Attributes:
         pattern: of the joints.
+        speed: along world x that is asked for, m/s.
         control_timestep: s.
         stiffness: (joints,) action per rad.
         damping: (joints,) action per rad/s.
@@ -42,6 +48,7 @@ class Stride(NamedTuple):
     """
 
     pattern: Pattern
+    speed: float
     control_timestep: float
     stiffness: np.ndarray
     damping: np.ndarray
@@ -94,6 +101,7 @@ class Stride(NamedTuple):
                 stance=np.zeros(len(joints)),
                 swing=np.concatenate(lifts),
             ),
+            speed=speed,
             control_timestep=task.scene.control_timestep,
             stiffness=stiffness,
             damping=damping,
@@ -101,13 +109,12 @@ class Stride(NamedTuple):
             steering=math.copysign(STEERING, speed) * np.repeat(lateral, counts),
         )
 
-    def __call__(self, clock, quaternion, angles, velocities):
-        """Return the actions (..., joints) after `clock` (...) control steps."""
-        yaw = rotations.yaw(quaternion)[..., None]
+    def __call__(self, clock, speed, quaternion, angles, velocities):
+        """Return the actions (..., joints) after `clock` (...) control steps, at a speed (...) along world x, m/s."""
+        yaw, stretch = rotations.yaw(quaternion)[..., None], (2.0 - speed / self.speed).clip(*STRETCH)[..., None]
         # Turned to the left, legs on the left take longer strides.
-        pattern = self.pattern._replace(
-            sweep=self.pattern.sweep * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))
-        )
+        steered = stretch * (1.0 + self.steering * yaw.clip(-LARGEST_YAW, LARGEST_YAW))
+        pattern = self.pattern._replace(sweep=self.pattern.sweep * steered)
         time = self.control_timestep * clock
         onset = (pattern.frequency * time[..., None] / ONSET).clip(max=1.0)
         targets = onset * joint_targets(pattern, time)
@@ -118,9 +125,35 @@ class Stride(NamedTuple):
         return torques(targets, angles, velocities - target_velocities, self.stiffness, self.damping, held)
 
 
-class StrideLaw(Clocked):
+class StrideState(NamedTuple):
+    """The state of a law by a stride.
+
+    Attributes:
+        steps: (environments,) control steps since the start of the episode.
+        speed: (environments,) smoothed, along world x, m/s.
+    """
+
+    steps: np.ndarray
+    speed: np.ndarray
+
+
+class StrideLaw:
     """The law by a stride, in the gait of a task."""
+
+    reads: tuple[str, ...] = ("posture", "velocities")
 
     def __init__(self, task: Task, froude: float):
         """Fit a stride; see `Stride.fit`."""
-        super().__init__(Stride.fit(task, froude))
+        self.stride = Stride.fit(task, froude)
+        cycles = self.stride.pattern.frequency * self.stride.control_timestep
+        self.smoothing = min(1.0, cycles / SMOOTHING)
+
+    def initial(self, count: int) -> StrideState:
+        """Return the state at the start of episodes in a number of environments."""
+        return StrideState(np.zeros(count, int), np.full(count, self.stride.speed))
+
+    def __call__(self, state: StrideState, observation: Mapping) -> tuple:
+        """Return the next state and the actions (environments, joints)."""
+        speed = state.speed + self.smoothing * (observation["velocities"][..., 0] - state.speed)
+        actions = self.stride(state.steps, speed, *proprioception(observation))
+        return StrideState(state.steps + 1, speed), actions

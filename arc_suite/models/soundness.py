@@ -127,18 +127,20 @@ def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
         return
     loads = _BRISK * sizing.loads(body)
     if (reached := _reached(body, (given / loads).clip(max=1.0))) < LEAST_SHARE:
-        flaw = _short(body, given, loads, "a brisk stride takes")
-        yield flaw._replace(text=f"weak: reaches about {reached:.1f} of the target speed, as {flaw.text}")
+        slow = f"weak: reaches about {reached:.1f} of the target speed, as "
+        yield _short(body, given, loads, "a brisk stride takes", slow)
 
 
-def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str) -> Flaw:
+def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str, effect: str = "") -> Flaw:
     """Return the flaw of motors that give less than what is needed, (joints,) N m."""
     weak, worst = int((given < needed).sum()), int((needed / given).argmax())
     lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that {purpose}"
     others = f", as do those of {weak - 1} more joints" * (weak > 1)
     cure = _unpowered(body, given < needed)
     fits = [joint.motor.gear for leg in sizing.sized(cure).legs for joint in leg.joints][worst]
-    return Flaw(f"the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure)
+    return Flaw(
+        f"{effect}the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure
+    )
 
 
 def _reached(body: Body, shares: np.ndarray) -> float:

@@ -32,7 +32,7 @@ _USED = 0.9  # share of a joint's range that targets may use
 
 # How much it matters that a foot moves as wanted along x, y and z. In stance it must not rise or
 # sink; if it slips sideways all of its friction points there and none of it brakes the body.
-_SWEEP_WEIGHTS = (1.0, 0.1, 4.0)
+_SWEEP_WEIGHTS = (1.0, 0.1, 1.0)
 _LIFT_WEIGHTS = (0.2, 0.2, 1.0)
 _DAMPING = 0.1  # of the leg's largest Jacobian entry
 
