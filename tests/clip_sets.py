@@ -21,7 +21,8 @@ from arc_suite.animation.clips.drafts import drafts, passage
 from arc_suite.animation.clips.recorder import Recorder
 from arc_suite.cpg.kinematics import Legs
 from arc_suite.envs.setup import Setup
-from arc_suite.robots import ROBOTS, generator, spec_files
+from arc_suite.models.families import sound_body
+from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.simulation.model import compiled
 
 ONE_CYCLE, CONNECTED, APART = 0.85, 0.95, 0.08
@@ -78,7 +79,7 @@ def measured(body) -> tuple[dict[str, float], dict[str, str]]:
 
 def main(count: str = "100") -> int:
     """Measure the bodies, and return the exit status."""
-    bodies = {f"random_{seed}": generator.random_body(seed) for seed in range(int(count))}
+    bodies = {f"random_{seed}": sound_body(seed) for seed in range(int(count))}
     others = dict(ROBOTS) | {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
     numbers = {}
     for name, body in tqdm((others | bodies).items(), disable=None, unit="body"):

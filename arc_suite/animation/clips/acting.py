@@ -13,7 +13,7 @@ from arc_suite.cpg.kinematics import Legs
 from arc_suite.cpg.law import torques
 from arc_suite.models import sizing
 from arc_suite.models.outline import solid_corners
-from arc_suite.models.standing import standing as mechanics
+from arc_suite.models.standing import posed
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
 
@@ -119,7 +119,7 @@ def _eased(steps: int) -> np.ndarray:
 def _holding(body: Body, rest: Pose) -> np.ndarray:
     """Return the target angles (joints,), rad, at which position control holds a pose under the body's weight."""
     sized = sizing.sized(body)
-    pose = mechanics(sized, tuple(rest.joints))
+    pose = posed(sized, rest.joints)
     stiffness, _ = sizing.position_gains(sized, pose.inertias)
     gears = np.array([joint.motor.gear for leg in sized.legs for joint in leg.joints])
     return rest.joints + pose.loads / (gears * stiffness)
@@ -139,7 +139,7 @@ def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damp
         A pose for every substep.
     """
     sized = sizing.sized(body)
-    gains = sizing.position_gains(sized, mechanics(sized, tuple(rest.joints)).inertias)
+    gains = sizing.position_gains(sized, posed(sized, rest.joints).inertias)
     model = copy.copy(compiled(body))
     model.dof_damping[6:] *= damping
     data, step = mujoco.MjData(model), sizing.control_timestep(body)

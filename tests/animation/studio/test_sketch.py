@@ -121,10 +121,10 @@ def test_what_check_says_can_be_applied():
 
 
 def test_legs_that_overlap_are_moved_apart():
-    sketch = Sketch(legs=12, links=2, layout="radial")
+    sketch = Sketch(legs=12, links=3, layout="pairs")
     (flaw,) = opened(sketch).flaws
     assert re.fullmatch(
-        r"leg\d+_\w+ and leg\d+_\w+ overlap by .* m in a stride: legs mounted .* as far out fit", flaw.text
+        r"[lr]\d+_\w+ and [lr]\d+_\w+ overlap by .* m in a stride: legs mounted .* as far out fit", flaw.text
     )
     assert opened(sketches.cured(sketch, flaw.cure)).flaws == ()
 
