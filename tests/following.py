@@ -24,15 +24,17 @@ def followed(family: str) -> bool:
     """Try the bodies of a family, print how they follow, and return whether they do."""
     errors, fell = [], []
     for seed in trange(BODIES, desc=family, disable=None):
-        motion, fallen = obeyed(FAMILIES[family](seed))
+        motion, falls = obeyed(FAMILIES[family](seed))
         errors.append(abs(motion - COMMANDS).mean())
-        fell.append(fallen.sum())
-        print(f"{family}_{seed}: mean error {errors[-1]:.3f}, fell in {fell[-1]} of {len(COMMANDS)} commands", flush=True)
+        fell.append(falls.sum())
+        told = f"mean error {errors[-1]:.3f}, fell in {fell[-1]} of {len(COMMANDS)} commands"
+        print(f"{family}_{seed}: {told}", flush=True)
     errors, fell = np.array(errors), np.array(fell)
     quantiles = ", ".join(f"{value:.3f}" for value in np.quantile(errors, (0.5, 0.9, 1.0)))
     print(f"{family}: mean error, median, nine tenths and most: {quantiles}")
-    print(f"{family}: {(errors <= MOST).mean():.0%} err by {MOST} at most; {(fell > 0).sum()} bodies of {len(fell)} fell")
-    return not fell.any() and (errors <= MOST).mean() >= SHARE
+    obedient, fallen = (errors <= MOST).mean(), (fell > 0).sum()
+    print(f"{family}: {obedient:.0%} err by {MOST} at most; {fallen} bodies of {len(fell)} fell")
+    return not fallen and obedient >= SHARE
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def text(path: Path) -> str:
     """Return the table of all policies in Markdown.
 
     A cell holds the share of bodies that walk, the score and, in brackets, that of the worst tenth; then the speed as a
-    share of the target, where it was measured. In tasks with a command it holds the score and the tracking as a share
+    share of the target. In tasks with a command it holds the score and the tracking as a share
     of the demonstrators'.
 
     Raises:
@@ -76,6 +76,5 @@ def _cell(result: transfer.TransferResult | None) -> str:
     if result is None:
         return "not run"
     if math.isnan(result.tracking):
-        speed = "" if math.isnan(result.speed) else f", speed {result.speed:.2f}"
-        return f"{result.walk:.0%}, {result.score:.2f} ({result.worst:.2f}){speed}"
+        return f"{result.walk:.0%}, {result.score:.2f} ({result.worst:.2f}), speed {result.speed:.2f}"
     return f"{result.score:.2f}, tracking {result.tracking:.2f}"

@@ -15,9 +15,9 @@ ROOT = pathlib.Path(__file__).parents[3]
 STUDY = ROOT / "studies" / "bodies.csv"
 
 
-def compared(policy, tracking=math.nan, speed=0.9):
+def compared(policy, tracking=math.nan):
     demonstrator, zero = Judged(20.0, True, 1.0, 0.8), Judged(10.0, False, 0.0, 0.1)
-    return Comparison("body", Judged(policy, True, speed, tracking), demonstrator, zero)
+    return Comparison("body", Judged(policy, True, 0.9, tracking), demonstrator, zero)
 
 
 def test_episodes_are_read_as_they_were_written(tmp_path):
@@ -33,9 +33,8 @@ def test_episodes_are_read_as_they_were_written(tmp_path):
         "| one | steer | not run | not run | 0.75, tracking 0.62 | not run | not run | not run | 0.00, tracking 0.25 |"
         " not run |"
     )
-    bodies.write(path, "one", "walk", {"robots": [compared(15.0)], "small": [compared(15.0, speed=math.nan)]})
+    bodies.write(path, "one", "walk", {"robots": [compared(15.0)]})
     assert "| one | walk | not run | not run | 100%, 0.50 (0.50), speed 0.90 | not run |" in bodies.text(path)
-    assert "| 100%, 0.50 (0.50) | not run |" in bodies.text(path), "the speed was not measured"
     path.write_text("family,body\n")
     with pytest.raises(ValueError, match=r"bodies\.csv: expected lines of policy, task, family, "):
         bodies.text(path)
@@ -59,8 +58,9 @@ def test_what_ships_is_in_the_table_and_is_good():
     found = bodies.read(STUDY)["universal", "walk"]
     assert list(found) == list(transfer.FAMILIES)
     results = {name: transfer.result(each) for name, each in found.items()}
-    assert all(result.demonstrated == 1.0 for result in results.values())
-    assert results["random"].walk == 1.0 and results["random"].score > 0.95
+    assert all(result.demonstrated >= 0.9 for result in results.values())
+    assert results["random"].walk == 1.0 and results["varied"].walk >= 0.95
+    assert min(results["random"].score, results["varied"].score) >= 0.98
     assert min(results["robots"].walk, results["mutants"].walk) >= 0.8
     steer = {name: transfer.result(each) for name, each in bodies.read(STUDY)["universal", "steer"].items()}
-    assert steer["robots"].tracking > 0.8
+    assert min(steer["robots"].tracking, steer["varied"].tracking) >= 0.9
