@@ -26,7 +26,7 @@ from arc_suite.robots.spec import Body
 
 FLAGS = flags.FLAGS
 define_task()
-flags.DEFINE_bool("walk", False, "Let the demonstrator walk a body that has no flaw.")
+flags.DEFINE_bool("walk", False, "Let the demonstrator walk a body, whatever its flaws are, if any walk is possible.")
 flags.DEFINE_string("robot", "queen", f"In which a task is checked: {ROBOT_HELP}.")
 
 
@@ -44,10 +44,10 @@ def _check_body(spec: str) -> int:
     found = flaws(body)
     for flaw in found:
         print(f"{spec}: {flaw.text}")
-    if found:
-        return 1
-    print(f"{spec}: {body.name} stands and can take steps")
-    return _check_walk(spec, body) if FLAGS.walk else 0
+    if not found:
+        print(f"{spec}: {body.name} stands and can take steps")
+    walked = _check_walk(spec, body) if FLAGS.walk and not any(flaw.hopeless for flaw in found) else 0
+    return int(bool(found) or walked)
 
 
 def _check_walk(spec: str, body: Body) -> int:

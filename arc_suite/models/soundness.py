@@ -24,7 +24,7 @@ _LARGEST_TURN = 0.5  # rad, of a joint
 
 # A body walks about as fast, of the target speed, as its motors give of this many times the loads of a stride: medians
 # of 16 `varied` bodies with 1, 2, 3, 4, 6 and 10 times the loads are 0.14, 0.25, 0.46, 0.61, 0.82 and 1.09. Over 161
-# bodies with random motors the mean error is 0.21.
+# bodies with random motors the mean error is 0.21; 118 are called weak, and 76 % of these stay below 0.7 as they walk.
 _BRISK = 7.0
 
 _SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # of the legs' mounts, tried against overlaps

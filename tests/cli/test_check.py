@@ -134,3 +134,17 @@ def test_a_slow_body_is_told_what_to_leave_out(path):
     slow, fast = walks.format(r"-?0\.[0-6]\d"), walks.format(r"(0\.9|1\.[0-3])\d")
     line = rf"{path}: spider is slow: {slow}: leave out damping of its joints: it then {fast}"
     assert done.returncode == 1 and re.fullmatch(line, done.stdout.splitlines()[1])
+
+
+def test_a_weak_body_is_told_and_walked_all_the_same(path):
+    spec = json.loads(spec_files.body_to_json(spec_files.load_body("spider")))
+    for leg in spec["legs"]:
+        leg["links"][0]["joint"]["motor"] = {"gear": 0.01}
+    path.write_text(json.dumps(spec))
+    done = check("--walk", path)
+    weak, walked = done.stdout.splitlines()
+    assert done.returncode == 1
+    assert re.fullmatch(
+        rf"{path}: weak: reaches about 0\.\d of the target speed, as the motor of \w+ lacks .*: gear .* fits", weak
+    )
+    assert walked.startswith(f"{path}: spider is slow: walks 100 control steps at ")
