@@ -41,9 +41,10 @@ def test_they_earn_what_is_listed(name):
 @pytest.mark.parametrize("task", ["walk", "steer"])
 def test_those_of_any_body_earn_what_is_listed(task):
     packaged = universal.load("universal", Setup.of("queen", task).definition)
-    environment = packaged.setup.validation(10).make_vec(10, autoreset_mode="Disabled")
+    count = evaluation.EPISODES  # as many bodies; fewer are others
+    environment = packaged.setup.validation(count).make_vec(count, autoreset_mode="Disabled")
     returns = [episode.total for episode in evaluation.episodes_in_batch(environment, packaged)]
-    assert np.mean(returns) == pytest.approx(INDEX[f"universal-{task}"]["return"], rel=0.02)
+    assert np.mean(returns) == pytest.approx(INDEX[f"universal-{task}"]["return"], rel=0.01)
 
 
 @pytest.mark.parametrize("body", [generator.generate(8, 3), generator.random_body(200_003)], ids=lambda body: body.name)
