@@ -12,7 +12,7 @@ from arc_suite.cpg.prescribed import Preset
 from arc_suite.cpg.selection import law, presets_of
 from arc_suite.envs import trees
 from arc_suite.envs.prepare import prepared
-from arc_suite.models.soundness import flaws
+from arc_suite.models.soundness import hopeless
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -59,9 +59,8 @@ class Demonstrator:
         if isinstance(preset, str) or preset is None:
             preset = presets[checks.name(preset, presets, "preset")]
         # Presets of the published law were found for a body as it is.
-        hopeless = [] if isinstance(preset, Preset) else [flaw.text for flaw in flaws(body) if flaw.hopeless]
-        if hopeless:
-            raise ValueError(f"{body.name} cannot walk: {hopeless[0]}")
+        if not isinstance(preset, Preset) and (found := hopeless(body)):
+            raise ValueError(f"{body.name} cannot walk: {found[0].text}")
         self._body, self.law = body, law(task or prepared(body, "walk")[0], preset)
         self._state, self._started = None, []
 

@@ -17,7 +17,7 @@ from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.kinematics import flows, rises, weights
 from arc_suite.models.sizing import sized
 from arc_suite.models.standing import posed
-from arc_suite.models.stride import lifted
+from arc_suite.models.stride import lifted, swung
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 
@@ -104,7 +104,7 @@ class Steered(CommandLaw):
             raised = ((1.0 - able) * unload - self.parameters.attitude * low) * leg.lift
             for targets, phase in ((now, request.phase), (later, request.phase + request.advance)):
                 cycle = (phase + self.offsets[index]) % 1.0
-                targets.append(raised + _swung(cycle[:, None], self.duty_factor, sweep, leg.lift))
+                targets.append(raised + swung(cycle[:, None], self.duty_factor, sweep, leg.lift))
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
         return none, self.neutral + now, later - now
 
@@ -146,14 +146,6 @@ class Steered(CommandLaw):
             below, above = -0.95 * low[joints], 0.95 * high[joints]
             room = np.minimum(np.minimum(below, above), self.parameters.sweep).clip(1e-3)
             yield _Leg(jacobian, room, lifted(jacobian, self.parameters.lift * self.pose.height, below, above))
-
-
-def _swung(cycle, duty_factor: float, sweep, lift):
-    """Departures (environments, n) of a leg's joints from the neutral pose at phases (environments, 1), cycles."""
-    numpy, stands = cycle.__array_namespace__(), cycle < duty_factor
-    progress = numpy.where(stands, cycle / duty_factor, (cycle - duty_factor) / (1.0 - duty_factor))
-    swept = numpy.where(stands, 1.0 - 2.0 * progress, 2.0 * progress - 1.0) * sweep
-    return swept + numpy.where(stands, 0.0, numpy.sin(np.pi * progress)) * lift
 
 
 def _sweep(leg: _Leg, path, level: float):

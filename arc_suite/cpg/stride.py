@@ -14,9 +14,9 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.cpg.gait import gait_of
 from arc_suite.cpg.law import Pattern, joint_targets, proprioception, torques
-from arc_suite.models.sizing import GRAVITY, position_gains, sized
-from arc_suite.models.standing import standing
-from arc_suite.models.stride import LIFT, lifted, swept, target_ranges
+from arc_suite.models.sizing import position_gains, sized
+from arc_suite.models.standing import GRAVITY, standing
+from arc_suite.models.stride import LIFT, strokes
 from arc_suite.tasks.contract import Task
 
 _LEAST_FROUDE = 1e-3
@@ -80,15 +80,11 @@ class Stride(NamedTuple):
         reach = 0.5 * speed * gait.duty_factor / gait.frequency or 1e-6 * pose.height
         joints = [joint for leg in body.legs for joint in leg.joints]
         counts = [len(leg.joints) for leg in body.legs]
-        sweeps, lifts, raised = [], [], []
-        for leg, jacobian in zip(body.legs, pose.jacobians, strict=True):
-            sweep = swept(leg, jacobian, reach)
-            low, high = target_ranges(leg)
-            lift = lifted(jacobian, LIFT * pose.height, -low, high)
+        moves, raised = strokes(task.scene.body, reach), []
+        for jacobian, (sweep, lift) in zip(pose.jacobians, moves, strict=True):
             able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
-            sweeps.append(sweep)
-            lifts.append(lift)
             raised.append((1.0 - able) * UNLOAD / LIFT * lift)
+        sweeps, lifts = map(np.concatenate, zip(*moves, strict=True))
         stiffness, damping = position_gains(body, pose.inertias)
         lateral = pose.soles[:, 1] / max(abs(pose.soles[:, 1]).max(), 1e-9)
         return cls(
@@ -96,10 +92,10 @@ class Stride(NamedTuple):
                 frequency=gait.frequency,
                 duty_factor=gait.duty_factor,
                 offset=np.repeat(gait.offsets, counts),
-                sweep=np.concatenate(sweeps),
+                sweep=sweeps,
                 centre=np.concatenate(raised),
                 stance=np.zeros(len(joints)),
-                swing=np.concatenate(lifts),
+                swing=lifts,
             ),
             speed=speed,
             control_timestep=task.scene.control_timestep,

@@ -64,10 +64,12 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
     """
     joints = [joint for leg in body.legs for joint in leg.joints]
     given = [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
-    counts = range(1, len(given) + 1)
-    sets = itertools.chain.from_iterable(itertools.combinations(given, count) for count in counts)
-    walks = {names: walk(_leaving_out(body, names)) for names in sets}
-    better = {names: each for names, each in walks.items() if each.quality > quality}
+    better = {}
+    for count in range(1, len(given) + 1):
+        walks = {names: walk(_leaving_out(body, names)) for names in itertools.combinations(given, count)}
+        better |= {names: each for names, each in walks.items() if each.quality > quality}
+        if any(each.quality == 2 for each in better.values()):  # larger sets are no better
+            break
     return max(better.items(), key=lambda item: (item[1].quality, -len(item[0]), item[1].share), default=None)
 
 

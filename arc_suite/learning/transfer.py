@@ -182,10 +182,10 @@ def _episodes(environment: BodiesEnv, policy: Policy) -> list[Judged]:
         fell[terminated] = True
 
     played, found = protocol.episodes_in_batch(environment, policy, range(count), watch), []
-    moved = np.diff(np.array(places)[..., :2], axis=0)
+    moved, wanted = np.diff(np.array(places)[..., :2], axis=0), np.array(targets)
     for index, episode in enumerate(played):
         lasted = slice(episode.length), index
-        speed, _ = walking.shares(np.array(targets)[lasted], moved[lasted], STEPS)
+        speed, _ = walking.shares(wanted[lasted], moved[lasted], STEPS)
         ending = "fall" if fell[index] else "time"
         failures = walking.failures(speed, touching[index] / episode.length, ending)
         found.append(Judged(episode.total, not failures, speed, episode.progress.get("tracking", math.nan)))

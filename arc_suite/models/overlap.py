@@ -7,8 +7,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from arc_suite.models.standing import compiled, standing
-from arc_suite.models.stride import GAIT_FREQUENCY, TARGET_FROUDE, fitted_gait, swept
+from arc_suite.models.standing import compiled
+from arc_suite.models.stride import fitted_gait, half_stroke, strokes
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
 
@@ -59,19 +59,17 @@ def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
 
 def _poses(body: Body) -> Iterator[tuple[str, np.ndarray]]:
     """Yield poses by name, (joints,) rad: the standing one, and those of a stride at which legs are nearest."""
-    pose = standing(body)
-    yield "the standing pose", np.zeros(len(pose.inertias))
+    yield "the standing pose", np.zeros(len(body.joint_names))
     if body.name in ROBOTS:  # which has a gait of its own
         return
     gait = fitted_gait(body)
-    reach = _LENGTHENED * 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * pose.height
-    sweeps = [swept(leg, jacobian, reach) for leg, jacobian in zip(body.legs, pose.jacobians, strict=True)]
+    moves = strokes(body, _LENGTHENED * half_stroke(body, gait))
     offsets = np.array(gait.offsets)
     # Neighbours reach the ends of their strides at different times. All legs sweep at constant speed between the
     # moments at which one of them touches down or takes off, so that two are nearest at such a moment.
     for time in np.unique(np.concatenate([-offsets, gait.duty_factor - offsets]).round(9) % 1.0):
         ways = np.interp((time + offsets) % 1.0, (0.0, gait.duty_factor, 1.0), (1.0, -1.0, 1.0))
-        yield "a stride", np.concatenate([way * sweep for way, sweep in zip(ways, sweeps, strict=True)])
+        yield "a stride", np.concatenate([way * sweep for way, (sweep, _) in zip(ways, moves, strict=True)])
 
 
 def _pairs(body: Body) -> np.ndarray:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from arc_suite.models import stride
-from arc_suite.models.standing import GRAVITY, Standing, standing
+from arc_suite.models.standing import GRAVITY, Standing, by_leg, standing
 from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
 
 SUBSTEPS = 25  # of a control step
@@ -91,14 +91,10 @@ def sized(body: Body) -> Body:
     complete = all(None not in (j.armature, j.damping, j.motor) for leg in body.legs for j in leg.joints)
     if complete and body.simulation and body.camera:
         return body
-    pose, first, legs = standing(body), 0, []
-    borne, frequency = loads(body), natural_frequency(body)
-    for leg in body.legs:
-        last = first + len(leg.joints)
-        legs.append(_sized_leg(leg, body.agility, pose.inertias[first:last], borne[first:last], frequency))
-        first = last
+    pose, frequency = standing(body), natural_frequency(body)
+    moved = zip(body.legs, by_leg(body, pose.inertias), by_leg(body, loads(body)), strict=True)
     return body.replace(
-        legs=tuple(legs),
+        legs=tuple(_sized_leg(leg, body.agility, *numbers, frequency) for leg, *numbers in moved),
         simulation=simulation(body),
         camera=body.camera or _camera(pose),
     )
@@ -106,15 +102,10 @@ def sized(body: Body) -> Body:
 
 def loads(body: Body) -> np.ndarray:
     """Return the torques (joints,) that joints are sized for, N m: the largest of a stride, and never nothing."""
-    pose, first, found = standing(body), 0, []
+    pose = standing(body)
     every = np.maximum(stride.loads(body), pose.inertias * stride.accelerations(body))
     least = _LEAST_LEVER * pose.height * pose.mass * GRAVITY / len(body.legs)
-    for leg in body.legs:
-        last = first + len(leg.joints)
-        own = every[first:last]
-        found.append(own.clip(min=_LEAST_SHARE * max(*own, least)))
-        first = last
-    return np.concatenate(found)
+    return np.concatenate([own.clip(min=_LEAST_SHARE * max(*own, least)) for own in by_leg(body, every)])
 
 
 def _sized_leg(leg: Leg, agility: float, inertias: np.ndarray, loads: np.ndarray, frequency: float) -> Leg:

@@ -9,8 +9,7 @@ import numpy as np
 from arc_suite.models import sizing, stride
 from arc_suite.models.outline import solid_corners
 from arc_suite.models.overlap import overlaps
-from arc_suite.models.standing import Standing, standing
-from arc_suite.models.stride import LEAST_SHARE
+from arc_suite.models.standing import Standing, by_leg, standing
 from arc_suite.robots.spec import Body, Leg, Link
 
 # Shares of the standing height.
@@ -48,6 +47,13 @@ def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk."""
     pose = standing(body)
     return [flaw for check in (_height, _support, _motors, _joints, _parts) for flaw in check(body, pose)]
+
+
+def hopeless(body: Body) -> list[Flaw]:
+    """Return the flaws of a body with which none can walk; quicker than `flaws`, as neither motors nor overlaps are."""
+    pose = standing(body)
+    found = [flaw for check in (_height, _support, _joints) for flaw in check(body, pose)]
+    return [flaw for flaw in found if flaw.hopeless]
 
 
 def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
@@ -126,7 +132,7 @@ def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
         yield _short(body, given, held, "hold the body up")
         return
     loads = _BRISK * sizing.loads(body)
-    if (reached := _reached(body, (given / loads).clip(max=1.0))) < LEAST_SHARE:
+    if (reached := _reached(body, (given / loads).clip(max=1.0))) < stride.LEAST_SHARE:
         slow = f"weak: reaches about {reached:.1f} of the target speed, as "
         yield _short(body, given, loads, "a brisk stride takes", slow)
 
@@ -148,13 +154,9 @@ def _reached(body: Body, shares: np.ndarray) -> float:
 
     In each leg the joint that bears most and the one that sweeps most decide; the others hardly matter.
     """
-    borne, first, reached = stride.loads(body), 0, []
-    for leg, (sweep, _) in zip(body.legs, stride.strokes(body), strict=True):
-        last = first + len(leg.joints)
-        deciding = [int(borne[first:last].argmax()), int(abs(sweep).argmax())]
-        reached.append(shares[first:last][deciding].min())
-        first = last
-    return float(np.mean(reached))
+    moves = stride.strokes(body, stride.half_stroke(body, stride.fitted_gait(body)))
+    legs = zip(by_leg(body, shares), by_leg(body, stride.loads(body)), moves, strict=True)
+    return float(np.mean([own[[borne.argmax(), abs(sweep).argmax()]].min() for own, borne, (sweep, _) in legs]))
 
 
 def _unpowered(body: Body, joints: np.ndarray) -> Body:

@@ -31,8 +31,6 @@ class Standing(NamedTuple):
         jacobians: for each leg (3, joints of the leg): velocity of the sole per joint velocity.
         inertias: (joints,) diagonal of the mass matrix without armature.
         loads: (joints,) torques of the joints that hold the pose while the feet that carry do so.
-        margin: static stability: distance of the centre of mass, on the floor, from the nearest
-            edge of the polygon of the soles; negative outside.
     """
 
     height: float
@@ -42,7 +40,12 @@ class Standing(NamedTuple):
     jacobians: tuple[np.ndarray, ...]
     inertias: np.ndarray
     loads: np.ndarray
-    margin: float
+
+    @property
+    def margin(self) -> float:
+        """Static stability: distance of the centre of mass, on the floor, from the nearest edge of the polygon of the
+        soles, m; negative outside."""
+        return stability_margin(self.centre, self.soles)
 
 
 @functools.lru_cache(maxsize=256)
@@ -90,8 +93,12 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
         jacobians=tuple(jacobians),
         inertias=np.diag(matrix)[6:].copy(),
         loads=data.qfrc_bias[6:] - held,
-        margin=stability_margin(centre, soles),
     )
+
+
+def by_leg(body: Body, values: np.ndarray) -> list[np.ndarray]:
+    """Return values of joints (joints,) as those of each leg (joints of the leg,)."""
+    return np.split(values, np.cumsum([len(leg.joints) for leg in body.legs])[:-1])
 
 
 @functools.lru_cache(maxsize=256)

@@ -30,7 +30,7 @@ LARGEST_SWEEP = 0.5  # rad, of a joint to either side
 LARGEST_LIFT = 0.9  # rad
 _USED = 0.9  # share of a joint's range that targets may use
 
-# How much it matters that a foot moves as wanted along x, y and z. In stance it must not rise or
+# How much it matters that a foot moves as wanted along x, y and z. In stance it is not to rise or
 # sink; if it slips sideways all of its friction points there and none of it brakes the body.
 _SWEEP_WEIGHTS = (1.0, 0.1, 1.0)
 _LIFT_WEIGHTS = (0.2, 0.2, 1.0)
@@ -55,16 +55,27 @@ def half_stroke(body: Body, gait: gaits.Gait) -> float:
 
 def poses(body: Body) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield joint angles (joints,), rad, and which feet stand (legs,), at moments of a cycle of the fitted gait."""
-    gait, moves = fitted_gait(body), strokes(body)
-    duty = gait.duty_factor
+    gait = fitted_gait(body)
+    moves = strokes(body, half_stroke(body, gait))
     for moment in np.arange(_MOMENTS) / _MOMENTS:
         cycle = (moment + np.array(gait.offsets)) % 1.0
-        stands, angles = cycle < duty, []
-        for place, standing_leg, (sweep, lift) in zip(cycle, stands, moves, strict=True):
-            swing = (place - duty) / (1.0 - duty)
-            moved = sweep * (1.0 - 2.0 * place / duty) if standing_leg else sweep * (2.0 * swing - 1.0)
-            angles.append(moved if standing_leg else moved + lift * math.sin(math.pi * swing))
-        yield np.concatenate(angles), stands
+        angles = [swung(place, gait.duty_factor, *move) for place, move in zip(cycle, moves, strict=True)]
+        yield np.concatenate(angles), cycle < gait.duty_factor
+
+
+def swung(cycle, duty_factor: float, sweep, lift):
+    """Return how far joints (..., n) are from rest, rad, at phases (..., 1) of a leg's cycle.
+
+    Args:
+        cycle: in cycles; a leg swings from the duty factor on.
+        duty_factor: of the gait.
+        sweep: (..., n) angles at touchdown, rad.
+        lift: (..., n) angles added in mid-swing, rad.
+    """
+    numpy, stands = cycle.__array_namespace__(), cycle < duty_factor
+    progress = numpy.where(stands, cycle / duty_factor, (cycle - duty_factor) / (1.0 - duty_factor))
+    angles = numpy.where(stands, 1.0 - 2.0 * progress, 2.0 * progress - 1.0) * sweep
+    return angles + numpy.where(stands, 0.0, numpy.sin(np.pi * progress)) * lift
 
 
 def loads(body: Body) -> np.ndarray:
@@ -80,14 +91,20 @@ def accelerations(body: Body) -> np.ndarray:
 
     A foot is lifted as a sine of time, and turns from going back to going forward in half of the swing.
     """
-    duration = (1.0 - fitted_gait(body).duty_factor) / GAIT_FREQUENCY * math.sqrt(body.torso.standing_height / GRAVITY)
-    sweeps, lifts = map(np.concatenate, zip(*strokes(body), strict=True))
+    gait = fitted_gait(body)
+    duration = (1.0 - gait.duty_factor) / GAIT_FREQUENCY * math.sqrt(body.torso.standing_height / GRAVITY)
+    sweeps, lifts = map(np.concatenate, zip(*strokes(body, half_stroke(body, gait)), strict=True))
     return (math.pi / duration) ** 2 * abs(lifts) + 4.0 / duration**2 * abs(sweeps)
 
 
-def strokes(body: Body) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return of each leg the angles (joints of the leg,) by which it is swept and lifted, rad."""
-    pose, ahead, found = standing(body), half_stroke(body, fitted_gait(body)), []
+def strokes(body: Body, ahead: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return of each leg the angles (joints of the leg,) by which it is swept and lifted, rad.
+
+    Args:
+        body: the spec.
+        ahead: how far a foot is to be swept from its place at rest, m.
+    """
+    pose, found = standing(body), []
     for leg, jacobian in zip(body.legs, pose.jacobians, strict=True):
         low, high = target_ranges(leg)
         found.append((swept(leg, jacobian, ahead), lifted(jacobian, LIFT * pose.height, -low, high)))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.sizing import GRAVITY
+from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors

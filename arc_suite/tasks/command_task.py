@@ -17,7 +17,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.arenas import Arena
 from arc_suite.markers import Marker
-from arc_suite.models.sizing import GRAVITY
+from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import blocks, clock, energy, mirrors, parameters, terms
 from arc_suite.tasks import readings as reading

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.arenas import Arena
-from arc_suite.models.sizing import GRAVITY
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.tasks.contract import STEPS
 from arc_suite.tasks.fitting import velocity_units
 

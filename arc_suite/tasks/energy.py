@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.models.sizing import GRAVITY, sized
-from arc_suite.models.standing import standing
+from arc_suite.models.sizing import sized
+from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots.spec import Body
 
 NOWHERE = 0.05  # share of the path at the target velocity below which a body gets nowhere

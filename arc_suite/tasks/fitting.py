@@ -9,8 +9,7 @@ import math
 
 import numpy as np
 
-from arc_suite.models.sizing import GRAVITY
-from arc_suite.models.standing import standing
+from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.models.stride import GAIT_FREQUENCY, TARGET_FROUDE, fitted_gait
 from arc_suite.robots.spec import Body
 

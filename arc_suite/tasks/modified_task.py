@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite.markers import Marker
-from arc_suite.models.sizing import GRAVITY, position_gains, sized
-from arc_suite.models.standing import standing
+from arc_suite.models.sizing import position_gains, sized
+from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
 from arc_suite.tasks import noise
 from arc_suite.tasks.blocks import Block

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite.models.sizing import GRAVITY, position_gains, sized
-from arc_suite.models.standing import standing
+from arc_suite.models.sizing import position_gains, sized
+from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach, velocity_units

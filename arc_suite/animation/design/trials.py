@@ -11,8 +11,8 @@ from arc_suite.animation.design.genes import Budget
 from arc_suite.envs.dm import Environment
 from arc_suite.envs.setup import Setup
 from arc_suite.evaluation.walking import MOST_TILT_COSINE
-from arc_suite.models.sizing import GRAVITY
 from arc_suite.models.soundness import flaws
+from arc_suite.models.standing import GRAVITY
 from arc_suite.models.stride import LEAST_SHARE
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
