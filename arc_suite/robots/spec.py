@@ -5,6 +5,9 @@ A `Body` is a torso, its ballast and its legs; a `Leg` is a chain of `Link`s tha
 kilograms, angles degrees (the only place where they are). Frames: x forward, y left, z up; a
 child's origin is the end of the link before it, and a body stands with all joints at zero.
 
+A body that was imported has a `source`, the MJCF that its physics follow. Its legs are then a sketch of
+the source in its standing pose, from which all angles count.
+
 Every class checks its own fields and raises `SpecError`, which names the field. This module needs only
 the standard library.
 """
@@ -29,6 +32,8 @@ _GEARS = (1e-20, 1e30)
 _LARGEST = 1e35
 _LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
 MAX_NAME = 32  # characters
+MAX_ALIAS = 100  # characters of a name in a file of others
+MAX_SOURCE = 1 << 21  # bytes of the MJCF of an imported body; of 38 files the largest has 430,000
 PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colours`
 _NAME = re.compile(rf"[a-z0-9_]{{1,{MAX_NAME}}}")
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
@@ -99,6 +104,24 @@ def _check_items(value: Any, kind: type, low: int, high: int) -> tuple:
     if not low <= len(value) <= high:
         raise SpecError(f"expected {low} to {high} {kind.__name__}s, got {len(value)}")
     return tuple(_check_instance(item, kind) for item in value)
+
+
+def _check_text(value: Any, low: int, high: int) -> str:
+    if not isinstance(value, str) or not low <= len(value) <= high:
+        raise SpecError(f"expected a text of {low} to {high} characters, got {_shown(value)}")
+    return value
+
+
+def _check_texts(value: Any, high: int) -> tuple[str, ...]:
+    if not isinstance(value, (tuple, list)) or len(value) > high:
+        raise SpecError(f"expected a sequence of at most {high} texts, got {_shown(value)}")
+    return tuple(_check_text(text, 1, MAX_ALIAS) for text in value)
+
+
+def _check_integer(value: Any, low: int, high: int) -> int:
+    if not isinstance(value, int) or isinstance(value, bool) or not low <= value <= high:
+        raise SpecError(f"expected an integer from {low} to {high}, got {_shown(value)}")
+    return value
 
 
 def _shown(value: Any) -> str:
@@ -176,8 +199,23 @@ class Motor(_Spec):
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
+class Servo(_Spec):
+    """A motor that holds its joint at an angle in every substep; a control of 0 is the standing pose.
+
+    Attributes:
+        stiffness: torque by the joint's distance from the wanted angle, N m/rad.
+        damping: torque against its velocity, N m s/rad.
+        limit: the largest torque, N m.
+    """
+
+    stiffness: float = _number(*_GEARS)
+    damping: float = _number(0.0, _LARGEST)
+    limit: float = _number(*_GEARS)
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
 class Joint(_Spec):
-    """A limited hinge at a link's origin, driven by its motor.
+    """A limited hinge at a link's origin, driven by its motor or its servo.
 
     Attributes:
         name: `<leg>_<name>` is the joint's and its motor's name in the model.
@@ -185,7 +223,9 @@ class Joint(_Spec):
         range_deg: lower and upper limit; zero, the standing pose, lies within.
         armature: rotor inertia seen at the joint, kg m^2; None: sized to the body.
         damping: viscous torque, N m s/rad; None: sized to the body.
-        motor: None: sized to the body.
+        motor: None: sized to the body, unless it has a servo.
+        servo: of an imported body.
+        alias: its name in the file that it was imported from.
     """
 
     name: str = _name()
@@ -194,13 +234,22 @@ class Joint(_Spec):
     armature: float | None = _number(0.0, _LARGEST, default=None, optional=True)
     damping: float | None = _number(0.0, _LARGEST, default=None, optional=True)
     motor: Motor | None = _field(_check_instance, Motor, default=None, optional=True)
+    servo: Servo | None = _field(_check_instance, Servo, default=None, optional=True)
+    alias: str | None = _field(_check_text, 1, MAX_ALIAS, default=None, optional=True)
 
     def _check_whole(self):
         if math.hypot(*self.axis) < 1e-6:
             self._fail("axis", "expected a direction, got one of no length")
+        if self.motor and self.servo:
+            self._fail("servo", "expected a motor or a servo, got both")
         low, high = self.range_deg
         if not (low <= 0.0 <= high and low < high):
             self._fail("range_deg", f"expected low <= 0 <= high and low < high, got {_shown(self.range_deg)}")
+
+    @property
+    def torque(self) -> float | None:
+        """Return the largest torque of its motor or servo, N m; None for one that is to be sized."""
+        return self.servo.limit if self.servo else self.motor and self.motor.gear
 
     def mirrored(self) -> Joint:
         """Return the joint of the leg across the x-z plane, so that equal angles give mirrored poses.
@@ -394,16 +443,31 @@ class Simulation(_Spec):
         contact_time: time constant of contacts and joint limits, s.
         contact_width: depth over which a contact hardens, m.
         contact_margin: of every geom that touches, m.
+        substeps: of a control step.
     """
 
     timestep: float = _number(1e-6, 0.1, default=0.002)
     contact_time: float = _number(2e-6, 1.0, default=0.02)
     contact_width: float = _number(1e-9, MAX_LENGTH, default=0.001)
     contact_margin: float = _number(0.0, MAX_LENGTH, default=0.005)
+    substeps: int = _field(_check_integer, 2, 1000, default=25)
 
     def _check_whole(self):
         if self.contact_time < 2.0 * self.timestep:
             self._fail("contact_time", f"expected at least two timesteps, got {self.contact_time:g}")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Held(_Spec):
+    """A joint outside of the legs of an imported body, which a servo holds in the standing pose.
+
+    Attributes:
+        name: of the joint and its servo in the model.
+        servo: that holds it.
+    """
+
+    name: str = _name()
+    servo: Servo = _field(_check_instance, Servo)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -423,6 +487,10 @@ class Body(_Spec):
         simulation: its constants; None: scaled to the body.
         agility: factor on the motors that are sized, for bodies that leap.
         palette: of its colours, one of `PALETTES` or a seed; None: the robot's own, or grey.
+        source: MJCF of an imported body, which names parts and joints as here and has the standing pose as the
+            keyframe `home`; see `arc_suite.models.source`.
+        held: its joints outside of the legs.
+        file_joints: names of its motors' joints in the file that it was imported from, in the order of the file.
     """
 
     name: str = _name()
@@ -434,17 +502,22 @@ class Body(_Spec):
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
     agility: float = _number(0.1, 10.0, default=1.0)
     palette: str | int | None = _field(_check_palette, default=None, optional=True)
+    source: str | None = _field(_check_text, 1, MAX_SOURCE, default=None, optional=True)
+    held: tuple[Held, ...] = _field(_check_items, Held, 0, 256, default=())
+    file_joints: tuple[str, ...] = _field(_check_texts, 1024, default=())
 
     def _check_whole(self):
         _check_unique(self, "legs", [leg.name for leg in self.legs])
         shapes = [part.name for part in (*self.torso.solids, *self.ballast)]
         _check_unique(self, "ballast", shapes)
-        self._check_inertia()
+        self._check_source()
+        if self.source is None:
+            self._check_inertia()
         if self.torso.standing_height is None:
             object.__setattr__(self, "torso", self.torso.replace(standing_height=self._derived_height()))
         # Names in the model: leg a's part b_c would meet leg a_b's part c.
         _check_unique(self, "legs", [*shapes, *self.part_names[1:]])
-        _check_unique(self, "legs", self.joint_names)
+        _check_unique(self, "legs", [*self.joint_names, *(joint.name for joint in self.held)])
 
     def _derived_height(self) -> float:
         """Return the height of the torso's origin above its lowest foot's lowest point."""
@@ -453,6 +526,21 @@ class Body(_Spec):
             reason = f"feet end {abs(height):.4g} m {'below' if height > 0.0 else 'above'} the torso's origin"
             self._fail("torso", f"standing_height cannot be derived: {reason}")
         return float(f"{height:.12g}")  # sums of decimal lengths are decimal again
+
+    def _check_source(self) -> None:
+        """Refuse servos without a source, and motors with one."""
+        servos = [joint.servo is not None for leg in self.legs for joint in leg.joints]
+        if self.source is None:
+            for field, given in (("legs", any(servos)), ("held", self.held), ("file_joints", self.file_joints)):
+                if given:
+                    what = "servos" if field == "legs" else "values"
+                    self._fail(field, f"expected no {what} in a body without a source")
+        elif not all(servos):
+            self._fail("legs", "expected a servo at every joint of a body with a source")
+        elif self.ballast:
+            self._fail("ballast", "expected none in a body with a source, which has its weights")
+        elif self.simulation is None:
+            self._fail("simulation", "missing; a body with a source needs it")
 
     def _check_inertia(self):
         """Refuse moving parts whose inertia is too small for MuJoCo; that of a ball is 8/15 pi density radius^5."""

@@ -97,7 +97,7 @@ IN_SOLID = "name, shape, size, position, euler_deg"
 THIN = "legs: r2_foot: expected a radius from 0.0009 at density 10, got "
 PARALLEL = "camera.xyaxes: expected two directions that are not parallel, got "
 SHAPES = "sphere, capsule, cylinder, ellipsoid, box"
-IN_BODY = "name, torso, legs, camera, density, ballast, simulation, agility, palette"
+IN_BODY = "name, torso, legs, camera, density, ballast, simulation, agility, palette, source, held, file_joints"
 
 
 @pytest.mark.parametrize(
