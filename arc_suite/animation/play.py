@@ -91,7 +91,7 @@ def _ground(body: Body, arena: str) -> dict[str, Any]:
     data = mujoco.MjData(model)
     data.qpos[:] = task.scene.standing
     mujoco.mj_forward(model, data)
-    return {"xml": root.to_xml_string(), "start": pages.plain(task.cleared(task.read(data)), digits=None)}
+    return {"xml": models.written(root), "start": pages.plain(task.cleared(task.read(data)), digits=None)}
 
 
 def _task(task: Task, steer: Task) -> dict[str, Any]:

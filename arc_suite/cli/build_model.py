@@ -9,6 +9,7 @@ The body is a robot of the suite, a spec file, or one made to order:
   arc-suite build_model --robot varied:7 --summary
   arc-suite build_model --spec spider --summary
   arc-suite build_model --robot tick --task stairs --set difficulty=1 --output stairs.xml
+  arc-suite build_model --robot tick --no_arena --output tick.xml
 """
 
 import contextlib
@@ -39,6 +40,7 @@ flags.DEFINE_enum(
 flags.DEFINE_float("scale", None, "Multiply all lengths by this and size the body anew.", *generator.SCALE)
 flags.DEFINE_bool("json", False, "Write the spec instead of the model.")
 flags.DEFINE_bool("visuals", False, "Add decorations without mass or contacts.")
+flags.DEFINE_bool("no_arena", False, "Leave floor and free joint to the scene that takes the model.")
 flags.DEFINE_string(
     "output",
     None,
@@ -90,10 +92,12 @@ def _arena(body: Body) -> Arena:
     """Return the arena of the task that flags name; the floor if they name none."""
     if not (FLAGS["task"].present or FLAGS["set"].present):
         return FLAT
+    if FLAGS.no_arena:
+        raise ValueError("--no_arena: goes without --task and --set, which bring an arena")
     return Setup.of(body, *task()).definition.scene.arena
 
 
 def _text(body: Body, arena: Arena) -> str:
     if FLAGS.json:
         return spec_files.body_to_json(body)
-    return models.assemble(body, arena, decorated=FLAGS.visuals).to_xml_string()
+    return models.written(models.assemble(body, None if FLAGS.no_arena else arena, decorated=FLAGS.visuals))

@@ -25,6 +25,13 @@ def saved(model):
     return buffer.tobytes()
 
 
+def reloaded(text):
+    """The model of a text, but for its keyframe."""
+    spec = mujoco.MjSpec.from_string(text)
+    spec.delete(spec.key("home"))
+    return spec.compile()
+
+
 def compiled(body, decorated=False):
     return mjcf.Physics.from_mjcf_model(models.assemble(body, decorated=decorated)).model.ptr
 
@@ -37,15 +44,14 @@ def test_three_links_are_the_default():
 def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
     path = tmp_path / "robot.xml"
     assert programs.passed(build_model("--robot", robot, "--output", path)) == ""
-    reloaded = mujoco.MjModel.from_xml_path(str(path))
-    assert saved(reloaded) == saved(compiled(ROBOTS[robot]))
+    assert saved(reloaded(path.read_text())) == saved(compiled(ROBOTS[robot]))
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.xml"]
 
 
 def test_visuals_dump_and_reload_bit_for_bit():
-    reloaded = mujoco.MjModel.from_xml_string(programs.passed(build_model("--robot", "queen", "--visuals")))
-    assert saved(reloaded) == saved(compiled(ROBOTS["queen"], decorated=True))
-    assert saved(reloaded) != saved(compiled(ROBOTS["queen"]))
+    model = reloaded(programs.passed(build_model("--robot", "queen", "--visuals")))
+    assert saved(model) == saved(compiled(ROBOTS["queen"], decorated=True))
+    assert saved(model) != saved(compiled(ROBOTS["queen"]))
 
 
 @pytest.mark.parametrize(
@@ -60,7 +66,16 @@ def test_visuals_dump_and_reload_bit_for_bit():
     ],
 )
 def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):
-    assert saved(mujoco.MjModel.from_xml_string(programs.passed(build_model(*arguments)))) == saved(compiled(body))
+    assert saved(reloaded(programs.passed(build_model(*arguments)))) == saved(compiled(body))
+
+
+def test_without_arena_a_scene_of_dm_control_takes_it(tmp_path):
+    path = tmp_path / "tick.xml"
+    programs.passed(build_model("--robot=tick", "--no_arena", "--visuals", "--output", path))
+    scene = mjcf.RootElement("scene")
+    scene.worldbody.add("geom", type="plane", size=(1.0, 1.0, 0.1))
+    scene.attach(mjcf.from_path(path)).add("freejoint")
+    assert mjcf.Physics.from_mjcf_model(scene).model.nu == len(ROBOTS["tick"].joint_names)
 
 
 def test_json_is_the_spec_and_builds_the_same_model(tmp_path):
@@ -96,6 +111,10 @@ def test_summary_prints_the_figures_alone():
         (["--legs=6", "--scale=nan"], "scale: expected a number from 0.01 to 100, got nan"),
         (["--seed=-1"], "flag --seed=-1: expected a non-negative integer"),
         (["--legs=5", "--layout=pairs"], "layout: expected radial for an odd number of legs, got 'pairs' for 5"),
+        (
+            ["--robot=tick", "--task=stairs", "--no_arena"],
+            "--no_arena: goes without --task and --set, which bring an arena",
+        ),
         (["--legs=5", "--layout=row"], "flag --layout=row: expected pairs or radial"),
         (["--legs=4", "--render=x.txt"], "unknown extension '.txt' (there are: .png)"),
         (["--spec=missing.json"], "cannot read missing.json: no such file or directory"),

@@ -34,16 +34,17 @@ def reward_colour(share: float) -> np.ndarray:
 def decorate(root: mjcf.RootElement, body: Body) -> None:
     """Add visuals to a body on its ground; its dynamics stay the same.
 
-    Adds sky, light and a grid on the ground, materials for all geoms, and geoms without mass or
-    contacts on torso and joints. All of them are named; the names of the geoms begin with `visual-`,
+    Adds materials for all geoms, and geoms without mass or contacts on torso and joints. A model with
+    ground also gets sky, light and a grid. All of them are named; the names of the geoms begin with `visual-`,
     which no part of a spec can have. The material `glow` can show a reward.
 
     Args:
-        root: of `builder.build`, with a geom `floor`.
+        root: of `assemble`.
         body: the spec it was built from.
     """
     visuals = VISUALS.get(body.name) or generic(body)
-    add_scene(root, body.torso.standing_height)
+    if root.worldbody.geom:
+        add_scene(root, body.torso.standing_height)
     own = {} if body.palette is None else palettes.colours(body.palette)
     for name, colour in {**visuals.colours, **own}.items():
         emission, specular, shininess = _FINISHES.get(name, _PLAIN)

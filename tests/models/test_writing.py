@@ -1,0 +1,121 @@
+"""The text of a model, in MuJoCo, in dm_control's PyMJCF, and in scenes of others."""
+
+import mujoco
+import numpy as np
+import pytest
+from dm_control import mjcf
+
+from arc_suite import models, registry
+from arc_suite.arenas import ARENAS, FLAT
+from arc_suite.models.sizing import sized
+from arc_suite.robots import ROBOTS
+
+BODIES = [*ROBOTS, "spider", "random:3"]
+
+
+def saved(model):
+    """Everything there is in a compiled model, names included, as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
+def without_keyframe(text):
+    spec = mujoco.MjSpec.from_string(text)
+    spec.delete(spec.key("home"))
+    return spec.compile()
+
+
+def by_pymjcf(text):
+    return mjcf.Physics.from_mjcf_model(mjcf.from_xml_string(text)).model.ptr
+
+
+def accelerations(model, joints):
+    """Those of the named joints, and of the root, in 20 random states near the floor: (20, nv of them)."""
+    data, random, found = mujoco.MjData(model), np.random.RandomState(0), []
+    free = model.joint(joints[0])
+    addresses = [free.dofadr[0] + axis for axis in range(6)] + [model.joint(name).dofadr[0] for name in joints[1:]]
+    places = [free.qposadr[0] + axis for axis in range(7)] + [model.joint(name).qposadr[0] for name in joints[1:]]
+    for _ in range(20):
+        mujoco.mj_resetData(model, data)
+        data.qpos[places] += random.uniform(-0.1, 0.1, len(places))
+        data.qvel[addresses] = random.normal(size=len(addresses))
+        mujoco.mj_forward(model, data)
+        found.append(data.qacc[addresses])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("decorated", [False, True])
+def test_pymjcf_and_mujoco_read_the_same_model(name, decorated):
+    root = models.assemble(registry.body_of(name), decorated=decorated)
+    text, before = models.written(root), mujoco.MjModel.from_xml_string(root.to_xml_string())
+    assert saved(by_pymjcf(text)) == saved(mujoco.MjModel.from_xml_string(text))
+    assert saved(without_keyframe(text)) == saved(before)
+    assert "class=" not in text
+
+
+@pytest.mark.parametrize("arena", ARENAS)
+def test_arenas_are_in_the_text(arena, tmp_path):
+    body = sized(registry.body_of("tick"))
+    root, path = models.assemble(body, ARENAS[arena](body)), tmp_path / "model.xml"
+    path.write_text(models.written(root))
+    assert saved(without_keyframe(path.read_text())) == saved(mujoco.MjModel.from_xml_string(root.to_xml_string()))
+    grounds = [geom.name for geom in mjcf.from_path(path).worldbody.geom]
+    assert grounds and all(name.startswith("floor") for name in grounds)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_home_is_the_standing_pose(name):
+    body = registry.body_of(name)
+    model = mujoco.MjModel.from_xml_string(models.written(models.assemble(body)))
+    assert model.key("home").qpos == pytest.approx([0.0, 0.0, body.torso.standing_height, 1.0, *[0.0] * (model.nq - 4)])
+
+
+@pytest.mark.parametrize("decorated", [False, True])
+def test_a_scene_of_dm_control_takes_a_body_without_arena(decorated):
+    body = registry.body_of("queen")
+    scene = mjcf.RootElement("scene")
+    scene.compiler.angle = "radian"
+    scene.option.set_attributes(integrator="implicitfast", iterations=200, timestep=0.004)
+    scene.asset.add("texture", name="sky", type="skybox", builtin="flat", width=8, height=48)
+    scene.worldbody.add("light", name="sun", pos=(0.0, 0.0, 3.0))
+    floor = models.assemble(body).find("geom", "floor")
+    scene.worldbody.add("geom", **floor.get_attributes())
+    for name in ("first", "second"):
+        text = models.written(models.assemble(body.replace(name=name), None, decorated))
+        site = scene.worldbody.add("site", pos=(0.0, 9.0 * (name == "second"), 0.0))
+        site.attach(mjcf.from_xml_string(text)).add("freejoint", name="root")
+    model = mjcf.Physics.from_mjcf_model(scene).model.ptr
+    assert (model.nq, model.nu, model.nsensor, model.nkey, model.opt.timestep) == (2 * 25, 2 * 18, 2, 0, 0.004)
+    data = mujoco.MjData(model)
+    for _ in range(500):
+        mujoco.mj_step(model, data)
+    assert data.body("first/torso").xpos[2] == pytest.approx(body.torso.standing_height, rel=0.15)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_spec_of_mujoco_takes_a_body_without_arena_and_its_dynamics_stay():
+    body = registry.body_of("queen")
+    whole = models.written(models.assemble(body))
+    scene = mujoco.MjSpec.from_string(whole)
+    scene.delete(scene.body("torso"))
+    child = mujoco.MjSpec.from_string(models.written(models.assemble(body, None)))
+    scene.attach(child, frame=scene.worldbody.add_frame(), prefix="queen-")
+    scene.body("queen-torso").add_freejoint().name = "queen-root"
+    model = scene.compile()
+    assert (model.nq, model.nu) == (25, 18)
+    before = mujoco.MjModel.from_xml_string(whole)
+    joints = ["root", *body.joint_names]
+    now = accelerations(model, [f"queen-{name}" for name in joints])
+    assert np.array_equal(now, accelerations(before, joints))
+    assert np.abs(now).max() > 10.0
+
+
+def test_a_body_without_arena_leaves_the_rest_to_the_scene():
+    text = models.written(models.assemble(registry.body_of("tick"), None, decorated=True))
+    model = mujoco.MjModel.from_xml_string(text)
+    assert (model.nq, model.nu, model.nlight, model.ntex, model.nkey) == (18, 18, 0, 0, 0)
+    assert (model.geom_bodyid > 0).all()
+    assert "<option" not in text and "<visual>" not in text
+    assert "<option" in models.written(models.assemble(registry.body_of("tick"), FLAT))
