@@ -13,7 +13,7 @@ def written(root: mjcf.RootElement) -> str:
         root: the model. Without a free joint the text has no keyframe, since PyMJCF's `attach` would shift its numbers.
 
     Returns:
-        The text. It compiles to the same model as `root`, but for the keyframe.
+        The text. It compiles to the same model as `root`, except the keyframe.
     """
     text = root.to_xml()
     for whole in text.findall("default"):

@@ -26,7 +26,7 @@ def saved(model):
 
 
 def reloaded(text):
-    """The model of a text, but for its keyframe."""
+    """The model of a text, without its keyframe."""
     spec = mujoco.MjSpec.from_string(text)
     spec.delete(spec.key("home"))
     return spec.compile()
