@@ -1,0 +1,139 @@
+"""Robots of others: from an MJCF or URDF file to a body whose physics are those of the file."""
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from arc_suite.models.importing import motors, opening, poses, sketch, tree, writing
+from arc_suite.models.importing.naming import Names, clean, names_of
+from arc_suite.models.importing.opening import Opened
+from arc_suite.models.importing.poses import Stance
+from arc_suite.models.importing.tree import Robot
+from arc_suite.robots import ROBOTS
+from arc_suite.robots.spec import MAX_NAME, Body, Held, Simulation, SpecError
+
+EXTENSIONS = (".xml", ".urdf")
+
+_CONTROL_STEP = 0.02  # s
+_LARGEST_TIMESTEP = 0.004  # s
+_UNNAMED = "MuJoCo Model"  # of MJCF without a name
+
+
+class Imported(NamedTuple):
+    """A robot of others.
+
+    Attributes:
+        body: with a source.
+        notes: a line each: its legs, joint map, standing pose, limits, what is left out.
+    """
+
+    body: Body
+    notes: tuple[str, ...]
+
+
+def imported(path: str | os.PathLike, home: str | None = None, feet: Sequence[str] = ()) -> Imported:
+    """Return the legged robot of an MJCF or URDF file.
+
+    Args:
+        path: of the file.
+        home: name of the keyframe in which it stands; None to find a pose.
+        feet: names of bodies or geoms at the ends of its legs; none to find them.
+
+    Raises:
+        SpecError: it cannot come in; one line that names the file.
+        OSError: the file cannot be read.
+    """
+    path = Path(path)
+    try:
+        return _imported(path, home, feet)
+    except SpecError as error:
+        raise SpecError(f"{path}: {error}") from None
+
+
+def _imported(path: Path, home: str | None, feet: Sequence[str]) -> Imported:
+    file = opening.opened(path)
+    robot = tree.robot_of(file.model, file.root)
+    stance = poses.stance(robot, home, feet)
+    _check_hinges(robot, stance)
+    names = names_of(robot, stance.legs)
+    driven = motors.motors_of(robot, stance)
+    order = _order(robot, stance, file.order)
+    body = Body(
+        name=_name(robot, path),
+        torso=sketch.torso(robot, stance),
+        legs=sketch.legs(robot, stance, names, driven.servos),
+        camera=sketch.camera(stance),
+        simulation=_simulation(float(robot.model.opt.timestep)),
+        source=writing.source(robot, stance, names),
+        held=tuple(Held(name=names.joints[joint], servo=driven.servos[joint]) for joint in names.held),
+        file_joints=tuple(robot.name(joint) for joint in order),
+    )
+    return Imported(body, tuple(_notes(file, robot, stance, names, body, order, driven.notes)))
+
+
+def _check_hinges(robot: Robot, stance: Stance) -> None:
+    for leg in stance.legs:
+        for joint in leg.joints:
+            if robot.model.jnt_type[joint] != tree.HINGE:
+                raise SpecError(f"joint {robot.name(joint)!r} of a leg is a slide joint; expected hinges")
+
+
+def _name(robot: Robot, path: Path) -> str:
+    """Return the model's name, or that of the file, cleaned; a robot's own would give the body its numbers."""
+    given = robot.model.names[: robot.model.names.index(b"\0")].decode("utf-8", "replace")
+    name = clean("" if given == _UNNAMED else given) or clean(path.stem) or "robot"
+    return f"{name[: MAX_NAME - 9]}_imported" if name in ROBOTS else name
+
+
+def _simulation(timestep: float) -> Simulation:
+    """Return the constants: the file's timestep, or the next smaller one that divides a control step."""
+    substeps = max(2, math.ceil(_CONTROL_STEP / min(timestep, _LARGEST_TIMESTEP) - 1e-6))
+    step = _CONTROL_STEP / substeps
+    return Simulation(timestep=step, contact_time=max(0.02, 2.0 * step), contact_margin=0.0, substeps=substeps)
+
+
+def _order(robot: Robot, stance: Stance, given: tuple[str, ...]) -> list[int]:
+    """Return the joints of the legs in the order of the file: of its actuators, or of its joints."""
+    legs = [joint for leg in stance.legs for joint in leg.joints]
+    named = {robot.name(joint): joint for joint in robot.joints}
+    orders = (motors.actuated(robot), [named[name] for name in given if name in named], robot.joints)
+    return next([joint for joint in order if joint in legs] for order in orders if set(legs) <= set(order))
+
+
+def _notes(
+    file: Opened, robot: Robot, stance: Stance, names: Names, body: Body, order: list[int], limits: Sequence[str]
+) -> Iterator[str]:
+    """Yield what a user is to know, a line each."""
+    kinds = sorted({len(leg.joints) for leg in stance.legs})
+    legs = ", ".join(names.legs)
+    yield f"legs: {len(stance.legs)} ({legs}), {' or '.join(map(str, kinds))} joints each"
+    pairs = ", ".join(f"{robot.name(joint)} {names.joints[joint]}" for joint in order)
+    places = {name: place for place, name in enumerate(body.joint_names)}
+    same = [places[names.joints[joint]] for joint in order]
+    yield f"joints in the file's order, each with its name in the suite: {pairs}"
+    what = "the file's order" if same == sorted(same) else f"places of the file's joints in an action: {same}"
+    yield f"joint map: {what}"
+    yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"
+    yield from limits
+    yield from file.notes
+    yield from _left_out(file, robot, names)
+
+
+def _left_out(file: Opened, robot: Robot, names: Names) -> Iterator[str]:
+    model = file.model
+    others = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody)) - 1
+    counts = {
+        "tendons": model.ntendon,
+        "equality constraints": model.neq,
+        "sensors": model.nsensor,
+        "other bodies in the world": others,
+    }
+    for what, count in counts.items():
+        if count:
+            yield f"left out: {count} {what}"
+    yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+    if names.held:
+        shown = ", ".join(robot.name(joint) for joint in names.held[:4])
+        yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({shown})"

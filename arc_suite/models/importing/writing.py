@@ -1,0 +1,211 @@
+"""From a compiled robot to the MJCF of a source: the same numbers to the last bit, names of the suite, nothing else.
+
+MuJoCo's own writer keeps classes, assets, actuators and six digits. Here, every number is what the compiler made
+of the file, written so that it is read back as itself: compiling the text gives the bits of the file.
+"""
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+
+from arc_suite.models.importing.naming import Names
+from arc_suite.models.importing.poses import Leg, Stance
+from arc_suite.models.importing.tree import HINGE, Robot
+
+SITE = {"group": "4"}
+
+_GEOMS = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: ("sphere", 1),
+    mujoco.mjtGeom.mjGEOM_CAPSULE: ("capsule", 2),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: ("ellipsoid", 3),
+    mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
+    mujoco.mjtGeom.mjGEOM_MESH: ("mesh", 0),
+}
+
+# What MuJoCo takes for attributes that are left out.
+_SOFTNESS = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95, 0.001, 0.5, 2.0)}
+_BODY = {"pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0), "gravcomp": 0.0}
+_JOINT = {
+    "pos": (0.0, 0.0, 0.0), "margin": 0.0, "ref": 0.0, "springref": 0.0, "armature": 0.0, "frictionloss": 0.0,
+    "stiffness": (0.0, 0.0, 0.0), "damping": (0.0, 0.0, 0.0),
+    **{f"{name}{what}": value for name, value in _SOFTNESS.items() for what in ("limit", "friction")},
+}  # fmt: skip
+_GEOM = {
+    "pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0), "condim": 3, "priority": 0, "solmix": 1.0, "margin": 0.0,
+    "gap": 0.0, "friction": (1.0, 0.005, 0.0001), "adhesion": 0.0, "surfacevel": (0.0,) * 6, **_SOFTNESS,
+}  # fmt: skip
+
+# Fields of mjOption by their attributes, with the words of those that are one of several.
+_OPTIONS = {
+    "timestep": None, "impratio": None, "tolerance": None, "ls_tolerance": None, "noslip_tolerance": None,
+    "ccd_tolerance": None, "gravity": None, "wind": None, "magnetic": None, "density": None, "viscosity": None,
+    "iterations": None, "ls_iterations": None, "noslip_iterations": None, "ccd_iterations": None,
+    "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
+    "cone": ("pyramidal", "elliptic"),
+    "jacobian": ("dense", "sparse", "auto"),
+    "solver": ("PGS", "CG", "Newton"),
+}  # fmt: skip
+
+# Flags of the physics; others would keep motors, contacts or sensors from working.
+_FLAGS = {
+    "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
+    "limit": mujoco.mjtDisableBit.mjDSBL_LIMIT,
+    "spring": mujoco.mjtDisableBit.mjDSBL_SPRING,
+    "damper": mujoco.mjtDisableBit.mjDSBL_DAMPER,
+    "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
+    "warmstart": mujoco.mjtDisableBit.mjDSBL_WARMSTART,
+    "filterparent": mujoco.mjtDisableBit.mjDSBL_FILTERPARENT,
+    "refsafe": mujoco.mjtDisableBit.mjDSBL_REFSAFE,
+    "midphase": mujoco.mjtDisableBit.mjDSBL_MIDPHASE,
+    "eulerdamp": mujoco.mjtDisableBit.mjDSBL_EULERDAMP,
+    "nativeccd": mujoco.mjtDisableBit.mjDSBL_NATIVECCD,
+    "island": mujoco.mjtDisableBit.mjDSBL_ISLAND,
+    "multiccd": mujoco.mjtDisableBit.mjDSBL_MULTICCD,
+}
+
+
+def source(robot: Robot, stance: Stance, names: Names) -> str:
+    """Return the MJCF of a robot: one free body, its joints and colliders, a site in each foot, the keyframe `home`."""
+    root = ElementTree.Element("mujoco")
+    _add(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
+    _add_option(root, robot.model)
+    asset = _add(root, "asset")
+    world = _add(root, "worldbody")
+    elements = {}
+    for body in robot.bodies:
+        parent = world if body == robot.root else elements[int(robot.model.body_parentid[body])]
+        elements[body] = _add_body(parent, robot, body, names)
+    _add_meshes(asset, robot)
+    _add(elements[robot.root], "site", name="torso", size=_text(0.01), **SITE)
+    for label, leg in zip(names.legs, stance.legs, strict=True):
+        _add_leg_bodies(elements, robot, stance, names, label, leg)
+    _add(_add(root, "keyframe"), "key", name="home", qpos=_text(_home(robot, stance)))
+    ElementTree.indent(root)
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
+    return ElementTree.SubElement(parent, tag, attributes)
+
+
+def _text(values) -> str:
+    """Return numbers as text that is read back as the same bits."""
+    return " ".join(str(number) if isinstance(number, int) else repr(number) for number in np.ravel(values).tolist())
+
+
+def _differing(plain: dict[str, Iterable], given: dict[str, Iterable]) -> dict[str, str]:
+    """Return the attributes whose numbers are not those that MuJoCo takes where they are left out."""
+    return {name: _text(value) for name, value in given.items() if not np.array_equal(value, plain[name])}
+
+
+def _add_option(root: ElementTree.Element, model: mujoco.MjModel) -> None:
+    plain, option = mujoco.MjSpec().option, model.opt
+    attributes = {}
+    for name, words in _OPTIONS.items():
+        value = getattr(option, name)
+        if not np.array_equal(value, getattr(plain, name)):
+            attributes[name] = _text(value) if words is None else words[int(value)]
+    element = _add(root, "option", **attributes)
+    flags = {name: "disable" for name, bit in _FLAGS.items() if option.disableflags & int(bit)}
+    if flags:
+        _add(element, "flag", **flags)
+
+
+def _add_body(parent: ElementTree.Element, robot: Robot, body: int, names: Names) -> ElementTree.Element:
+    """Add a body with its inertia, joints and colliders."""
+    model = robot.model
+    given = {"pos": model.body_pos[body], "quat": model.body_quat[body], "gravcomp": model.body_gravcomp[body]}
+    element = _add(parent, "body", name=names.bodies[body], **_differing(_BODY, given))
+    if model.body_mass[body] > 0.0:
+        given = {"quat": model.body_iquat[body], "diaginertia": model.body_inertia[body]}
+        mass = {"pos": _text(model.body_ipos[body]), "mass": _text(model.body_mass[body])}
+        _add(element, "inertial", **mass, **{name: _text(value) for name, value in given.items()})
+    for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
+        own = _free(model, joint) if body == robot.root else _joint(model, joint)
+        _add(element, "joint", name=names.joints.get(joint, "root"), **own)
+    own = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
+    for place, geom in enumerate(own):
+        _add(element, "geom", name=f"{names.bodies[body]}_geom{place}", **_geom(model, geom))
+    return element
+
+
+def _resistance(model: mujoco.MjModel, joint: int) -> dict[str, Iterable]:
+    """Return what resists the movement of any joint."""
+    dof = model.jnt_dofadr[joint]
+    return {
+        "armature": model.dof_armature[dof],
+        "frictionloss": model.dof_frictionloss[dof],
+        "stiffness": (model.jnt_stiffness[joint], *model.jnt_stiffnesspoly[joint]),
+        "damping": (model.dof_damping[dof], *model.dof_dampingpoly[dof]),
+        "solreffriction": model.dof_solref[dof],
+        "solimpfriction": model.dof_solimp[dof],
+    }
+
+
+def _free(model: mujoco.MjModel, joint: int) -> dict[str, str]:
+    """Return the attributes of the torso's joint; the classes of some files resist its movement, too."""
+    return {"type": "free", **_differing(_JOINT, _resistance(model, joint))}
+
+
+def _joint(model: mujoco.MjModel, joint: int) -> dict[str, str]:
+    """Return the attributes of a hinge or slide."""
+    place = model.jnt_qposadr[joint]
+    given = _resistance(model, joint) | {
+        "pos": model.jnt_pos[joint],
+        "margin": model.jnt_margin[joint],
+        "ref": model.qpos0[place],
+        "springref": model.qpos_spring[place],
+        "solreflimit": model.jnt_solref[joint],
+        "solimplimit": model.jnt_solimp[joint],
+    }
+    attributes = {"type": "hinge" if model.jnt_type[joint] == HINGE else "slide", "axis": _text(model.jnt_axis[joint])}
+    if model.jnt_limited[joint]:
+        attributes |= {"limited": "true", "range": _text(model.jnt_range[joint])}
+    if model.jnt_actfrclimited[joint]:
+        attributes |= {"actuatorfrclimited": "true", "actuatorfrcrange": _text(model.jnt_actfrcrange[joint])}
+    if model.jnt_actgravcomp[joint]:
+        attributes["actuatorgravcomp"] = "true"
+    return attributes | _differing(_JOINT, given)
+
+
+def _geom(model: mujoco.MjModel, geom: int) -> dict[str, str]:
+    """Return the attributes of a collider, which touches the floor alone and weighs nothing."""
+    kind, sizes = _GEOMS[mujoco.mjtGeom(model.geom_type[geom])]
+    given = {name: getattr(model, f"geom_{name}")[geom] for name in _GEOM}
+    shape = {"type": kind}
+    if kind == "mesh":
+        shape["mesh"] = _mesh_name(model, geom)
+    else:
+        shape["size"] = _text(model.geom_size[geom][:sizes])
+    return {**shape, "mass": "0", "contype": "1", "conaffinity": "0", **_differing(_GEOM, given)}
+
+
+def _mesh_name(model: mujoco.MjModel, geom: int) -> str:
+    return f"mesh{model.geom_dataid[geom]}"
+
+
+def _add_meshes(asset: ElementTree.Element, robot: Robot) -> None:
+    """Add the meshes of colliders."""
+
+
+def _add_leg_bodies(
+    elements: dict[int, ElementTree.Element], robot: Robot, stance: Stance, names: Names, label: str, leg: Leg
+) -> None:
+    """Add a massless body to each foot, and to each link that shares its body with the next one."""
+    for place, joint in enumerate(leg.joints, start=1):
+        body = int(robot.model.jnt_bodyid[joint])
+        if names.bodies[body] != f"{label}_link{place}":
+            _add(elements[body], "body", name=f"{label}_link{place}")
+    last = int(robot.model.jnt_bodyid[leg.joints[-1]])
+    data = robot.placed(stance.qpos)
+    place = data.xmat[last].reshape(3, 3).T @ (leg.centre - data.xpos[last])
+    foot = _add(elements[last], "body", name=f"{label}_foot", pos=_text(place))
+    _add(foot, "site", name=f"{label}_foot", size=_text(leg.radius), **SITE)
+
+
+def _home(robot: Robot, stance: Stance) -> list[float]:
+    """Return qpos of the standing pose in the model of the source."""
+    return [0.0, 0.0, stance.height, 1.0, 0.0, 0.0, 0.0, *(stance.qpos[robot.place(joint)] for joint in robot.joints)]
