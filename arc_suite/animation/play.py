@@ -19,7 +19,6 @@ from arc_suite.animation import pages
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.steering import Steered
 from arc_suite.envs.setup import Setup
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import universal, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.universal import Universal
@@ -74,8 +73,8 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         task, driver = _graph(body, policy, steer)
     return pages.drawn(body) | {
         "name": body.name,
-        "timestep": steer.scene.control_timestep / SUBSTEPS,
-        "substeps": SUBSTEPS,
+        "timestep": steer.scene.control_timestep / steer.scene.substeps,
+        "substeps": steer.scene.substeps,
         "grounds": {name: _ground(body, arena) for name, arena in GROUNDS.items()},
         "task": pages.plain(_task(task, steer), digits=None),
         "policy": pages.plain(driver, digits=None),
@@ -106,7 +105,7 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
     scene, (force_unit,) = steer.scene, context.force_unit
     return {
         "headed": headed,
-        "torso": scene.layout.parts.start,
+        "torso": scene.layout.torso,
         "parts": len(scene.body.part_names),
         "step": scene.control_timestep,
         "turn": clock.TWO_PI * task.parameters.gait_frequency * scene.control_timestep,

@@ -6,9 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite.cpg.drives import drive
 from arc_suite.cpg.gait import gait_of
-from arc_suite.cpg.law import proprioception, torques
-from arc_suite.models.sizing import position_gains, sized
+from arc_suite.cpg.law import proprioception
+from arc_suite.models.sizing import sized
 from arc_suite.models.standing import posed
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import velocity_units
@@ -68,8 +69,7 @@ class CommandLaw(ABC):
         stance: that it lasts, s.
         offsets: (legs,) over the task's clock, cycles.
         units: (3,) of the command, m/s and rad/s.
-        stiffness: (joints,) action per rad.
-        damping: (joints,) action per rad/s.
+        drive: of the joints.
     """
 
     reads: tuple[str, ...] = ("posture", "velocities", "command", "gait_clock")
@@ -91,7 +91,7 @@ class CommandLaw(ABC):
         self.smoothing, self.onset = min(1.0, self.cycles / _SMOOTHING), self.cycles / _ONSET
         self.stance, self.offsets = gait.duty_factor / gait.frequency, gait.offsets + parameters.lead
         self.units = velocity_units(self.body, gait.target_velocity)
-        self.stiffness, self.damping = position_gains(self.body, self.pose.inertias)
+        self.drive = drive(self.body, self.pose.inertias)
 
     def initial(self, count: int) -> CommandLawState:
         """Return the state at the start of episodes in a number of environments."""
@@ -102,7 +102,7 @@ class CommandLaw(ABC):
         """Return the next state and the actions (environments, joints); see `law`."""
         _, angles, velocities = proprioception(observation)
         state, targets, speeds = self.targets(state, observation)
-        return state, torques(targets, angles, velocities - speeds, self.stiffness, self.damping)
+        return state, self.drive.actions(targets, speeds, angles, velocities)
 
     def targets(self, state: CommandLawState, observation: Mapping) -> tuple:
         """Return the next state, and the joints' target angles, rad, and velocities, rad/s, (environments, joints)."""

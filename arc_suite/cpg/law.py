@@ -49,6 +49,36 @@ def joint_targets(pattern: Pattern, time):
     return pattern.centre + pattern.sweep * sweep + bend * numpy.sin(np.pi * progress)
 
 
+class Drive(NamedTuple):
+    """How actions move the joints of a body: by torques of motors, or by angles that servos hold.
+
+    Attributes:
+        stiffness: (joints,) action of a motor per rad, or torque of a servo per rad by its largest.
+        damping: (joints,) the same per rad/s.
+        reach: (joints,) angles that actions of 1 ask of servos, rad; None for motors.
+    """
+
+    stiffness: np.ndarray
+    damping: np.ndarray
+    reach: np.ndarray | None = None
+
+    def actions(self, targets, speeds, angles, velocities, feedforward=0.0):
+        """Return the actions (..., joints) in [-1, 1] by which joints follow targets.
+
+        Args:
+            targets: (..., joints) rad.
+            speeds: (..., joints) of the targets, rad/s.
+            angles: (..., joints) of the joints, rad.
+            velocities: (..., joints) of the joints, rad/s.
+            feedforward: (..., joints) torques that are added, shares of the largest.
+        """
+        if self.reach is None:
+            return torques(targets, angles, velocities - speeds, self.stiffness, self.damping, feedforward)
+        # The servo damps the joint's own velocity: its angle is further on by what the target's velocity lacks.
+        ahead = (self.damping * speeds + feedforward) / self.stiffness
+        return ((targets + ahead) / self.reach).clip(-1.0, 1.0)
+
+
 def torques(targets, angles, velocities, stiffness, damping, feedforward=0.0):
     """Return actions (..., joints) in [-1, 1] that pull angles (rad) to their targets against velocities (rad/s).
 

@@ -12,9 +12,10 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from arc_suite import checks, rotations
+from arc_suite.cpg.drives import drive
 from arc_suite.cpg.gait import gait_of
-from arc_suite.cpg.law import Pattern, joint_targets, proprioception, torques
-from arc_suite.models.sizing import position_gains, sized
+from arc_suite.cpg.law import Drive, Pattern, joint_targets, proprioception
+from arc_suite.models.sizing import sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.models.stride import LIFT, strokes
 from arc_suite.tasks.contract import Task
@@ -41,8 +42,7 @@ class Stride(NamedTuple):
         pattern: of the joints.
         speed: along world x that is asked for, m/s.
         control_timestep: s.
-        stiffness: (joints,) action per rad.
-        damping: (joints,) action per rad/s.
+        drive: of the joints.
         held: (joints,) action that a standing leg adds, by which it holds its share of the weight.
         steering: (joints,) by which share the sweep of the joint's leg answers to a yaw of 1 rad.
     """
@@ -50,8 +50,7 @@ class Stride(NamedTuple):
     pattern: Pattern
     speed: float
     control_timestep: float
-    stiffness: np.ndarray
-    damping: np.ndarray
+    drive: Drive
     held: np.ndarray
     steering: np.ndarray
 
@@ -85,7 +84,6 @@ class Stride(NamedTuple):
             able = np.clip(jacobian[0] @ sweep / reach, 0.0, 1.0)
             raised.append((1.0 - able) * UNLOAD / LIFT * lift)
         sweeps, lifts = map(np.concatenate, zip(*moves, strict=True))
-        stiffness, damping = position_gains(body, pose.inertias)
         lateral = pose.soles[:, 1] / max(abs(pose.soles[:, 1]).max(), 1e-9)
         return cls(
             pattern=Pattern(
@@ -99,9 +97,8 @@ class Stride(NamedTuple):
             ),
             speed=speed,
             control_timestep=task.scene.control_timestep,
-            stiffness=stiffness,
-            damping=damping,
-            held=pose.loads / (gait.duty_factor * np.array([joint.motor.gear for joint in joints])),
+            drive=drive(body, pose.inertias),
+            held=pose.loads / (gait.duty_factor * np.array([joint.torque for joint in joints])),
             steering=math.copysign(STEERING, speed) * np.repeat(lateral, counts),
         )
 
@@ -118,7 +115,7 @@ class Stride(NamedTuple):
         target_velocities = (following - targets) / self.control_timestep
         cycle = (pattern.frequency * time[..., None] + pattern.offset) % 1.0
         held = self.held * (cycle < pattern.duty_factor)
-        return torques(targets, angles, velocities - target_velocities, self.stiffness, self.damping, held)
+        return self.drive.actions(targets, target_velocities, angles, velocities, held)
 
 
 class StrideState(NamedTuple):

@@ -25,7 +25,6 @@ from arc_suite.envs.calls import (
 )
 from arc_suite.envs.prepare import checked_changes, prepared
 from arc_suite.envs.task_view import TaskView
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import checked_fields
 from arc_suite.simulation.physics import Physics
@@ -98,14 +97,13 @@ class Environment(KnownAttributes, control.Environment):
         """Put a task's run and its simulation together; `load` makes both."""
         self.task_kwargs = task_kwargs
         self._lock = Lock()
-        limit = run.definition.step_limit
-        step = SUBSTEPS * physics.timestep()
+        limit, scene = run.definition.step_limit, run.definition.scene
         super().__init__(
             physics,
             run,
             # Half a step short, so that rounding adds none.
-            time_limit=math.inf if limit == math.inf else (limit - 0.5) * step,
-            n_sub_steps=SUBSTEPS,
+            time_limit=math.inf if limit == math.inf else (limit - 0.5) * scene.control_timestep,
+            n_sub_steps=scene.substeps,
             legacy_step=False,  # which would move the contact forces and foot heights one substep on
         )
         self._made = __name__
@@ -347,7 +345,7 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         )
         data = physics.data.ptr
         physics.marker, physics.failed_legs = self.markers, self.failed_legs  # which a copy of the simulation has not
-        data.ctrl[:] = inputs.ctrl
+        data.ctrl[: inputs.ctrl.shape[-1]] = inputs.ctrl
         if inputs.kick is not None:
             data.qvel[:] += inputs.kick
 

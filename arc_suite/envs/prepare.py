@@ -8,7 +8,8 @@ from typing import Any
 import mujoco
 
 from arc_suite import checks, registry
-from arc_suite.models.sizing import SUBSTEPS
+from arc_suite.models.sizing import simulation
+from arc_suite.models.standing import stood
 from arc_suite.simulation.model import compiled
 from arc_suite.tasks import modified_task, modifiers, parameters
 from arc_suite.tasks.contract import CHANGEABLE, STEPS, Scene, Task
@@ -38,13 +39,15 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     settings = kind.settings_for(body, settings)
     arena = kind.arena(body, settings) if arena is None else registry.arena_of(arena, body)
     model = compiled(body, arena)
-    step = SUBSTEPS * model.opt.timestep
+    substeps = simulation(body).substeps
+    step = substeps * model.opt.timestep
     scene = Scene(
         body=body,
         arena=arena,
         layout=layout(model, body.joint_names, body.part_names, body.foot_names),
-        standing=model.qpos0.copy(),
+        standing=stood(model),
         control_timestep=step,
+        substeps=substeps,
         model={name: getattr(model, name).copy() for name in CHANGEABLE},
     )
     task = kind(scene, settings, _step_limit(time_limit, step))

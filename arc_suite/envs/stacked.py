@@ -23,7 +23,8 @@ def kind(task: Task) -> Hashable | None:
     if not all(vars(type(each)).get("from_body") for each in (task, inner)):  # of the class itself
         return None
     scene = task.scene
-    return type(task), type(inner), repr(scene.layout), scene.arena, tuple(task.settings.weights), task.structure
+    same = repr(scene.layout), scene.substeps, scene.arena
+    return type(task), type(inner), *same, tuple(task.settings.weights), task.structure
 
 
 def stacked(tasks: Sequence[Task]) -> Task:

@@ -24,7 +24,6 @@ from arc_suite.envs.calls import (
 from arc_suite.envs.prepare import checked_changes, checked_limit, prepared
 from arc_suite.envs.task_view import TaskView
 from arc_suite.envs.together import MOST_ENVS, Together
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
@@ -179,7 +178,8 @@ class VectorEnv(KnownAttributes, Together):
         }
         self._observation = np.zeros((self.num_envs, self._task.size), np.float32)  # the latest
         self.single_observation_space = gymnasium.spaces.Box(-np.inf, np.inf, (self._task.size,), np.float32)
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.batch.data.ctrl.shape[1],), np.float32)
+        joints = len(self._tasks[0].scene.body.joint_names)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (joints,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._made = __name__
@@ -237,10 +237,10 @@ class VectorEnv(KnownAttributes, Together):
         waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
         stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
         memory, inputs = task.before(before, checked_action(actions, self.action_space.shape))
-        np.copyto(data.ctrl, inputs.ctrl, where=stepping[:, None])
+        np.copyto(data.ctrl[:, : inputs.ctrl.shape[-1]], inputs.ctrl, where=stepping[:, None])
         if inputs.kick is not None:
             data.qvel[stepping] += inputs.kick[stepping]
-        diverged = self.batch.step(SUBSTEPS, stepping)
+        diverged = self.batch.step(task.scene.substeps, stepping)
         readings = task.read(data)
         self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)
         self._steps += 1

@@ -5,7 +5,7 @@ import numpy as np
 from dm_control import mjcf
 
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.models import builder, sizing, visuals
+from arc_suite.models import builder, sizing, source, visuals
 from arc_suite.robots.spec import Body
 
 
@@ -38,6 +38,8 @@ def parsed(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.M
     Heights of the ground go in as numbers. MuJoCo's parser reports "unknown error" of a long list
     when the heap cannot grow in place, although the memory is there.
     """
+    if body.source:
+        return source.parsed(sizing.sized(body), arena, decorated)
     root = assemble(body, arena, decorated)
     fields = root.find_all("hfield")
     heights = [np.reshape(field.elevation, (field.nrow, field.ncol)) for field in fields]

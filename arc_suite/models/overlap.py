@@ -42,6 +42,8 @@ def overlaps(body: Body, spread: float = 1.0) -> Iterator[Overlap]:
         body: the spec.
         spread: factor of the distances of the legs' mounts from the torso's middle, seen from above.
     """
+    if body.source:  # whose parts are a sketch of colliders of any shape
+        return
     names, pairs = _names(body), _pairs(body)
     model = copy.copy(compiled(body))
     model.body_pos[[model.body(leg.part_names[0]).id for leg in body.legs], :2] *= spread

@@ -14,8 +14,6 @@ from arc_suite.models import stride
 from arc_suite.models.standing import GRAVITY, Standing, by_leg, standing
 from arc_suite.robots.spec import Body, Joint, Leg, Motor, Simulation, TrackingCamera
 
-SUBSTEPS = 25  # of a control step
-
 # A body of this height has MuJoCo's own constants; others are scaled from it.
 _REFERENCE_HEIGHT = 0.3  # m
 
@@ -40,7 +38,7 @@ _LEAST_ARMATURE = 0.3
 
 def control_timestep(body: Body) -> float:
     """Return the control step, s."""
-    return SUBSTEPS * simulation(body).timestep
+    return simulation(body).substeps * simulation(body).timestep
 
 
 def simulation(body: Body) -> Simulation:
@@ -65,16 +63,26 @@ def natural_frequency(body: Body) -> float:
 def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the stiffness, action per rad, and damping, action per rad/s, of critically damped position control.
 
+    Of servos they are their own, by their largest torque.
+
     Args:
         body: sized.
         inertias: (joints,) that the joints move, without armature, kg m^2.
     """
     joints = [joint for leg in body.legs for joint in leg.joints]
     inertia = inertias + [joint.armature for joint in joints]
-    gear = np.array([joint.motor.gear for joint in joints])
+    if body.source:
+        servos = [joint.servo for joint in joints]
+        return tuple(np.array([(s.stiffness / s.limit, s.damping / s.limit) for s in servos]).T)
+    gear = np.array([joint.torque for joint in joints])
     friction = np.array([joint.damping for joint in joints])
     frequency = natural_frequency(body)
     return inertia * frequency**2 / gear, (2.0 * inertia * frequency - friction).clip(0.0) / gear
+
+
+def reaches(body: Body) -> np.ndarray:
+    """Return the angles (joints,) that actions of 1 ask for: to the farther limit from the standing pose, rad."""
+    return abs(np.radians([joint.range_deg for leg in body.legs for joint in leg.joints])).max(axis=-1)
 
 
 @functools.lru_cache(maxsize=256)
@@ -88,7 +96,7 @@ def sized(body: Body) -> Body:
         A body without None among armatures, dampings, motors, simulation and camera; the same one if
         it leaves nothing open.
     """
-    complete = all(None not in (j.armature, j.damping, j.motor) for leg in body.legs for j in leg.joints)
+    complete = all(None not in (j.armature, j.damping, j.torque) for leg in body.legs for j in leg.joints)
     if complete and body.simulation and body.camera:
         return body
     pose, frequency = standing(body), natural_frequency(body)

@@ -123,7 +123,7 @@ def _displacement(x: float, y: float) -> str:
 def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
     """Find motors too weak to hold the standing pose where no joint limit holds it, or too weak for a stride."""
     joints = [joint for leg in body.legs for joint in leg.joints]
-    given = np.array([np.inf if joint.motor is None else joint.motor.gear for joint in joints])
+    given = np.array([joint.torque or np.inf for joint in joints])
     if np.isinf(given).all():
         return
     low, high = np.transpose([joint.range_deg for joint in joints])

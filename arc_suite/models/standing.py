@@ -7,6 +7,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite.models import source
 from arc_suite.robots.spec import Ballast, Body
 
 GRAVITY = 9.81  # m/s^2
@@ -64,18 +65,20 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
     """
     model = compiled(body)
     data = mujoco.MjData(model)
+    data.qpos[:] = stood(model)
+    turned, dofs = _addresses(model, body)
     if angles is not None:
-        data.qpos[7:] = angles
+        data.qpos[turned] += angles
     mujoco.mj_forward(model, data)
     origin = data.xpos[1]
-    soles, jacobians = [], []
+    soles, jacobians, first = [], [], 0
     for leg, name in zip(body.legs, body.foot_names, strict=True):
         sole = data.body(name).xpos - (0.0, 0.0, leg.foot.radius)
         jacobian = np.empty((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, sole, model.body(name).id)
-        start = model.joint(leg.full_name(leg.joints[0])).dofadr[0]
         soles.append(sole - origin)
-        jacobians.append(jacobian[:, start : start + len(leg.joints)])
+        jacobians.append(jacobian[:, _span(dofs[first : first + len(leg.joints)])])
+        first += len(leg.joints)
     soles = np.array(soles)
     centre = data.subtree_com[1] - origin
     mass = float(model.body_mass.sum())
@@ -91,9 +94,26 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
         centre=centre,
         soles=soles,
         jacobians=tuple(jacobians),
-        inertias=np.diag(matrix)[6:].copy(),
-        loads=data.qfrc_bias[6:] - held,
+        inertias=np.diag(matrix)[dofs],
+        loads=(data.qfrc_bias - data.qfrc_passive)[dofs] - held,
     )
+
+
+def stood(model: mujoco.MjModel) -> np.ndarray:
+    """Return the positions (nq,) in which a body stands: of an imported one the keyframe of its source."""
+    return model.key_qpos[0].copy() if model.nkey else model.qpos0.copy()
+
+
+def _span(indices: np.ndarray) -> slice | np.ndarray:
+    """Return indices as a slice where they are adjacent: matrix products round by how an array lies in memory."""
+    adjacent = slice(int(indices[0]), int(indices[-1]) + 1)
+    return adjacent if adjacent.stop - adjacent.start == len(indices) else indices
+
+
+def _addresses(model: mujoco.MjModel, body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the angles and velocities of a body's joints lie in qpos and qvel, (joints,) each."""
+    joints = [model.joint(name) for name in body.joint_names]
+    return np.array([joint.qposadr[0] for joint in joints]), np.array([joint.dofadr[0] for joint in joints])
 
 
 def by_leg(body: Body, values: np.ndarray) -> list[np.ndarray]:
@@ -105,8 +125,11 @@ def by_leg(body: Body, values: np.ndarray) -> list[np.ndarray]:
 def compiled(body: Body) -> mujoco.MjModel:
     """Return the body of `builder.build` without motors, contacts and constants; geoms are ordered as in the spec.
 
-    MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model.
+    MuJoCo's own `MjSpec` is fast here; PyMJCF would double the time of building the model. An imported body's is that
+    of its source.
     """
+    if body.source:
+        return source.bare(body)
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     torso = spec.worldbody.add_body(name="torso", pos=(0.0, 0.0, body.torso.standing_height))

@@ -17,7 +17,9 @@ from arc_suite.robots.spec import Body, Leg
 # Of the target speed; a body that moves at this speed heads within 45 degrees of the target's.
 LEAST_SHARE = 0.7
 TARGET_FROUDE = 0.2  # speed that a walk asks for, of sqrt(g h); published robots: 0.18 to 0.27
-GAIT_FREQUENCY = 0.27  # of sqrt(g / h); published: 0.2 to 0.41
+
+# Of sqrt(g / h), by the kind of motor; published: 0.2 to 0.41. Real robots have quick motors, and fall in slow gaits.
+_FREQUENCY, _FREQUENCY_OF_SERVOS = 0.27, 0.36
 
 # Of every body; published: 0.6. A lower one leaves fewer feet on the ground, a higher one too little time to swing: of
 # 0.55 to 0.8 this one lets the most bodies walk.
@@ -39,18 +41,24 @@ _DAMPING = 0.1  # of the leg's largest Jacobian entry
 
 @functools.lru_cache(maxsize=256)
 def fitted_gait(body: Body) -> gaits.Gait:
-    """Return the gait of a body: a trot on two pairs of legs, else the metachronal one.
+    """Return the gait of a body: a trot on two pairs of legs, a tripod on servos, else the metachronal one.
 
     Four legs would have to lean over three feet in a metachronal gait; in a trot the body falls less far than that.
     """
-    if "trot" in gaits.fitting(body):
-        return gaits.gait(body, "trot")._replace(duty_factor=DUTY_FACTOR)
+    for name in ("trot", "tripod") if body.source else ("trot",):
+        if name in gaits.fitting(body):
+            return gaits.gait(body, name)._replace(duty_factor=DUTY_FACTOR)
     return gaits.metachronal(body, DUTY_FACTOR)
+
+
+def gait_frequency(body: Body) -> float:
+    """Return the frequency of the fitted gait, as a share of sqrt(g / h)."""
+    return _FREQUENCY_OF_SERVOS if body.source else _FREQUENCY
 
 
 def half_stroke(body: Body, gait: gaits.Gait) -> float:
     """Return how far ahead of its place at rest a foot touches down at the target velocity, m."""
-    return 0.5 * TARGET_FROUDE / GAIT_FREQUENCY * gait.duty_factor * body.torso.standing_height
+    return 0.5 * TARGET_FROUDE / gait_frequency(body) * gait.duty_factor * body.torso.standing_height
 
 
 def poses(body: Body) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -92,7 +100,7 @@ def accelerations(body: Body) -> np.ndarray:
     A foot is lifted as a sine of time, and turns from going back to going forward in half of the swing.
     """
     gait = fitted_gait(body)
-    duration = (1.0 - gait.duty_factor) / GAIT_FREQUENCY * math.sqrt(body.torso.standing_height / GRAVITY)
+    duration = (1.0 - gait.duty_factor) / gait_frequency(body) * math.sqrt(body.torso.standing_height / GRAVITY)
     sweeps, lifts = map(np.concatenate, zip(*strokes(body, half_stroke(body, gait)), strict=True))
     return (math.pi / duration) ** 2 * abs(lifts) + 4.0 / duration**2 * abs(sweeps)
 

@@ -4,12 +4,33 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite.robots.spec import Body, Leg, Solid
+from arc_suite.robots.spec import Body, Joint, Leg, Solid
 
 _ROUNDING = 1e-9  # of the standing height for lengths, and of a number for numbers
+_ROUNDING_OF_FILES = 1e-3  # the same of imported bodies, whose files have few digits
 
 _REFLECTION = np.array((1.0, -1.0, 1.0))  # of a point, and of a velocity
 _TURNED = -_REFLECTION  # of the axis of a rotation
+
+
+class _Rounding:
+    """Comparisons of numbers up to rounding."""
+
+    def __init__(self, body: Body):
+        self.share = _ROUNDING_OF_FILES if body.source else _ROUNDING
+        self.length = self.share * body.torso.standing_height
+
+    def equal(self, number: float | None, other: float | None) -> bool:
+        """Return whether two numbers are equal, or neither is there."""
+        return number == other if None in (number, other) else bool(np.isclose(number, other, self.share, 0.0))
+
+    def near(self, points, others) -> bool:
+        """Return whether points are the same."""
+        return bool(np.allclose(points, others, rtol=0.0, atol=self.length))
+
+    def along(self, cosine) -> bool:
+        """Return whether directions with these cosines of their angles are parallel."""
+        return bool((abs(cosine) > 1.0 - self.share).all())
 
 
 class Image(NamedTuple):
@@ -36,7 +57,7 @@ def image(body: Body) -> Image:
     Raises:
         ValueError: the body has no left-right symmetry; the message names a part without a counterpart.
     """
-    rounding = _ROUNDING * body.torso.standing_height
+    rounding = _Rounding(body)
     for kind, solids in (("solid", body.torso.solids), ("ballast", body.ballast)):
         for solid in solids:
             if not any(_solids_match(solid, other, rounding) for other in solids):
@@ -59,24 +80,23 @@ def image(body: Body) -> Image:
     )
 
 
-def _signs(leg: Leg, other: Leg, rounding: float) -> list[int] | None:
+def _signs(leg: Leg, other: Leg, rounding: _Rounding) -> list[int] | None:
     """Return the signs of the joints of two legs that are reflections of each other, else None."""
-    if len(leg.links) != len(other.links) or not np.isclose(leg.foot.radius, other.foot.radius, _ROUNDING, 0.0):
+    if len(leg.links) != len(other.links) or not rounding.equal(leg.foot.radius, other.foot.radius):
         return None
-    if not np.allclose(np.array(leg.points) * _REFLECTION, other.points, rtol=0.0, atol=rounding):
+    if not rounding.near(np.array(leg.points) * _REFLECTION, other.points):
         return None
     signs = []
     for link, across in zip(leg.links, other.links, strict=True):
-        if not np.isclose(link.radius, across.radius, _ROUNDING, 0.0) or (link.joint is None) != (across.joint is None):
+        if not rounding.equal(link.radius, across.radius) or (link.joint is None) != (across.joint is None):
             return None
         if link.joint is None:
             continue
         cosine = (_axis(leg, link) * _TURNED) @ _axis(other, across)
         sign = 1 if cosine > 0.0 else -1
         bounds = tuple(sorted(sign * bound for bound in link.joint.range_deg))
-        ours, theirs = ([j.armature, j.damping, j.motor.gear if j.motor else None] for j in (link.joint, across.joint))
-        pairs = zip([*bounds, *ours], [*across.joint.range_deg, *theirs], strict=True)
-        if abs(cosine) < 1.0 - _ROUNDING or not all(_equal(a, b) for a, b in pairs):
+        pairs = zip([*bounds, *_drive(link.joint)], [*across.joint.range_deg, *_drive(across.joint)], strict=True)
+        if not (rounding.along(cosine) and all(rounding.equal(a, b) for a, b in pairs)):
             return None
         signs.append(sign)
     return signs
@@ -90,22 +110,24 @@ def _axis(leg: Leg, link) -> np.ndarray:
     return np.array((x, y, axis[2])) / np.linalg.norm(axis)
 
 
-def _equal(number: float | None, other: float | None) -> bool:
-    return number == other if None in (number, other) else bool(np.isclose(number, other, _ROUNDING, 0.0))
+def _drive(joint: Joint) -> tuple[float | None, ...]:
+    """Return the numbers by which a joint is driven."""
+    servo = joint.servo
+    return (joint.armature, joint.damping, joint.torque, *((servo.stiffness, servo.damping) if servo else ()))
 
 
-def _solids_match(solid: Solid, other: Solid, rounding: float) -> bool:
+def _solids_match(solid: Solid, other: Solid, rounding: _Rounding) -> bool:
     """Return whether a shape is the reflection of another."""
-    if solid.shape != other.shape or not np.allclose(solid.size, other.size, rtol=_ROUNDING, atol=0.0):
+    if solid.shape != other.shape or not all(map(rounding.equal, solid.size, other.size)):
         return False
-    if not _equal(getattr(solid, "mass", None), getattr(other, "mass", None)):
+    if not rounding.equal(getattr(solid, "mass", None), getattr(other, "mass", None)):
         return False
-    if not np.allclose(np.array(solid.position) * _REFLECTION, other.position, rtol=0.0, atol=rounding):
+    if not rounding.near(np.array(solid.position) * _REFLECTION, other.position):
         return False
     # Shapes are symmetric about their own axes: a sphere about any, a round one about any across its z.
     axes = {"sphere": [], "capsule": [2], "cylinder": [2]}.get(solid.shape, [0, 1, 2])
     cosines = ((_REFLECTION[:, None] * _turned(solid)) * _turned(other)).sum(axis=0)
-    return bool((abs(cosines[axes]) > 1.0 - _ROUNDING).all())
+    return rounding.along(cosines[axes])
 
 
 def _turned(solid: Solid) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.models import direct
+from arc_suite.models import direct, source
 from arc_suite.models.sizing import sized
 from arc_suite.robots.spec import Body
 
@@ -27,6 +27,7 @@ FIELDS = {
     "dof_frictionloss": (0.0, _MOST),
     "jnt_stiffness": (0.0, _MOST),
     "actuator_gear": (-_MOST, _MOST),
+    "jnt_actfrcrange": (-_MOST, _MOST),
     "pair_friction": (0.0, _MOST),
     "pair_solref": (-_MOST, _MOST),
     "pair_solimp": (0.0, _MOST),
@@ -59,6 +60,8 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
     spec = direct.on_flat_ground(sized(body)) if arena == FLAT else models.parsed(body, arena)
+    if body.source:
+        source.add_releases(spec, body)
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()
@@ -99,7 +102,8 @@ def checked_fields(
     Raises:
         ValueError: no such field, one without effect on this model, or values that do not fit.
     """
-    valid = [name for name in FIELDS if every or name != "geom_friction" or model.geom_contype.any()]
+    without = {"geom_friction": not model.geom_contype.any(), "jnt_actfrcrange": not model.jnt_actfrclimited.any()}
+    valid = [name for name in FIELDS if every or not without.get(name)]
     if "geom_friction" in checks.mapping("model", fields) and "geom_friction" not in valid:
         raise ValueError("model field 'geom_friction': contacts of this model read pair_friction; change that")
     found = {}

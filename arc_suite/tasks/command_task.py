@@ -78,7 +78,7 @@ class Sensed(NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._
         touches: (...) whether the body touches an obstacle; None where there are none.
     """
 
-    torso_height = Readings.torso_height
+    torso_height, effort = Readings.torso_height, Readings.effort
 
 
 class Core(NamedTuple):
@@ -230,7 +230,7 @@ class CommandTask(Task):
         schedule = draw_schedule(random)
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
         command_memory = self.command.start(context, random, schedule)
-        still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
+        still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
         spent, none = energy.start(len(still)), np.zeros(3)
         core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
         return Start(qpos, qvel, CommandTaskMemory(core, command_memory, ground_memory, self.health.start()), obstacles)
@@ -282,7 +282,7 @@ class CommandTask(Task):
             previous_action=core.previous_action,
             schedule_errors=schedule_errors,
             all_schedule_errors=core.all_schedule_errors + schedule_errors,
-            energy=energy.after(core.energy, self._torques, core.action, readings.joint_angles),
+            energy=energy.after(core.energy, self._torques, readings.effort(core.action), readings.joint_angles),
             path=core.path + context.pace * numpy.hypot(motion[..., 0], motion[..., 1]),
             place=place,
             motion=motion,

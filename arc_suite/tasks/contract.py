@@ -51,7 +51,7 @@ from arc_suite.tasks.readings import Layout, Readings
 STEPS = 1000  # control steps of an episode
 
 # Fields of `MjModel` that an episode can have its own values of: masses and frictions.
-CHANGEABLE = ("body_mass", "body_inertia", "pair_friction", "geom_friction")
+CHANGEABLE = ("body_mass", "body_inertia", "pair_friction", "geom_friction", "jnt_actfrcrange")
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
 CURRICULUM = ("curriculum", "level")
@@ -68,6 +68,7 @@ class Scene(NamedTuple):
         layout: of the body in the simulation's arrays.
         standing: (nq,) the pose in which it stands: torso position and quaternion, joint angles.
         control_timestep: s between two actions.
+        substeps: of the simulation between them.
         model: the fields of `MjModel` that `CHANGEABLE` names, as compiled.
     """
 
@@ -76,6 +77,7 @@ class Scene(NamedTuple):
     layout: Layout
     standing: np.ndarray
     control_timestep: float
+    substeps: int
     model: Mapping[str, np.ndarray]
 
 
@@ -210,12 +212,10 @@ class Task(Observed):
         weights: signed weight of every term of the reward by name, in the order in which they are added up.
         cost_limit: bound of the weighted sum of the costs of a step; None for no bound. See `terms.reward`.
         version: raised with any change of dynamics, reward or observation.
-        reads: fields of the simulation that `read` takes.
         commands: sizes of what may be set from outside while an episode runs, such as by a player's stick,
             by name; see `with_command`.
         own_arena: whether it takes place in an arena of its own, and in no other.
         modifiers: settings of `tasks.modifiers` that the task has unless the caller gives others.
-        actions: what an action asks of a motor: "torque" or "position".
         demonstrators: names of presets that suit the task, the best first; empty where this follows from the blocks.
         from_body: cached attributes with numbers that follow from the body or the settings. With these and the settings
             stacked along a leading axis, its functions serve a batch of different bodies or settings. A class that
@@ -231,11 +231,9 @@ class Task(Observed):
     weights: ClassVar[Mapping[str, float]]
     cost_limit: ClassVar[float | None] = None
     version: ClassVar[int] = 0
-    reads: ClassVar[tuple[str, ...]] = reading.FIELDS
     commands: ClassVar[Mapping[str, int]] = {}
     own_arena: ClassVar[bool] = False
     modifiers: ClassVar[Mapping[str, Any]] = {}
-    actions: ClassVar[str] = "torque"
     demonstrators: ClassVar[tuple[str, ...]] = ()
     from_body: ClassVar[tuple[str, ...]] = ()
     structure: ClassVar[Hashable] = ()
@@ -262,6 +260,16 @@ class Task(Observed):
     def unwrapped(self) -> "Task":
         """The task itself, without the wrappers around it."""
         return self
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The fields of the simulation that `read` takes."""
+        return reading.FIELDS if self.scene.layout.home is None else reading.FIELDS_OF_SERVOS
+
+    @property
+    def actions(self) -> str:
+        """What an action asks of a motor: "torque", or of a servo: "position"."""
+        return "position" if self.scene.body.source else "torque"
 
     @property
     def adapts(self) -> bool:
@@ -311,7 +319,7 @@ class Task(Observed):
         rise = (self.clearances - readings.foot_heights).max(axis=-1).clip(0.0)
         x, y, z = (readings.torso_position[..., i] for i in range(3))
         position = numpy.stack([x, y, z + rise], axis=-1)
-        return numpy.concatenate([position, readings.torso_quaternion, readings.joint_angles], axis=-1)
+        return numpy.concatenate([position, readings.qpos[..., 3:]], axis=-1)
 
     @functools.cached_property
     def clearances(self) -> np.ndarray:

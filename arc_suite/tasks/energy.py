@@ -45,7 +45,7 @@ def after(memory: Energy, torques: np.ndarray, action, angles) -> Energy:
     Args:
         memory: before it.
         torques: (joints,) of the body; see `torques`.
-        action: (..., joints) of the step.
+        action: (..., joints) of the step, or the torques of servos as shares of the largest.
         angles: (..., joints) of the joints after it, rad.
     """
     step = (torques * action * (angles - memory.angles)).clip(0.0).sum(axis=-1)
@@ -66,5 +66,5 @@ def cost_of_transport(memory: Energy, path, target_path):
 
 def torques(body: Body) -> np.ndarray:
     """Return the greatest torques (joints,) of a body's motors by its weight, m."""
-    gears = np.array([joint.motor.gear for leg in sized(body).legs for joint in leg.joints])
+    gears = np.array([joint.torque for leg in sized(body).legs for joint in leg.joints])
     return gears / (standing(body).mass * GRAVITY)

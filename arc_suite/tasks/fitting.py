@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from arc_suite.models.standing import GRAVITY, standing
-from arc_suite.models.stride import GAIT_FREQUENCY, TARGET_FROUDE, fitted_gait
+from arc_suite.models.stride import TARGET_FROUDE, fitted_gait, gait_frequency
 from arc_suite.robots.spec import Body
 
 BAND = 0.75  # of the target velocity; published: 0.6 to 1
@@ -35,7 +35,7 @@ def fitted_parameters(body: Body) -> dict:
     return {
         "target_velocity": speed,
         "velocity_band": BAND * speed,
-        "gait_frequency": GAIT_FREQUENCY * rate,
+        "gait_frequency": gait_frequency(body) * rate,
         "duty_factor": gait.duty_factor,
         "phase_offsets": tuple(2.0 * math.pi * offset for offset in gait.offsets),
         "stance_threshold": max(leg.foot.radius for leg in body.legs) + STANCE_HEIGHT * height,

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from arc_suite.markers import Marker
-from arc_suite.models.sizing import position_gains, sized
+from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
 from arc_suite.tasks import noise
@@ -32,6 +32,7 @@ SHOWN, _KICKED, _LENGTH, _SHAFT, _APART = 10, (0.95, 0.1, 0.08, 1.0), 1.0, 0.07,
 
 # What friction and mass multiply.
 _FRICTIONS, _MASSES = ("pair_friction", "geom_friction"), ("body_mass", "body_inertia")
+_LIMITS = ("jnt_actfrcrange",)  # of the torques of servos
 
 
 class Changes(NamedTuple):
@@ -184,7 +185,7 @@ class Modified(Wrapper):
     @functools.cached_property
     def reach(self) -> np.ndarray:
         """(joints,) the farther limit of each joint's range, from the standing pose, rad."""
-        return abs(np.radians([joint.range_deg for leg in self.scene.body.legs for joint in leg.joints])).max(axis=-1)
+        return reaches(self.scene.body)
 
     @functools.cached_property
     def noises(self) -> dict[str, tuple[slice, np.ndarray]]:
@@ -223,6 +224,7 @@ class Modified(Wrapper):
         for names, span, share in (
             (_FRICTIONS, changes.friction, drawn.friction),
             (_MASSES, changes.mass, drawn.mass),
+            (_LIMITS, changes.motor_strength if body.source else (1.0, 1.0), drawn.strength),
         ):
             if span != (1.0, 1.0):
                 model |= {name: _within(span, share) * model.get(name, self.scene.model[name]) for name in names}
@@ -241,14 +243,23 @@ class Modified(Wrapper):
         changes, own = self.changes, memory.changes
         if changes.delay[1]:
             own, action = _delayed(own, action)
-        if changes.actions == "position":
+        if self._controls:
             action = self.torques(own, action)
         inner, inputs = self.task.before(memory.task, action)
-        ctrl = own.strength * inputs.ctrl
+        ctrl, strength = own.strength * inputs.ctrl, own.strength
         if changes.actuator_failure is not False:
-            ctrl = ctrl * ~(own.failing & (own.elapsed >= FAILS_FROM))
+            works = ~(own.failing & (own.elapsed >= FAILS_FROM))
+            ctrl, strength = ctrl * works, strength * works
+        if self.scene.body.source:
+            numpy = ctrl.__array_namespace__()
+            ctrl = numpy.concatenate([ctrl, 1.0 - strength], axis=-1)  # of servos and of their releases
         kick = self._kick(own, inputs.kick) if changes.kicks else inputs.kick
         return ModifiedMemory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick)
+
+    @property
+    def _controls(self) -> bool:
+        """Whether it holds positions by torques; servos do so by themselves."""
+        return self.changes.actions == "position" and not self.scene.body.source
 
     def torques(self, changes: Changes, action):
         """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
@@ -320,7 +331,7 @@ class Modified(Wrapper):
         return tuple(leg.name for leg, joints in zip(legs, self.members, strict=True) if own.failing[joints].any())
 
     def _sensed(self, changes: Changes, readings: Readings) -> Changes:
-        if self.changes.actions == "torque":
+        if not self._controls:
             return changes
         return changes._replace(angles=readings.joint_angles + 0.0, speeds=readings.velocities[..., 6:] + 0.0)
 

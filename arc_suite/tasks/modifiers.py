@@ -32,7 +32,8 @@ class Modifiers(NamedTuple):
             `noise`, or by the name of a block.
         delay: delay of actions, control steps, or two of them.
         actions: "torque", or "position": an action is then the joints' wanted angles, 0 for the standing
-            pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains.
+            pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains. None:
+            torques of motors and positions of servos, which take nothing else.
         exclude_blocks: names of blocks that the observation leaves out: the vector gets shorter.
     """
 
@@ -43,7 +44,7 @@ class Modifiers(NamedTuple):
     mass: tuple[float, float] = (1.0, 1.0)
     observation_noise: Mapping[str, float] = {}
     delay: tuple[int, int] = (0, 0)
-    actions: str = "torque"
+    actions: str | None = None
     exclude_blocks: tuple[str, ...] = ()
 
 
@@ -84,9 +85,17 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]
             values["observation_noise"], [name for name in blocks if blocks[name].noise is not None]
         ),
         delay=_delay(values["delay"]),
-        actions=checks.name(values["actions"], ACTIONS, "actions"),
+        actions=_actions(values["actions"], body),
         exclude_blocks=_exclude_blocks(values["exclude_blocks"], blocks),
     )
+
+
+def _actions(value, body: Body) -> str:
+    if value is None:
+        return "position" if body.source else "torque"
+    if checks.name(value, ACTIONS, "actions") == "torque" and body.source:
+        raise ValueError(f"actions: {body.name} has servos, which take positions, expected position, got torque")
+    return value
 
 
 def _actuator_failure(value, body: Body) -> bool | int:

@@ -11,17 +11,20 @@ import numpy as np
 from arc_suite.arenas import Arena
 
 FIELDS = ("qpos", "qvel", "cfrc_ext", "xpos")  # of the simulation, that `read` takes
+FIELDS_OF_SERVOS = (*FIELDS, "qfrc_actuator")
 
 
 class Layout(NamedTuple):
     """Where a body's quantities lie in the simulation's arrays, looked up by name once."""
 
-    pose: slice  # in qpos: torso height, torso quaternion, joint angles
-    joint_angles: slice  # in qpos
-    joint_velocities: slice  # in qvel
-    velocities: slice  # in qvel: torso linear and angular, joints
-    parts: slice  # in cfrc_ext and xpos; the first is the torso
+    joint_angles: slice | np.ndarray  # in qpos
+    joint_velocities: slice | np.ndarray  # in qvel
+    velocities: slice | np.ndarray  # in qvel: torso linear and angular, joints
+    torso: int  # in xpos
+    parts: slice | np.ndarray  # in cfrc_ext; the first is the torso
     feet: slice | np.ndarray  # in xpos
+    home: np.ndarray | None = None  # angles of the joints in the standing pose; None where they are 0
+    limits: np.ndarray | None = None  # of the joints' torques, for servos; None for motors
 
 
 class Readings(NamedTuple):
@@ -31,16 +34,19 @@ class Readings(NamedTuple):
     them, one substep behind the rest, as in the published benchmark.
 
     Attributes:
+        qpos: (..., nq) of the simulation.
         posture: (..., 5 + joints): torso height over the ground, torso quaternion, joint angles.
         torso_position: (..., 3) in the world.
         torso_quaternion: (..., 4), w first.
-        joint_angles: (..., joints)
+        joint_angles: (..., joints) from the standing pose.
         velocities: (..., 6 + joints): torso linear (world) and angular (body), joint velocities.
         contact_forces: (..., 6 * parts), torque and force on each part, clipped to [-1, 1].
         frame_position: (..., 3) of the torso's frame, world.
         foot_heights: (..., feet) over the ground.
+        efforts: (..., joints) torques of servos, shares of the largest; None for motors, whose actions they are.
     """
 
+    qpos: np.ndarray
     posture: np.ndarray
     torso_position: np.ndarray
     torso_quaternion: np.ndarray
@@ -49,11 +55,19 @@ class Readings(NamedTuple):
     contact_forces: np.ndarray
     frame_position: np.ndarray
     foot_heights: np.ndarray
+    efforts: np.ndarray | None = None
 
     @property
     def torso_height(self):
         """(...) over the ground."""
         return component(self.posture, 0)
+
+    def effort(self, action):
+        """Return the torques (..., joints) of a step as shares of the largest, given its action (..., joints).
+
+        Of servos they are those of the last substep.
+        """
+        return action if self.efforts is None else self.efforts
 
 
 def layout(model, joints, parts, feet) -> Layout:
@@ -70,20 +84,38 @@ def layout(model, joints, parts, feet) -> Layout:
 
     Raises:
         KeyError: a name is not in the model.
-        ValueError: joints or parts do not lie side by side in the given order, the joints next to
-            the torso's.
+        ValueError: joints or parts of a body without a source do not lie side by side in the given order, the joints
+            next to the torso's.
     """
+    ids = [model.body(name).id for name in feet]
+    if model.nkey:
+        return _layout_of_source(model, joints, parts, ids)
     angles = _span([model.joint(name).qposadr[0] for name in joints])
     velocities = _span([model.joint(name).dofadr[0] for name in joints])
     if (angles.start, velocities.start) != (7, 6):
         raise ValueError(f"expected the joints next to the torso's, at 7 in qpos, got {angles.start}")
+    parts = _span([model.body(name).id for name in parts])
+    return Layout(angles, velocities, slice(0, velocities.stop), parts.start, parts, _evenly_spaced(ids))
+
+
+def _layout_of_source(model, joints, parts, feet) -> Layout:
+    """Find an imported body, between whose joints and parts others may lie.
+
+    What pushes on a foot pushes on the part that has its collider, as the foot itself has none.
+    """
+    found = [model.joint(name) for name in joints]
+    angles, velocities = [int(each.qposadr[0]) for each in found], [int(each.dofadr[0]) for each in found]
+    ids = (model.body(name).id for name in parts)
+    owners = [int(model.body_parentid[index]) if index in feet else index for index in ids]
     return Layout(
-        pose=slice(2, angles.stop),
-        joint_angles=angles,
-        joint_velocities=velocities,
-        velocities=slice(0, velocities.stop),
-        parts=_span([model.body(name).id for name in parts]),
-        feet=_evenly_spaced([model.body(name).id for name in feet]),
+        joint_angles=_evenly_spaced(angles),
+        joint_velocities=_evenly_spaced(velocities),
+        velocities=_evenly_spaced([*range(6), *velocities]),
+        torso=owners[0],
+        parts=np.array(owners),
+        feet=_evenly_spaced(feet),
+        home=model.key_qpos[0][angles],
+        limits=model.jnt_actfrcrange[[joint.id for joint in found], 1],
     )
 
 
@@ -125,7 +157,13 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         The readings; arrays may be views of `data`.
     """
     qpos, xpos = data.qpos, data.xpos
-    pose, position, feet = qpos[..., layout.pose], qpos[..., 0:3], xpos[..., layout.feet, :]
+    position, feet, joints = qpos[..., 0:3], xpos[..., layout.feet, :], layout.joint_angles
+    if layout.home is None:
+        pose, efforts = qpos[..., 2 : joints.stop], None
+    else:
+        numpy = qpos.__array_namespace__()
+        pose = numpy.concatenate([qpos[..., 2:7], qpos[..., joints] - layout.home], axis=-1)
+        efforts = data.qfrc_actuator[..., layout.joint_velocities] / layout.limits
     foot_heights = feet[..., 2]
     if not arena.is_level:  # a subtraction of 0 would change bits on level ground
         numpy = qpos.__array_namespace__()
@@ -133,12 +171,14 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         foot_heights = foot_heights - arena.height(feet[..., 0], feet[..., 1])
     forces = data.cfrc_ext[..., layout.parts, :] if forces is None else forces
     return Readings(
+        qpos=qpos,
         posture=pose,
         torso_position=position,
         torso_quaternion=pose[..., 1:5],
         joint_angles=pose[..., 5:],
         velocities=data.qvel[..., layout.velocities],
         contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),
-        frame_position=xpos[..., layout.parts.start, :],
+        frame_position=xpos[..., layout.torso, :],
         foot_heights=foot_heights,
+        efforts=efforts,
     )

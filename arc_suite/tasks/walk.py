@@ -130,7 +130,7 @@ class Walk(Task):
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
         """Draw the state: the standing pose, with noise. The clock starts at 0, with no action before."""
         qpos, qvel = self.settings.noise.drawn(self.scene.standing, random)
-        still, zero = np.zeros(len(qpos) - 7), np.float64(0.0)
+        still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
         spent = energy.start(len(still))
         return Start(qpos, qvel, WalkMemory(0, still, still, zero, zero, zero, zero, zero, np.True_, spent))
 
@@ -159,7 +159,7 @@ class Walk(Task):
             distance=memory.distance + displacement,
             all_schedule_errors=memory.all_schedule_errors + schedule_errors,
             healthy=(low <= height) & (height <= high),
-            energy=energy.after(memory.energy, self._torques, memory.action, readings.joint_angles),
+            energy=energy.after(memory.energy, self._torques, readings.effort(memory.action), readings.joint_angles),
         )
 
     def terms(self, memory: WalkMemory, readings: Readings) -> dict:

@@ -11,7 +11,6 @@ import arc_suite
 from arc_suite import policies
 from arc_suite.envs.setup import Setup
 from arc_suite.learning import onnx_file
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import alone, universal
 from arc_suite.policies.graph import INPUT
 from arc_suite.policies.network import PACKAGED
@@ -65,7 +64,7 @@ def test_metadata_tell_what_a_game_needs(tmp_path):
     assert list(blocks.items()) == [(name, block.size) for name, block in timestep.observation.items()]
     step = float(texts["control_timestep"])
     assert step == environment.control_timestep()
-    assert int(texts["substeps"]) == SUBSTEPS
+    assert int(texts["substeps"]) == 25
     body = environment.task.body
     assert json.loads(texts["joints"]) == list(body.joint_names)
     assert json.loads(texts["gears"]) == environment.physics.model.actuator_gear[:, 0].tolist()

@@ -99,7 +99,7 @@ def test_bearing_and_distance_of_the_goal():
 def moved(environment, place):
     """The memory after a step that ends with the torso at a place (2,), m."""
     data = fields(environment)
-    data.xpos[environment.task.definition.scene.layout.parts.start, :2] = place
+    data.xpos[environment.task.definition.scene.layout.torso, :2] = place
     return environment.task.definition.after(environment.task.memory, environment.task.definition.read(data))
 
 

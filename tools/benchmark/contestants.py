@@ -9,7 +9,6 @@ import gymnasium
 import mujoco
 
 import arc_suite
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots import ROBOTS
 from arc_suite.simulation import timers
 from arc_suite.simulation.model import compiled
@@ -29,6 +28,7 @@ ORDER = (FULL, LEAN, SILENT, DM_ENV, GYM, ORDINARY, SYNC, ASYNC, VECTOR)
 # No episode ends while it is measured.
 _TASK_KWARGS = {"healthy_range": (-1e3, 1e3), "time_limit": 1e6}
 _FOREVER = {"max_episode_steps": 10**7}
+_SUBSTEPS = 25  # of a control step of the robots
 
 
 class Contestant(NamedTuple):
@@ -110,7 +110,7 @@ def _mujoco(name: str, robot: str, model: mujoco.MjModel, context) -> Contestant
     def step(action):
         data.ctrl[:] = action
         with context:
-            mujoco.mj_step(model, data, SUBSTEPS)
+            mujoco.mj_step(model, data, _SUBSTEPS)
         return observation
 
     return Contestant(name, 1, 1, reset, step, lambda: None)

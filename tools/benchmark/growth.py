@@ -5,7 +5,6 @@ import time
 import mujoco
 import numpy as np
 
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots import queen
 from arc_suite.robots.spec import Body, Leg, Link
 from arc_suite.simulation import timers
@@ -14,6 +13,7 @@ from arc_suite.simulation.model import compiled
 LEGS = (2, 4, 6, 8, 10, 12)
 LINKS = (1, 2, 3, 4)
 STEPS = 10  # control steps of a turn, in which the bodies still stand upright
+_SUBSTEPS = 25  # of a control step
 SIZES = tuple((legs, links) for links in LINKS for legs in LEGS)
 
 
@@ -44,10 +44,10 @@ class Bodies:
         """Times 25 times mj_step of each body, standing on motors that rest."""
         for model, times in zip(self._models, self._times, strict=True):
             data = mujoco.MjData(model)
-            mujoco.mj_step(model, data, 10 * SUBSTEPS)  # it lands
+            mujoco.mj_step(model, data, 10 * _SUBSTEPS)  # it lands
             started = time.perf_counter()
             with timers.off:
-                mujoco.mj_step(model, data, STEPS * SUBSTEPS)
+                mujoco.mj_step(model, data, STEPS * _SUBSTEPS)
             times.append(1e6 * (time.perf_counter() - started) / STEPS)
 
     def results(self) -> list[dict]:

@@ -74,7 +74,7 @@ def rise(body: Body, rest: Pose) -> Motion:
     share = np.concatenate([_eased(sink), np.ones(hold), _eased(sink)[::-1], np.zeros(hold)])
     joints, _ = sunk(body, rest, share * _depth(body, rest))
     recording = _driven(body, rest, joints + _holding(body, rest) - rest.joints)
-    first = sizing.SUBSTEPS * (sink + hold)
+    first = sizing.simulation(body).substeps * (sink + hold)
     _check_lies(body, rest, recording.qpos[first])
     return standing(recording, first, len(recording.qpos) - 1 - first)
 
@@ -121,7 +121,7 @@ def _holding(body: Body, rest: Pose) -> np.ndarray:
     sized = sizing.sized(body)
     pose = posed(sized, rest.joints)
     stiffness, _ = sizing.position_gains(sized, pose.inertias)
-    gears = np.array([joint.motor.gear for leg in sized.legs for joint in leg.joints])
+    gears = np.array([joint.torque for leg in sized.legs for joint in leg.joints])
     return rest.joints + pose.loads / (gears * stiffness)
 
 
@@ -149,10 +149,10 @@ def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damp
     for target, later in zip(targets[:-1], targets[1:], strict=True):
         speeds = data.qvel[6:] - (later - target) / step
         data.ctrl[:] = np.nan_to_num(torques(target, data.qpos[7:], speeds, *gains))
-        for _ in range(sizing.SUBSTEPS):
+        for _ in range(sized.simulation.substeps):
             mujoco.mj_step(model, data)
             poses.append(data.qpos.copy())
-    return Recording(model.opt.timestep, np.stack(poses))
+    return Recording(model.opt.timestep, sized.simulation.substeps, np.stack(poses))
 
 
 def sunk(body: Body, rest: Pose, depths: np.ndarray) -> tuple[np.ndarray, float]:

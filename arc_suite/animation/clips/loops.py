@@ -13,7 +13,6 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import Motion, after, along, logarithm, on_root, places, relative
-from arc_suite.models.sizing import SUBSTEPS
 
 CLOSED = np.radians(0.5)  # a seam up to which loops are equally good
 OPEN = np.radians(2.0)  # a seam from which a loop is refused
@@ -62,11 +61,11 @@ def closings(recording: Recording, cycle: float, most: int) -> Mapping[int, Clos
         cycle: s.
         most: cycles of a loop.
     """
-    found = {}
+    found, substeps = {}, recording.substeps
     for cycles in range(1, most + 1):
-        length = cycles * cycle / recording.step / SUBSTEPS
+        length = cycles * cycle / recording.step / substeps
         # A cycle of a whole number of control steps is one up to rounding.
-        lengths = {SUBSTEPS * int(np.floor(length + 1e-6)), SUBSTEPS * int(np.ceil(length - 1e-6))}
+        lengths = {substeps * int(np.floor(length + 1e-6)), substeps * int(np.ceil(length - 1e-6))}
         loops = [
             Closing(float(_seams(recording.qpos[:-samples], recording.qpos[samples:]).min()), samples)
             for samples in lengths

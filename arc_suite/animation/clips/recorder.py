@@ -8,7 +8,6 @@ from arc_suite.animation.clips import loops
 from arc_suite.animation.clips.recordings import Recording, record
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import policy as named_policy
 from arc_suite.tasks.fitting import velocity_units
 
@@ -141,8 +140,9 @@ class Recorder:
         start = stop + round(_REST * steps)
         commands = [(0, command), (stop, (0.0, 0.0, 0.0)), (start, command)]
         recording = self._recorded(self._setup, _SETTLE, start + round(_AFTER * steps) - _SETTLE, commands)
-        late = round(SUBSTEPS * steps * phase(stop))
-        stop, start = (SUBSTEPS * (count - _SETTLE) for count in (stop, start))
+        substeps = recording.substeps
+        late = round(substeps * steps * phase(stop))
+        stop, start = (substeps * (count - _SETTLE) for count in (stop, start))
         return Transition(Recorded(recording, cycle, phase(_SETTLE)), stop - late, start, late)
 
     def _gait(self) -> tuple[float, float, float]:

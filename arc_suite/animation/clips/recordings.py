@@ -8,7 +8,6 @@ import numpy as np
 from mujoco import rollout
 
 from arc_suite.envs.dm import Environment
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import Policy, alone
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
@@ -19,10 +18,12 @@ class Recording(NamedTuple):
 
     Attributes:
         step: s between two poses.
+        substeps: of a control step.
         qpos: (samples, nq): torso position and quaternion in the world, joint angles in rad.
     """
 
     step: float
+    substeps: int
     qpos: np.ndarray
 
 
@@ -43,7 +44,7 @@ def record(
             takes there.
 
     Returns:
-        `steps * SUBSTEPS + 1` poses.
+        A pose for every substep, and the first one.
 
     Raises:
         ValueError: the episode ends before.
@@ -62,7 +63,8 @@ def record(
         if timestep.last():
             raise ValueError(f"the episode ends after {count + 1} control steps, {settle + steps} are needed")
         controls.append(data.ctrl.copy())
-    controls = np.repeat(controls[settle:], SUBSTEPS, axis=0)
+    substeps = environment.task.definition.scene.substeps
+    controls = np.repeat(controls[settle:], substeps, axis=0)
     states, _ = rollout.rollout(model, mujoco.MjData(model), state, controls[None], initial_warmstart=warmstart)
     # Of the full state, time comes first and then the positions.
-    return Recording(model.opt.timestep, np.concatenate([start[None], states[0, :, 1 : 1 + model.nq]]))
+    return Recording(model.opt.timestep, substeps, np.concatenate([start[None], states[0, :, 1 : 1 + model.nq]]))

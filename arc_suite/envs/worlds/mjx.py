@@ -21,7 +21,6 @@ import numpy as np
 from arc_suite import checks
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.worlds import starts
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import device, pictures
 from arc_suite.tasks import terms
@@ -119,8 +118,9 @@ class Env:
         self._mjx_model = device.put(model, self.impl)
         self._data = device.made(model, self.impl, self.num_envs)
         self.episode_length = self.task.step_limit
-        self.observation_size, self.action_size = self.task.size, self.mj_model.nu
-        self.dt, self.sim_dt, self.n_substeps = self.task.scene.control_timestep, self.mj_model.opt.timestep, SUBSTEPS
+        self.observation_size, self.action_size = self.task.size, len(self.task.scene.body.joint_names)
+        scene = self.task.scene
+        self.dt, self.sim_dt, self.n_substeps = scene.control_timestep, self.mj_model.opt.timestep, scene.substeps
 
     @property
     def mjx_model(self):
@@ -213,10 +213,10 @@ class Env:
         for name in task.commands:
             memory = task.with_command(memory, name, info[name])
         moved, inputs = task.before(memory, action)
-        data = before.replace(ctrl=inputs.ctrl)
+        data = before.replace(ctrl=before.ctrl.at[: inputs.ctrl.shape[-1]].set(inputs.ctrl))
         if inputs.kick is not None:
             data = data.replace(qvel=data.qvel + inputs.kick)
-        data = device.advanced(self._mjx_model.replace(**info["model"]), data, SUBSTEPS)
+        data = device.advanced(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
         diverged, overflow = device.diverged(data), device.overflow(data)
 
         readings = task.read(device.fields(data, task.reads))

@@ -42,15 +42,10 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
         root: of `assemble`.
         body: the spec it was built from.
     """
-    visuals = VISUALS.get(body.name) or generic(body)
+    visuals = _visuals(body)
     if root.worldbody.geom:
         add_scene(root, body.torso.standing_height)
-    own = {} if body.palette is None else palettes.colours(body.palette)
-    for name, colour in {**visuals.colours, **own}.items():
-        emission, specular, shininess = _FINISHES.get(name, _PLAIN)
-        root.asset.add(
-            "material", name=name, rgba=(*colour, 1.0), emission=emission, specular=specular, shininess=shininess
-        )
+    add_materials(root, body)
     for solid in (*body.torso.solids, *body.ballast):
         root.find("geom", solid.name).material = visuals.solids.get(solid.name, "shell")
     torso = root.find("body", "torso")
@@ -60,6 +55,21 @@ def decorate(root: mjcf.RootElement, body: Body) -> None:
             _add(torso, part.name, part.material, part.shape, part.size, pos=part.position, euler=euler)
     for leg in body.legs:
         _dress(root, leg, visuals)
+
+
+def _visuals(body: Body) -> Visuals:
+    return VISUALS.get(body.name) or generic(body)
+
+
+def add_materials(root: mjcf.RootElement, body: Body) -> None:
+    """Add the materials of a body."""
+    visuals = _visuals(body)
+    own = {} if body.palette is None else palettes.colours(body.palette)
+    for name, colour in {**visuals.colours, **own}.items():
+        emission, specular, shininess = _FINISHES.get(name, _PLAIN)
+        root.asset.add(
+            "material", name=name, rgba=(*colour, 1.0), emission=emission, specular=specular, shininess=shininess
+        )
 
 
 def _dress(root: mjcf.RootElement, leg: Leg, visuals: Visuals) -> None:

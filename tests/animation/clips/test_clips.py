@@ -18,7 +18,6 @@ from arc_suite.animation import clips as export
 from arc_suite.animation.clips import drafts, foot_contacts, recordings
 from arc_suite.animation.clips.catalogue import ADDITIVE, CLIPS, WalkLoop
 from arc_suite.envs.setup import Setup
-from arc_suite.models.sizing import SUBSTEPS
 from arc_suite.policies import policy
 from arc_suite.robots import ROBOTS, spec_files
 from arc_suite.robots.generator import random_body
@@ -369,7 +368,7 @@ def test_the_recording_is_the_episode_to_the_bit():
     for _ in range(15):
         timestep = environment.step(act(timestep))
         poses.append(environment.physics.data.qpos.copy())
-    np.testing.assert_array_equal(recording.qpos[::SUBSTEPS], poses[9:])
+    np.testing.assert_array_equal(recording.qpos[:: recording.substeps], poses[9:])
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def walk(twist, seconds=6.0, cycle=CYCLE, drift=0.0, start=(1.0, -2.0, 2.5)):
     quaternions = rotations.turned(tilt, place[:, 2])
     joints = np.stack([np.sin(phase), 0.3 * np.sin(2.0 * phase) + 0.2 * np.cos(phase) + drift * times], axis=-1)
     height = 0.5 + 0.01 * np.cos(2.0 * phase)
-    return Recording(STEP, np.concatenate([place[:, :2], height[:, None], quaternions, joints], axis=-1))
+    return Recording(STEP, 25, np.concatenate([place[:, :2], height[:, None], quaternions, joints], axis=-1))
 
 
 @pytest.mark.parametrize("twist", TWISTS)
@@ -97,9 +97,9 @@ def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
     recording = walk(twist, seconds=4 * CYCLE)
     qpos = recording.qpos.copy()
     qpos[825:, :2] += np.outer(np.arange(276) / 275.0, 0.3 * (qpos[-1, :2] - qpos[825, :2]))
-    first = loops.usual(Recording(STEP, qpos), 275)
+    first = loops.usual(Recording(STEP, 25, qpos), 275)
     assert first < 600
-    speed = np.hypot(*loops.loop(Recording(STEP, qpos), first, 275).twist[:2])
+    speed = np.hypot(*loops.loop(Recording(STEP, 25, qpos), first, 275).twist[:2])
     mean = np.hypot(*twist[:2])
     assert mean < speed < 1.3 * mean
 
@@ -111,8 +111,8 @@ def test_a_loop_that_closes_goes_before_a_usual_one():
     qpos[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)
     qpos[275:, 0] += 0.05 * np.cos(2.5) * np.arange(276) / 275.0
     qpos[275:, 1] += 0.05 * np.sin(2.5) * np.arange(276) / 275.0
-    first = loops.usual(Recording(STEP, qpos), 275)
-    assert loops.loop(Recording(STEP, qpos), first, 275).seam <= loops.CLOSED
+    first = loops.usual(Recording(STEP, 25, qpos), 275)
+    assert loops.loop(Recording(STEP, 25, qpos), first, 275).seam <= loops.CLOSED
 
 
 def test_no_loop_is_taken_whose_seam_is_over_the_bound():
@@ -121,8 +121,8 @@ def test_no_loop_is_taken_whose_seam_is_over_the_bound():
     qpos = recording.qpos[:-1].copy()
     qpos[:275, 8] += np.radians(np.where(np.arange(275) < 11, 1.9, 2.2))
     qpos[:11, :2] += 0.05  # a longer way than that of the others
-    first = loops.usual(Recording(STEP, qpos), 275)
-    assert np.radians(1.8) < loops.loop(Recording(STEP, qpos), first, 275).seam <= loops.OPEN
+    first = loops.usual(Recording(STEP, 25, qpos), 275)
+    assert np.radians(1.8) < loops.loop(Recording(STEP, 25, qpos), first, 275).seam <= loops.OPEN
 
 
 def test_the_least_number_of_cycles_that_refuses_the_fewest():
