@@ -1,0 +1,188 @@
+"""Import the robots of `zoo.py`, compare their dynamics with their files, and walk them: `make check-robots`, minutes.
+
+python tests/robots_of_others/check.py FOLDER [NAME ...]
+
+Prints a table and writes it to FOLDER/robots.csv. Of each file: whether it comes in, in how many of 200 states the
+accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Fails where
+  - a file that should come in does not, or one that should not does;
+  - accelerations differ;
+  - a robot of MUST_WALK does not walk, or fewer than seven tenths of the NEW robots do.
+"""
+
+import csv
+import multiprocessing
+import os
+import pathlib
+import sys
+import traceback
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+
+import reference  # noqa: E402
+import zoo  # noqa: E402
+
+from arc_suite import rotations  # noqa: E402
+from arc_suite.cpg import Demonstrator  # noqa: E402
+from arc_suite.envs.setup import Setup  # noqa: E402
+from arc_suite.evaluation import protocol, walking  # noqa: E402
+from arc_suite.models.importing import imported  # noqa: E402
+from arc_suite.models.soundness import flaws  # noqa: E402
+from arc_suite.robots.spec import Body, SpecError  # noqa: E402
+
+WALKS = {"medium": "walk", "steered": "steer"}  # task of each preset
+SEEDS, SECONDS = 3, 20.0
+LEAST, MOST, MOST_LIMITED = 0.8, 1.25, 0.03
+MUST_WALK = ("go2_like", "a1_like", "hexapod", "go2", "aliengo", "anymal_b", "a1")
+SHARE = 0.7  # of the NEW robots
+
+
+class Walk(NamedTuple):
+    """Of one preset, over all seeds.
+
+    Attributes:
+        slowest, fastest: speeds as shares of the target.
+        falls: of seeds.
+        limited: share of samples, of all joints at all control steps, in which a motor is at its torque limit.
+    """
+
+    slowest: float
+    fastest: float
+    falls: int
+    limited: float
+
+    @property
+    def good(self) -> bool:
+        return LEAST <= self.slowest and self.fastest <= MOST and not self.falls and self.limited < MOST_LIMITED
+
+
+class Row(NamedTuple):
+    """Of one file; see the table."""
+
+    robot: zoo.Robot
+    line: str  # that refuses it, or the first flaw of the body, or why it could not be walked
+    legs: int = 0
+    same: int | None = None
+    walks: dict[str, Walk] = {}
+
+    @property
+    def came(self) -> bool:
+        return self.legs > 0
+
+    @property
+    def walked(self) -> bool:
+        return len(self.walks) == len(WALKS) and all(walk.good for walk in self.walks.values())
+
+    def faults(self) -> list[str]:
+        found = []
+        if self.came == (self.robot.refused is not None):
+            found.append(f"expected it {'to come in' if self.robot.refused is None else 'to be refused'}")
+        if self.robot.refused is not None and not self.came and self.robot.refused not in self.line:
+            found.append(f"expected a line with {self.robot.refused!r}")
+        if self.came and self.same != reference.STATES:
+            found.append(f"same bits in {self.same} of {reference.STATES} states")
+        if self.robot.name in MUST_WALK and not self.walked:
+            found.append("does not walk")
+        return [f"{self.robot.name}: {fault}" for fault in found]
+
+
+def row(robot: zoo.Robot, folder: pathlib.Path) -> Row:
+    """Import a file and try the body."""
+    path = zoo.place(robot, folder)
+    try:
+        body = imported(path).body
+    except SpecError as error:
+        return Row(robot, str(error))
+    except Exception:
+        return Row(robot, f"TRACEBACK {traceback.format_exc(limit=-1).splitlines()[-1]}", legs=-1)
+    same = reference.same_bits(path, body)
+    line = next((flaw.text for flaw in flaws(body)), "")
+    if robot.group == zoo.ODD:
+        return Row(robot, line, len(body.legs), same)
+    walks = {}
+    for preset, task in WALKS.items():
+        try:
+            walks[preset] = walk(body, task, preset)
+        except Exception as error:
+            line = line or f"{preset}: {type(error).__name__}: {error}"
+    return Row(robot, line, len(body.legs), same, walks)
+
+
+def walk(body: Body, task: str, preset: str) -> Walk:
+    """Walk a body straight ahead."""
+    tries = [_tried(body, task, preset, seed) for seed in range(SEEDS)]
+    speeds, falls, limited = zip(*tries, strict=True)
+    return Walk(min(speeds), max(speeds), sum(falls), float(np.mean(limited)))
+
+
+def _tried(body: Body, task: str, preset: str, seed: int) -> tuple[float, bool, float]:
+    """Return speed as a share of the target, whether it fell, and the share of samples at the torque limit."""
+    environment = Setup.of(body, task, {"time_limit": SECONDS, "on_divergence": "terminate"}).load()
+    steps = round(SECONDS / environment.control_timestep())
+    limits = np.array([joint.torque for leg in body.legs for joint in leg.joints])
+    names = body.joint_names
+    model, data = environment.physics.model.ptr, environment.physics.data.ptr
+    motors = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) for name in names]
+    targets, places, limited, fell = [], [], [], False
+    for timestep in protocol.rollout(environment, Demonstrator(environment, preset), seed, steps):
+        if timestep.first() and "command" in environment.task.definition.commands:
+            environment.command("command", (1.0, 0.0, 0.0))
+        place = np.array((*data.qpos[:2], rotations.yaw(data.qpos[3:7])))
+        places.append(place)
+        targets.append(walking.target(environment.task.definition, timestep.observation, place))
+        limited.append((abs(data.actuator_force[motors]) >= 0.999 * limits).mean())
+        ended = timestep.last() and timestep.discount == 0.0
+        if ended or rotations.upright(data.qpos[3:7]) < walking.MOST_TILT_COSINE:
+            fell = True
+            break
+    moved = np.diff(np.array(places)[:, :2], axis=0)
+    speed, _ = walking.shares(np.array(targets[:-1]), moved, steps) if len(moved) else (0.0, 0.0)
+    return speed, fell, float(np.mean(limited[1:] or [0.0]))
+
+
+HEADER = ["robot", "group", "legs", "same bits"]
+HEADER += [f"{preset} {figure}" for preset in WALKS for figure in ("slowest", "fastest", "falls", "at limit")]
+HEADER += ["walks", "line"]
+
+
+def cells(row: Row) -> list[str]:
+    """Return a row of the table."""
+    figures = []
+    for preset in WALKS:
+        one = row.walks.get(preset)
+        figures += ["", "", "", ""] if one is None else [f"{value:.3g}" for value in one]
+    came = ["" if not row.came else str(row.legs), "" if row.same is None else str(row.same)]
+    return [row.robot.name, row.robot.group, *came, *figures, "yes" if row.walked else "no", row.line]
+
+
+def main(folder: str, *names: str) -> int:
+    """Try all files, or those that are named; print, write and judge the table."""
+    place = pathlib.Path(folder)
+    chosen = [robot for robot in zoo.ROBOTS if not names or robot.name in names]
+    with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool:
+        waiting = [pool.apply_async(row, (robot, place)) for robot in chosen]
+        rows = []
+        for one in waiting:
+            rows.append(one.get())
+            print(" | ".join(cells(rows[-1])), flush=True)
+    with (place / "robots.csv").open("w", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([HEADER, *map(cells, rows)])
+    faults = [fault for one in rows for fault in one.faults()]
+    new = [one for one in rows if one.robot.group == zoo.NEW]
+    walking_ones = sum(one.walked for one in new)
+    for group in (zoo.MET, zoo.NEW):
+        ones = [one for one in rows if one.robot.group == group]
+        print(f"{group}: {sum(one.walked for one in ones)} of {len(ones)} walk")
+    came = [one for one in rows if one.came]
+    print(f"{len(came)} of {len(rows)} files come in, {sum(one.same == reference.STATES for one in came)} with the same bits")
+    if walking_ones < SHARE * len(new):
+        faults.append(f"{walking_ones} of {len(new)} new robots walk: expected {SHARE:.0%}")
+    print("\n".join(faults))
+    return int(bool(faults))
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

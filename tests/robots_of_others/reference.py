@@ -1,0 +1,73 @@
+"""The dynamics of a file itself, against those of what was imported from it."""
+
+import pathlib
+import xml.etree.ElementTree as ElementTree
+
+import mujoco
+import numpy as np
+
+from arc_suite.models.importing import urdf
+from arc_suite.robots.spec import Body
+
+STATES = 200
+FLOOR = {"friction": [1.0, 0.5, 0.5], "solref": [0.02, 1.0], "solimp": [0.9, 0.95, 0.001, 0.5, 2.0]}
+
+
+def same_bits(path: pathlib.Path, body: Body) -> int:
+    """Return in how many random states near the standing pose, on a floor, both have the same accelerations.
+
+    Motors are off, parts of the robot do not touch one another, and tendons and equalities are out of both.
+
+    Args:
+        path: of an MJCF, or of a URDF, which is compared as `importing.urdf` repairs it.
+        body: as imported from it.
+    """
+    ours, theirs = _model(mujoco.MjSpec.from_string(body.source)), _model(_robot(path))
+    if (ours.nq, ours.nv) != (theirs.nq, theirs.nv):
+        return 0
+    home, random = ours.key("home").qpos, np.random.default_rng(0)
+    return sum(_equal(ours, theirs, home, random) for _ in range(STATES))
+
+
+def _equal(ours: mujoco.MjModel, theirs: mujoco.MjModel, home: np.ndarray, random: np.random.Generator) -> bool:
+    qpos = home.copy()
+    qpos[2] *= random.uniform(0.95, 1.05)
+    qpos[7:] += random.uniform(-0.3, 0.3, len(qpos) - 7)
+    qvel, torque = random.normal(size=ours.nv), 0.3 * ours.body_mass.sum() * random.normal(size=ours.nv)
+    found = []
+    for model in (ours, theirs):
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = qpos, qvel, torque
+        mujoco.mj_forward(model, data)
+        found.append(data.qacc)
+    return np.isfinite(found[0]).all() and np.array_equal(*found)
+
+
+def _robot(path: pathlib.Path) -> mujoco.MjSpec:
+    """Return the file's robot alone, free to move."""
+    if path.suffix == ".urdf":
+        cured, *_ = urdf.cured(ElementTree.parse(path).getroot(), path.parent)
+        spec = mujoco.MjSpec.from_string(cured)
+    else:
+        spec = mujoco.MjSpec.from_file(str(path))
+    tops = list(spec.worldbody.bodies)
+    root = max(tops, key=lambda top: len(top.find_all("joint")))
+    world = [*spec.worldbody.geoms, *(top for top in tops if top is not root)]
+    for element in (*world, *spec.keys, *spec.tendons, *spec.equalities, *spec.pairs, *spec.excludes):
+        spec.delete(element)
+    if not root.joints:
+        root.add_freejoint()
+    return spec
+
+
+def _model(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile a robot on a floor, without motors and contacts of its parts with one another."""
+    for element in (*spec.actuators, *spec.sensors):
+        spec.delete(element)
+    for geom in spec.geoms:
+        geom.contype, geom.conaffinity = int(bool(geom.contype or geom.conaffinity)), 0
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    spec.worldbody.add_geom(name="our floor", type=plane, size=(0.0, 0.0, 1.0), contype=0, conaffinity=1, **FLOOR)
+    model = spec.compile()
+    model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+    return model
