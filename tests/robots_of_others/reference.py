@@ -50,10 +50,12 @@ def _robot(path: pathlib.Path) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_string(cured)
     else:
         spec = mujoco.MjSpec.from_file(str(path))
+    spec.compile()  # which fuses what is fixed in a URDF
     tops = list(spec.worldbody.bodies)
     root = max(tops, key=lambda top: len(top.find_all("joint")))
     world = [*spec.worldbody.geoms, *(top for top in tops if top is not root)]
-    for element in (*world, *spec.keys, *spec.tendons, *spec.equalities, *spec.pairs, *spec.excludes):
+    others = (spec.cameras, spec.lights, spec.keys, spec.tendons, spec.equalities, spec.pairs, spec.excludes)
+    for element in (*spec.actuators, *spec.sensors, *(one for kind in others for one in kind), *world):
         spec.delete(element)
     if not root.joints:
         root.add_freejoint()
@@ -61,9 +63,7 @@ def _robot(path: pathlib.Path) -> mujoco.MjSpec:
 
 
 def _model(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """Compile a robot on a floor, without motors and contacts of its parts with one another."""
-    for element in (*spec.actuators, *spec.sensors):
-        spec.delete(element)
+    """Compile a robot on a floor, without contacts of its parts with one another."""
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = int(bool(geom.contype or geom.conaffinity)), 0
     plane = mujoco.mjtGeom.mjGEOM_PLANE
