@@ -18,6 +18,7 @@
 #   docs, notebooks     links of the site, its front page in Chromium; the notebooks of examples
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
+#   robots              robots of others, in wheels (400 MB): they come in, with the same bits, and walk; minutes
 #   bodies, survey, following, clip-sets    many bodies: bit-equality, walks, commands, clips; minutes to half an hour
 #   soak, fuzz, loopholes, mutants    memory over two million steps; damaged files; policies that cheat; planted mistakes (hours)
 
@@ -212,6 +213,8 @@ check-agents-release: MARKS := long or release
 
 check-bodies: RUN = $(PYTEST) $(PARALLEL) tests/envs/test_bodies.py tests/models/test_families.py && \
 	$(VENV)/bin/arc-suite survey --family varied --count 120
+check-robots: RUN = $(PYTHON) tests/robots_of_others/zoo.py out/robots && \
+	$(PYTHON) tests/robots_of_others/check.py out/robots
 check-survey: RUN = $(VENV)/bin/arc-suite survey --count 500
 check-following: RUN = $(PYTHON) tests/following.py
 check-clip-sets: RUN = $(PYTHON) tests/clip_sets.py

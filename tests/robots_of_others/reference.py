@@ -10,7 +10,9 @@ from arc_suite.models.importing import urdf
 from arc_suite.robots.spec import Body
 
 STATES = 200
-FLOOR = {"friction": [1.0, 0.5, 0.5], "solref": [0.02, 1.0], "solimp": [0.9, 0.95, 0.001, 0.5, 2.0]}
+# All that a class of the file would set otherwise.
+FLOOR = {"friction": [1.0, 0.5, 0.5], "solref": [0.02, 1.0], "solimp": [0.9, 0.95, 0.001, 0.5, 2.0], "margin": 0.0}
+FLOOR |= {"gap": 0.0, "condim": 3, "priority": 0, "solmix": 1.0, "contype": 0, "conaffinity": 1}
 
 
 def same_bits(path: pathlib.Path, body: Body) -> int:
@@ -67,7 +69,7 @@ def _model(spec: mujoco.MjSpec) -> mujoco.MjModel:
     for geom in spec.geoms:
         geom.contype, geom.conaffinity = int(bool(geom.contype or geom.conaffinity)), 0
     plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(name="our floor", type=plane, size=(0.0, 0.0, 1.0), contype=0, conaffinity=1, **FLOOR)
+    spec.worldbody.add_geom(name="our floor", type=plane, size=(0.0, 0.0, 1.0), **FLOOR)
     model = spec.compile()
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     return model

@@ -1,4 +1,6 @@
-"""Files of robots that others wrote, in wheels of exact versions: `python tests/robots_of_others/zoo.py FOLDER` fetches them.
+"""Files of robots that others wrote, in wheels of exact versions.
+
+`python tests/robots_of_others/zoo.py FOLDER` downloads and unpacks the wheels.
 
 MET are robots on which the rules for poses, servos and gaits were found. NEW ones judge these rules. ODD files are
 expected to come in, or to be refused, and nobody expects a walk.
@@ -38,6 +40,7 @@ class Robot(NamedTuple):
         path: in the package's folder of models.
         group: MET, NEW or ODD.
         refused: part of the line that refuses it; None for a file that comes in.
+        feet: as `imported` takes them.
     """
 
     name: str
@@ -45,7 +48,10 @@ class Robot(NamedTuple):
     path: str
     group: str
     refused: str | None = None
+    feet: tuple[str, ...] = ()
 
+
+CLAWS = tuple(f"claw_T{pair}_{side}" for pair in (1, 2, 3) for side in ("left", "right"))
 
 ROBOTS = (
     Robot("go2_like", "own", "go2_like.xml", MET),
@@ -87,11 +93,12 @@ ROBOTS = (
     Robot("ant_pybullet", "pybullet", "mjcf/ant.xml", NEW),
     Robot("bolt", "example_robot_data", "bolt_description/robots/bolt.urdf", ODD),
     Robot("g1", "mjlab", "unitree_g1/xmls/g1.xml", ODD),
-    Robot("neuromechfly", "flygym_gymnasium", "mjcf/neuromechfly_seqik_kinorder_ypr.xml", ODD),
-    Robot("minitaur", "pybullet", "quadruped/minitaur.urdf", ODD, ""),
-    Robot("microtaur", "pybullet", "quadruped/microtaur/microtaur.urdf", ODD, ""),
-    Robot("laikago_toes", "pybullet", "laikago/laikago_toes.urdf", ODD, ""),
-    Robot("dog", "dm_control", "suite/dog.xml", ODD, ""),
+    Robot("dog", "dm_control", "suite/dog.xml", ODD),
+    Robot("fly", "dm_control", "locomotion/walkers/assets/fruitfly_v2/fruitfly.xml", ODD, None, CLAWS),
+    Robot("neuromechfly", "flygym_gymnasium", "mjcf/neuromechfly_seqik_kinorder_ypr.xml", ODD, "the torso"),
+    Robot("minitaur", "pybullet", "quadruped/minitaur.urdf", ODD, "no standing pose"),
+    Robot("microtaur", "pybullet", "quadruped/microtaur/microtaur.urdf", ODD, "origin rpy: expected 3 numbers"),
+    Robot("laikago_toes", "pybullet", "laikago/laikago_toes.urdf", ODD, "no standing pose"),
 )
 
 
