@@ -10,6 +10,7 @@ from pathlib import Path
 
 from arc_suite import checks
 from arc_suite.arenas import ARENAS, Arena
+from arc_suite.models import importing
 from arc_suite.models.families import FAMILIES
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec import Body
@@ -43,7 +44,8 @@ def body_of(robot, near: Iterable[str] = ()) -> Body:
 
     Args:
         robot: name of a robot, `module:name` for one of another package, `family:seed`, name of a packaged spec (such
-            as spider), path of a file that holds a body, text of such a file, or the body itself.
+            as spider), path of a file that holds a body or a robot in MJCF or URDF, text of a body's file, or the body
+            itself.
         near: other words that are valid in its place, for the error.
 
     Raises:
@@ -108,7 +110,7 @@ def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
     elif text.startswith("{"):
         yield body_from_json(text)
     elif (text in EXAMPLES and text not in ROBOTS) or _is_path(robot):
-        yield load_body(EXAMPLES.get(text, Path(robot)))
+        yield _read(EXAMPLES.get(text, Path(robot)))
     elif "," in text:
         yield from itertools.chain.from_iterable(_bodies(part, near) for part in text.split(","))
     elif family in FAMILIES or ":" in family or (family and _SEEDS.fullmatch(seeds)):  # seeds are no name of a robot
@@ -117,10 +119,16 @@ def _bodies(robot, near: Iterable[str]) -> Iterator[Body]:
         yield _find(robot, ROBOTS, "robot", (*words()[len(ROBOTS) :], *near))
 
 
+def _read(path: Path) -> Body:
+    return importing.body_of(path) if path.suffix.lower() in importing.EXTENSIONS else load_body(path)
+
+
 def _is_path(robot) -> bool:
     if isinstance(robot, str):
         path = Path(robot)
-        return path.suffix == ".json" or (":" not in robot and bool(path.suffix or path.name != robot))
+        return path.suffix.lower() in (".json", *importing.EXTENSIONS) or (
+            ":" not in robot and bool(path.suffix or path.name != robot)
+        )
     return isinstance(robot, os.PathLike)
 
 

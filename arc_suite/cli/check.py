@@ -7,7 +7,7 @@
 A body: one line for each flaw, with the value that would fit: feet that hang in the air, legs that hold
 nothing up, none that can step. With --walk the demonstrator walks it for 100 control steps. Where it falls,
 or stays below 0.7 of the target speed, the line names the fields to leave out, which are then sized to suit
-the body. MJCF and URDF are not read.
+the body.
 
 A task: a batch of environments must compute bit for bit what each computes alone, over 200 control steps;
 the line names the terms, metrics and blocks that differ.

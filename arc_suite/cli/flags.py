@@ -18,7 +18,7 @@ from arc_suite.tasks import TASKS
 FLAGS = flags.FLAGS
 
 MOST = 100_000  # episodes, or bodies: more than anyone waits for
-ROBOT_HELP = f"{', '.join(registry.words())}; a JSON file; module:name of one that another package has"
+ROBOT_HELP = f"{', '.join(registry.words())}; a file in JSON, MJCF or URDF; module:name of one that another package has"
 
 
 def define_body(robot: str | None = "queen", more: str = "") -> None:
@@ -30,7 +30,9 @@ def define_body(robot: str | None = "queen", more: str = "") -> None:
     """
     flags.DEFINE_string("robot", robot, f"{ROBOT_HELP}{more}.")
     examples = ", ".join(spec_files.EXAMPLES)
-    flags.DEFINE_string("spec", None, f"A body in place of a robot: a JSON file, or one of {examples}.")
+    flags.DEFINE_string(
+        "spec", None, f"A body in place of a robot: a file in JSON, MJCF or URDF, or one of {examples}."
+    )
     flags.DEFINE_integer("legs", None, "A body with this number of legs, in place of a robot.", *generator.LEGS)
     flags.DEFINE_integer(
         "links", None, "Actuated links of each leg of a body made to order. [default: 3]", *generator.LINKS

@@ -6,6 +6,7 @@ from pathlib import Path
 # The package of each program: the core's own, and those of the wings, which nothing else of the core names.
 PROGRAMS = {
     "build_model": "arc_suite.cli",
+    "import": "arc_suite.cli",
     "check": "arc_suite.cli",
     "render": "arc_suite.animation.cli",
     "animate": "arc_suite.animation.cli",

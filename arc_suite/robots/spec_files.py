@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from arc_suite import checks, files
-from arc_suite.robots.spec import Body, SpecError
+from arc_suite.robots import sources
+from arc_suite.robots.spec import MAX_SOURCE, Body, SpecError
 
 MAX_BYTES = 1 << 18  # of a file; a body of 64 legs with 16 links each has fewer
+MAX_IMPORTED = MAX_BYTES + 2 * MAX_SOURCE  # of a file with a source, in which line breaks and quotes take two bytes
 
 # Paths of the creatures that come with the suite, by name.
 EXAMPLES = {path.stem: path for path in sorted(Path(__file__).with_name("examples").glob("*.json"))}
@@ -38,11 +40,14 @@ def load_body(path: str | os.PathLike) -> Body:
     if isinstance(path, str) and not Path(path).suffix and not Path(path).is_file():
         path = EXAMPLES[checks.name(path, EXAMPLES, "spec", near=("FILE.json",))]
     with files.reading(path), Path(path).open("rb") as file:
-        data = file.read(MAX_BYTES + 1)
+        data = file.read(MAX_IMPORTED + 1)
     try:
-        if len(data) > MAX_BYTES:
+        if len(data) > MAX_IMPORTED:
+            raise SpecError(f"expected at most {MAX_BYTES} bytes, or {MAX_IMPORTED} of a body with a source")
+        body = body_from_json(data)
+        if body.source is None and len(data) > MAX_BYTES:
             raise SpecError(f"expected at most {MAX_BYTES} bytes")
-        return body_from_json(data)
+        return body
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
 
@@ -69,7 +74,9 @@ def body_from_json(text: str | bytes) -> Body:
         SpecError: not JSON, or no body.
     """
     if text.lstrip()[:1] in ("<", b"<"):
-        raise SpecError("expected a body in JSON, got XML: MJCF and URDF cannot be read; see docs/bodies.md")
+        raise SpecError(
+            "expected a body in JSON, got XML; the name of an MJCF file ends in .xml, that of a URDF file in .urdf"
+        )
     try:
         # Integers of any length become floats, which the field's range then refuses.
         value = json.loads(text, object_pairs_hook=_object, parse_int=_integer)
@@ -79,7 +86,7 @@ def body_from_json(text: str | bytes) -> Body:
         raise SpecError("expected a body in JSON, got too many brackets within brackets") from None
     except ValueError as error:
         raise SpecError(f"expected a body in JSON: {error}") from None
-    return _spec(Body, value, "")
+    return sources.check(_spec(Body, value, ""))
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict:

@@ -1,17 +1,23 @@
 """Robots of others: from an MJCF or URDF file to a body whose physics are those of the file."""
 
+import contextlib
+import functools
+import hashlib
 import math
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from arc_suite.models.importing import motors, opening, poses, sketch, tree, writing
+import numpy as np
+
+from arc_suite import files
+from arc_suite.models.importing import motors, opening, poses, sketch, tree, urdf, writing
 from arc_suite.models.importing.naming import Names, clean, names_of
 from arc_suite.models.importing.opening import Opened
 from arc_suite.models.importing.poses import Stance
 from arc_suite.models.importing.tree import Robot
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import ROBOTS, sources
 from arc_suite.robots.spec import MAX_NAME, Body, Held, Simulation, SpecError
 
 EXTENSIONS = (".xml", ".urdf")
@@ -52,10 +58,24 @@ def imported(path: str | os.PathLike, home: str | None = None, feet: Sequence[st
         raise SpecError(f"{path}: {error}") from None
 
 
+def body_of(path: str | os.PathLike) -> Body:
+    """Return the body of `imported`; the same one as long as the file stays as it is.
+
+    Raises:
+        SpecError: as `imported`.
+        OSError: as `imported`.
+    """
+    with files.reading(path):
+        return _body(os.path.realpath(path), hashlib.sha256(Path(path).read_bytes()).digest())
+
+
+@functools.lru_cache(maxsize=64)
+def _body(path: str, _content: bytes) -> Body:
+    return imported(path).body
+
+
 def _imported(path: Path, home: str | None, feet: Sequence[str]) -> Imported:
-    file = opening.opened(path)
-    robot = tree.robot_of(file.model, file.root)
-    stance = poses.stance(robot, home, feet)
+    file, robot, stance = _standing(path, home, feet)
     _check_hinges(robot, stance)
     names = names_of(robot, stance.legs)
     driven = motors.motors_of(robot, stance)
@@ -66,11 +86,31 @@ def _imported(path: Path, home: str | None, feet: Sequence[str]) -> Imported:
         legs=sketch.legs(robot, stance, names, driven.servos),
         camera=sketch.camera(stance),
         simulation=_simulation(float(robot.model.opt.timestep)),
-        source=writing.source(robot, stance, names),
+        source=writing.source(robot, stance, names, file.meshes),
         held=tuple(Held(name=names.joints[joint], servo=driven.servos[joint]) for joint in names.held),
         file_joints=tuple(robot.name(joint) for joint in order),
     )
-    return Imported(body, tuple(_notes(file, robot, stance, names, body, order, driven.notes)))
+    return Imported(sources.check(body), tuple(_notes(file, robot, stance, names, body, order, driven.notes)))
+
+
+def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[Opened, Robot, Stance]:
+    """Return the robot of a file as it stands; a URDF in which it does not may have another axis that points up."""
+
+    def tried(turn: str) -> tuple[Opened, Robot, Stance]:
+        file = opening.opened(path, turn)
+        robot = tree.robot_of(file.model, file.root)
+        return file, robot, poses.stance(robot, home, feet)
+
+    try:
+        return tried(urdf.LEVEL)
+    except poses.NoStance as error:
+        for turn in urdf.TURNS if path.suffix.lower() == ".urdf" else ():
+            with contextlib.suppress(SpecError):
+                file, robot, stance = tried(turn)
+                if np.ptp([leg.centre for leg in stance.legs], axis=0).argmax() == 0:
+                    note = "turned: the file's y axis points up, the torso's frame has z there"
+                    return file._replace(notes=(*file.notes, note)), robot, stance
+        raise SpecError(str(error)) from None
 
 
 def _check_hinges(robot: Robot, stance: Stance) -> None:
@@ -124,6 +164,11 @@ def _notes(
 def _left_out(file: Opened, robot: Robot, names: Names) -> Iterator[str]:
     model = file.model
     others = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody)) - 1
+    hulls = sorted(
+        {file.meshes[geom].name for geom in robot.colliders if geom in file.meshes and not file.meshes[geom].whole}
+    )
+    if hulls:
+        yield f"reduced: {len(hulls)} large meshes to their hulls, such as {hulls[0]}; contacts differ by some digits"
     counts = {
         "tendons": model.ntendon,
         "equality constraints": model.neq,

@@ -20,8 +20,10 @@ _LEAST_FREQUENCY = 25.0  # rad/s, of a joint with what it moves
 _DAMPING_RATIO = 0.7
 
 _STRENGTH = 30.0  # times the load, of a motor whose limit the file does not have
-_PLACEHOLDER = 1000.0  # N m; files have it, and larger ones, where nobody knew the motor
+_UNKNOWN = 1000.0  # N m; files have it, and larger ones, where nobody knew the motor
 _IMPLAUSIBLE = 200.0  # times the leg's strongest load
+
+_SIZED, _PLACEHOLDER = "sized", "placeholder"  # where a limit comes from, in place of an attribute
 
 _OF_JOINTS = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 
@@ -49,9 +51,9 @@ def motors_of(robot: Robot, stance: Stance) -> Motors:
         strongest = max(loads[joint] for joint in group)
         for joint in group:
             load, inertia = max(loads[joint], _LEAST_SHARE * strongest), inertias[joint]
-            limit, origins[joint] = limits.get(joint) or (_sized(load, inertia), "sized")
-            if limit >= _PLACEHOLDER or (strongest and limit > _IMPLAUSIBLE * strongest):
-                origins[joint] = "placeholder"
+            limit, origins[joint] = limits.get(joint) or (_sized(load, inertia), _SIZED)
+            if limit >= _UNKNOWN or (strongest and limit > _IMPLAUSIBLE * strongest):
+                origins[joint] = _PLACEHOLDER
             damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
             stiffness, resistance = given.get(joint) or _rule(load, inertia, limit, damping)
             servos[joint] = Servo(stiffness=stiffness, damping=resistance, limit=limit)
@@ -145,10 +147,11 @@ def _notes(legs: list[int], servos: dict, origins: dict, given: dict) -> Iterato
     """Yield a line for each origin of limits of the legs' motors, and one for the gains."""
     for origin, count in Counter(origins[joint] for joint in legs).items():
         torques = [servos[joint].limit for joint in legs if origins[joint] == origin]
-        span = " to ".join(dict.fromkeys(f"{torque:.3g}" for torque in (min(torques), max(torques))))
-        yield {
-            "sized": f"limits: the file has none for {count} motors: sized to {span} N m, {_STRENGTH:g} times their load",
-            "placeholder": f"limits: {span} N m of {count} motors looks like a placeholder, far above their load",
-        }.get(origin, f"limits: {span} N m of {count} motors, from {origin}")
+        span = " to ".join(dict.fromkeys(f"{torque:.4g}" for torque in (min(torques), max(torques))))
+        said = {
+            _SIZED: f"none in the file for {count} motors, sized to {span} N m, {_STRENGTH:g} times their load",
+            _PLACEHOLDER: f"{span} N m of {count} motors is a placeholder, far above their load",
+        }
+        yield f"limits: {said.get(origin, f'{span} N m of {count} motors, from {origin}')}"
     own = sum(joint in given for joint in legs)
-    yield f"gains: {own} of {len(legs)} servos from the file's position actuators, the others by rule"
+    yield f"gains: {own} of {len(legs)} servos have those of the file's position actuators, the others are sized"

@@ -10,6 +10,7 @@ import mujoco
 
 from arc_suite import checks, files
 from arc_suite.models.importing import urdf
+from arc_suite.models.importing.meshes import Mesh, file_of, meshes_of
 from arc_suite.robots.spec import SpecError
 
 MAX_BYTES = 1 << 24  # of a file; the largest of 45 has 200 kB
@@ -25,18 +26,24 @@ class Opened(NamedTuple):
     Attributes:
         model: compiled, with a free joint at the torso.
         root: body of the torso.
+        meshes: of geoms that are one, by geom.
         order: names of joints in the order of the file; none where the model has that order.
         notes: one line for each thing that is left out or repaired.
     """
 
     model: mujoco.MjModel
     root: int
+    meshes: dict[int, Mesh]
     order: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def opened(path: Path) -> Opened:
+def opened(path: Path, turn: str = urdf.LEVEL) -> Opened:
     """Return the robot of an MJCF or a URDF file.
+
+    Args:
+        path: of the file.
+        turn: roll, pitch and yaw of a URDF's base in the torso's frame.
 
     Raises:
         SpecError: it is neither, or MuJoCo cannot compile it.
@@ -45,10 +52,10 @@ def opened(path: Path) -> Opened:
     with files.reading(path), path.open("rb") as file:
         data = file.read(MAX_BYTES + 1)
     element = _parsed(data)
-    spec, order, notes = _read(path, element)
+    spec, order, notes = _read(path, element, turn)
     model, left_out = _compiled(spec)
     model, root, freed = _freed(spec, model)
-    return Opened(model, root, order, (*notes, *left_out, *freed))
+    return Opened(model, root, meshes_of(spec, model), order, (*notes, *left_out, *freed))
 
 
 def _parsed(data: bytes) -> ElementTree.Element:
@@ -69,10 +76,12 @@ def _parsed(data: bytes) -> ElementTree.Element:
     return element
 
 
-def _read(path: Path, element: ElementTree.Element) -> tuple[mujoco.MjSpec, tuple[str, ...], tuple[str, ...]]:
+def _read(
+    path: Path, element: ElementTree.Element, turn: str
+) -> tuple[mujoco.MjSpec, tuple[str, ...], tuple[str, ...]]:
     """Return the file as a spec that is not compiled, its joints in its order, and notes."""
     if element.tag == "robot":
-        cured, order, notes = urdf.cured(element, path.parent)
+        cured, order, notes = urdf.cured(element, path.parent, turn)
         return _said(lambda: mujoco.MjSpec.from_string(cured)), order, notes
     spec = _said(lambda: mujoco.MjSpec.from_file(str(path)))
     _drop_looks(spec)
@@ -135,13 +144,12 @@ def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjModel, tuple[str, ...]]:
 def _unread(spec: mujoco.MjSpec) -> Iterator[str]:
     """Yield the names of meshes that do not compile alone."""
     for mesh in spec.meshes:
-        alone = mujoco.MjSpec()
-        alone.modelfiledir, alone.meshdir = spec.modelfiledir, spec.meshdir
         try:
-            alone.add_mesh(name=mesh.name, file=mesh.file, scale=mesh.scale, inertia=mesh.inertia)
+            alone = mujoco.MjSpec.from_file(str(file_of(spec, mesh)))
+            alone.meshes[0].name, alone.meshes[0].inertia = mesh.name, mesh.inertia
             alone.worldbody.add_geom(type=_MESH, meshname=mesh.name)
             alone.compile()
-        except ValueError:
+        except (ValueError, IndexError):
             yield mesh.name
 
 

@@ -16,6 +16,7 @@ from arc_suite.robots.spec import SpecError
 _AGREE = 0.15  # by which feet on the floor may differ
 _HANG = 0.5  # of the deepest foot: a chain that reaches lower is a leg that hangs
 _LEAST_MARGIN = 0.02  # of the centre of mass inside the feet
+_BESIDE = 0.15  # of the centre of mass beside the line between two feet, which may be long
 
 _STRAIGHT = 0.96  # of a leg's length: one that is longer has no knee to bend
 _LEAST_THIGH = 0.2  # of the standing height; a shorter one does not make a leg straight
@@ -73,6 +74,10 @@ class Stance(NamedTuple):
     origin: str
 
 
+class NoStance(SpecError):
+    """No pose in which a robot stands."""
+
+
 class _Unfit(Exception):
     """A pose in which the robot does not stand; the message says why."""
 
@@ -89,7 +94,8 @@ def stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
         feet: names of bodies or geoms at the ends of the legs; none to find them.
 
     Raises:
-        SpecError: no pose stands, or a name is not in the file.
+        NoStance: no pose stands.
+        SpecError: a name is not in the file, or its pose has no legs.
     """
     ends = _named_feet(robot, feet) if feet else None
     if home is not None:
@@ -106,7 +112,7 @@ def stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
         except _Unfit as reason:
             reasons.append(f"{origin}: {reason}")
     cure = "name a keyframe that stands with --home, or the feet with --feet"
-    raise SpecError(f"no standing pose ({'; '.join(reasons)}); {cure}")
+    raise NoStance(f"no standing pose ({'; '.join(reasons)}); {cure}")
 
 
 def _known(name: str, valid: Sequence[str], kind: str) -> str:
@@ -248,10 +254,9 @@ def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], heigh
     rest = [geom for geom, chain in chains.items() if not own.intersection(chain)]
     if rest and tree.lowest(robot, data, rest)[0][2] < -height:
         raise _Unfit("the torso is lower than the feet")
-    if len(legs) > 2:
-        margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
-        if margin < _LEAST_MARGIN * height:
-            raise _Unfit(f"the centre of mass is {margin:.3g} m inside of the feet")
+    margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
+    if margin < (_LEAST_MARGIN if len(legs) > 2 else -_BESIDE) * height:
+        raise _Unfit(f"the centre of mass is {margin:.3g} m inside of the feet")
 
 
 def _check_knees(data: mujoco.MjData, legs: tuple[Leg, ...], height: float) -> None:

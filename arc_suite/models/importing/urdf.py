@@ -1,5 +1,6 @@
 """Cures of URDF: what MuJoCo refuses, and what gets lost on the way into it."""
 
+import itertools
 import math
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -9,6 +10,10 @@ import numpy as np
 
 from arc_suite.robots.spec import SpecError
 
+LEVEL = "0 0 0"
+TURNS = (f"{math.pi / 2} 0 {math.pi / 2}", f"{math.pi / 2} 0 0")  # y points up, and z or x ahead
+
+_OWN = "arc_suite_"  # begins the names of links that are added
 _READABLE = (".stl", ".obj", ".msh")
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating")
 _DENSITY = 1000.0  # kg/m^3, of the ball that a link without inertia is taken for
@@ -26,12 +31,13 @@ _COMPILER = {
 }
 
 
-def cured(robot: ElementTree.Element, folder: Path) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+def cured(robot: ElementTree.Element, folder: Path, turn: str = LEVEL) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
     """Return a URDF that MuJoCo reads, its moving joints in the order of the file, and notes.
 
     Args:
         robot: the top element, which is changed.
         folder: of the file; meshes are searched there and upwards.
+        turn: roll, pitch and yaw of the base in the torso's frame, for files whose z axis does not point up.
 
     Raises:
         SpecError: it is no URDF; the message names the link or joint.
@@ -45,7 +51,7 @@ def cured(robot: ElementTree.Element, folder: Path) -> tuple[str, tuple[str, ...
     notes = [*_cure_shapes(links, folder), *_cure_inertias(links), *_mimics(joints)]
     for name, joint in joints.items():
         _check_joint(name, joint, links)
-    _add_root(robot, links, joints)
+    _add_root(robot, links, joints, turn)
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
     order = tuple(name for name, joint in joints.items() if joint.get("type") not in ("fixed", "floating"))
     return ElementTree.tostring(robot, encoding="unicode"), order, tuple(notes)
@@ -164,7 +170,7 @@ def _check_joint(name: str, joint: ElementTree.Element, links: dict[str, Element
             raise SpecError(f"joint {name!r}: its {end} is no link of the file: {link!r}")
 
 
-def _add_root(robot: ElementTree.Element, links: dict, joints: dict) -> None:
+def _add_root(robot: ElementTree.Element, links: dict, joints: dict, turn: str) -> None:
     """Have the base float on an empty link, unless it floats: MuJoCo welds the base of a URDF to the world."""
     if any(joint.get("type") == "floating" for joint in joints.values()):
         return
@@ -172,8 +178,13 @@ def _add_root(robot: ElementTree.Element, links: dict, joints: dict) -> None:
     bases = [name for name in links if name not in children]
     if len(bases) != 1:
         raise SpecError(f"expected one link without a parent, got {len(bases)}: {', '.join(bases[:4]) or 'a loop'}")
-    world, root = (f"arc_suite_{name}" for name in ("world", "root"))
-    ElementTree.SubElement(robot, "link", name=world)
-    joint = ElementTree.SubElement(robot, "joint", name=root, type="floating")
-    ElementTree.SubElement(joint, "parent", link=world)
-    ElementTree.SubElement(joint, "child", link=bases[0])
+    chain = [f"{_OWN}world", bases[0]] if turn == LEVEL else [f"{_OWN}world", f"{_OWN}torso", bases[0]]
+    for link in chain[:-1]:
+        ElementTree.SubElement(robot, "link", name=link)
+    for parent, child in itertools.pairwise(chain):
+        kind = "floating" if parent == chain[0] else "fixed"
+        joint = ElementTree.SubElement(robot, "joint", name=f"{parent}_joint", type=kind)
+        ElementTree.SubElement(joint, "parent", link=parent)
+        ElementTree.SubElement(joint, "child", link=child)
+        if kind == "fixed":
+            ElementTree.SubElement(joint, "origin", rpy=turn)

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 import mujoco
 import numpy as np
 
+from arc_suite.models.importing.meshes import Mesh
 from arc_suite.models.importing.naming import Names
 from arc_suite.models.importing.poses import Leg, Stance
 from arc_suite.models.importing.tree import HINGE, Robot
@@ -22,7 +23,6 @@ _GEOMS = {
     mujoco.mjtGeom.mjGEOM_CYLINDER: ("cylinder", 2),
     mujoco.mjtGeom.mjGEOM_ELLIPSOID: ("ellipsoid", 3),
     mujoco.mjtGeom.mjGEOM_BOX: ("box", 3),
-    mujoco.mjtGeom.mjGEOM_MESH: ("mesh", 0),
 }
 
 # What MuJoCo takes for attributes that are left out.
@@ -34,7 +34,7 @@ _JOINT = {
     **{f"{name}{what}": value for name, value in _SOFTNESS.items() for what in ("limit", "friction")},
 }  # fmt: skip
 _GEOM = {
-    "pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0), "condim": 3, "priority": 0, "solmix": 1.0, "margin": 0.0,
+    "condim": 3, "priority": 0, "solmix": 1.0, "margin": 0.0,
     "gap": 0.0, "friction": (1.0, 0.005, 0.0001), "adhesion": 0.0, "surfacevel": (0.0,) * 6, **_SOFTNESS,
 }  # fmt: skip
 
@@ -67,18 +67,17 @@ _FLAGS = {
 }
 
 
-def source(robot: Robot, stance: Stance, names: Names) -> str:
+def source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, Mesh]) -> str:
     """Return the MJCF of a robot: one free body, its joints and colliders, a site in each foot, the keyframe `home`."""
     root = ElementTree.Element("mujoco")
     _add(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     _add_option(root, robot.model)
-    asset = _add(root, "asset")
+    placed = _add_meshes(root, robot, meshes)
     world = _add(root, "worldbody")
     elements = {}
     for body in robot.bodies:
         parent = world if body == robot.root else elements[int(robot.model.body_parentid[body])]
-        elements[body] = _add_body(parent, robot, body, names)
-    _add_meshes(asset, robot)
+        elements[body] = _add_body(parent, robot, body, names, placed)
     _add(elements[robot.root], "site", name="torso", size=_text(0.01), **SITE)
     for label, leg in zip(names.legs, stance.legs, strict=True):
         _add_leg_bodies(elements, robot, stance, names, label, leg)
@@ -114,7 +113,26 @@ def _add_option(root: ElementTree.Element, model: mujoco.MjModel) -> None:
         _add(element, "flag", **flags)
 
 
-def _add_body(parent: ElementTree.Element, robot: Robot, body: int, names: Names) -> ElementTree.Element:
+def _add_meshes(root: ElementTree.Element, robot: Robot, meshes: dict[int, Mesh]) -> dict[int, dict[str, str]]:
+    """Add the meshes of colliders, and return the attributes of their geoms."""
+    own = {geom: meshes[geom] for geom in robot.colliders if geom in meshes}
+    asset = _add(root, "asset") if own else root
+    names = {}
+    for mesh in own.values():
+        key = tuple(mesh.attributes.items())
+        if key not in names:
+            names[key] = f"mesh{len(names)}"
+            _add(asset, "mesh", name=names[key], **mesh.attributes)
+    return {
+        geom: {"type": "mesh", "mesh": names[tuple(mesh.attributes.items())]}
+        | _differing(_BODY, {"pos": mesh.position, "quat": mesh.orientation})
+        for geom, mesh in own.items()
+    }
+
+
+def _add_body(
+    parent: ElementTree.Element, robot: Robot, body: int, names: Names, meshes: dict[int, dict[str, str]]
+) -> ElementTree.Element:
     """Add a body with its inertia, joints and colliders."""
     model = robot.model
     given = {"pos": model.body_pos[body], "quat": model.body_quat[body], "gravcomp": model.body_gravcomp[body]}
@@ -128,7 +146,7 @@ def _add_body(parent: ElementTree.Element, robot: Robot, body: int, names: Names
         _add(element, "joint", name=names.joints.get(joint, "root"), **own)
     own = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
     for place, geom in enumerate(own):
-        _add(element, "geom", name=f"{names.bodies[body]}_geom{place}", **_geom(model, geom))
+        _add(element, "geom", name=f"{names.bodies[body]}_geom{place}", **_geom(model, geom, meshes.get(geom)))
     return element
 
 
@@ -171,24 +189,21 @@ def _joint(model: mujoco.MjModel, joint: int) -> dict[str, str]:
     return attributes | _differing(_JOINT, given)
 
 
-def _geom(model: mujoco.MjModel, geom: int) -> dict[str, str]:
-    """Return the attributes of a collider, which touches the floor alone and weighs nothing."""
-    kind, sizes = _GEOMS[mujoco.mjtGeom(model.geom_type[geom])]
+def _geom(model: mujoco.MjModel, geom: int, mesh: dict[str, str] | None) -> dict[str, str]:
+    """Return the attributes of a collider, which touches the floor alone and weighs nothing.
+
+    Args:
+        model: of the file.
+        geom: the collider.
+        mesh: its shape and place if it is a mesh.
+    """
     given = {name: getattr(model, f"geom_{name}")[geom] for name in _GEOM}
-    shape = {"type": kind}
-    if kind == "mesh":
-        shape["mesh"] = _mesh_name(model, geom)
-    else:
-        shape["size"] = _text(model.geom_size[geom][:sizes])
-    return {**shape, "mass": "0", "contype": "1", "conaffinity": "0", **_differing(_GEOM, given)}
-
-
-def _mesh_name(model: mujoco.MjModel, geom: int) -> str:
-    return f"mesh{model.geom_dataid[geom]}"
-
-
-def _add_meshes(asset: ElementTree.Element, robot: Robot) -> None:
-    """Add the meshes of colliders."""
+    touch = {"mass": "0", "contype": "1", "conaffinity": "0", **_differing(_GEOM, given)}
+    if mesh is None:
+        kind, sizes = _GEOMS[mujoco.mjtGeom(model.geom_type[geom])]
+        place = {"pos": model.geom_pos[geom], "quat": model.geom_quat[geom]}
+        mesh = {"type": kind, "size": _text(model.geom_size[geom][:sizes]), **_differing(_BODY, place)}
+    return mesh | touch
 
 
 def _add_leg_bodies(

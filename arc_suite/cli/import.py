@@ -1,0 +1,40 @@
+"""Import a legged robot from MJCF or URDF, and print what it has become.
+
+  arc-suite import go2.xml -o go2.json
+  arc-suite import mini_cheetah.xml --home crouch --feet FL_foot,FR_foot,RL_foot,RR_foot -o cheetah.json
+
+The file that is written is a body with the physics of the robot's file, to the last bit: on the floor of the
+suite, without contacts of the robot with itself. It needs no other file. A line each tells the legs, the
+order of the joints, the standing pose, the limits of the motors, what was repaired and what is left out.
+
+Other programs, and `arc_suite.load`, take the robot's own file, too.
+"""
+
+import contextlib
+
+from absl import flags
+
+from arc_suite import checks, files
+from arc_suite.models.importing import imported
+from arc_suite.robots.spec_files import body_to_json
+
+FLAGS = flags.FLAGS
+flags.DEFINE_string("output", None, "File to write the body to, in JSON. [default: none]", short_name="o")
+flags.DEFINE_string("home", None, "Keyframe of the file in which the robot stands. [default: one that stands]")
+flags.DEFINE_list("feet", [], "Bodies or geoms at the ends of the legs. [default: those that reach lowest]")
+
+
+def main(robot: str | None = None) -> None:
+    """Import the robot, write the body, and print a line for each thing to know."""
+    if robot is None:
+        raise ValueError("expected a file in MJCF or URDF; see --help")
+    with contextlib.ExitStack() as stack:
+        if FLAGS.output is not None:
+            checks.extension(FLAGS.output, [".json"])
+            output = stack.enter_context(files.writing(FLAGS.output))
+        body, notes = imported(robot, FLAGS.home, [foot for foot in FLAGS.feet if foot])
+        if FLAGS.output is not None:
+            output.write_text(body_to_json(body), encoding="utf-8")
+    print(f"{robot}: {body.name}")
+    for note in notes:
+        print(f"  {note}")
