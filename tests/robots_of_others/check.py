@@ -94,8 +94,8 @@ def row(robot: zoo.Robot, folder: pathlib.Path) -> Row:
     if found is None:
         return Row(robot, refusal)
     body = found.body
-    same, lines = reference.same_bits(path, body), []
-    walks = {}
+    same, line = attempt(reference.same_bits, path, body)
+    lines, walks = [line], {}
     if robot.group != zoo.ODD:
         for preset, task in WALKS.items():
             walks[preset], line = attempt(walk, body, task, preset)

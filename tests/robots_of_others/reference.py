@@ -21,10 +21,15 @@ def same_bits(path: pathlib.Path, body: Body) -> int:
     Motors are off, parts of the robot do not touch one another, and tendons and equalities are out of both.
 
     Args:
-        path: of an MJCF, or of a URDF, which is compared as `importing.urdf` repairs it.
+        path: of an MJCF, or of a URDF, which is compared as `importing.urdf` repairs it, turned in any of its ways.
         body: as imported from it.
     """
-    ours, theirs = _model(mujoco.MjSpec.from_string(body.source)), _model(_robot(path))
+    turns = (urdf.LEVEL, *urdf.TURNS) if path.suffix == ".urdf" else (urdf.LEVEL,)
+    return max(_same(body, _robot(path, turn)) for turn in turns)
+
+
+def _same(body: Body, file: mujoco.MjSpec) -> int:
+    ours, theirs = _model(mujoco.MjSpec.from_string(body.source)), _model(file)
     if (ours.nq, ours.nv) != (theirs.nq, theirs.nv):
         return 0
     home, random = ours.key("home").qpos, np.random.default_rng(0)
@@ -45,10 +50,10 @@ def _equal(ours: mujoco.MjModel, theirs: mujoco.MjModel, home: np.ndarray, rando
     return np.isfinite(found[0]).all() and np.array_equal(*found)
 
 
-def _robot(path: pathlib.Path) -> mujoco.MjSpec:
+def _robot(path: pathlib.Path, turn: str) -> mujoco.MjSpec:
     """Return the file's robot alone, free to move."""
     if path.suffix == ".urdf":
-        cured, *_ = urdf.cured(ElementTree.parse(path).getroot(), path.parent)
+        cured, *_ = urdf.cured(ElementTree.parse(path).getroot(), path.parent, turn)
         spec = mujoco.MjSpec.from_string(cured)
     else:
         spec = mujoco.MjSpec.from_file(str(path))

@@ -129,6 +129,8 @@ def _name(robot: Robot, path: Path) -> str:
 
 def _simulation(timestep: float) -> Simulation:
     """Return the constants: the file's timestep, or the next smaller one that divides a control step."""
+    if timestep <= 0.0:
+        raise SpecError(f"option: timestep: expected a number above 0, got {timestep:g}")
     substeps = max(2, math.ceil(_CONTROL_STEP / min(timestep, _LARGEST_TIMESTEP) - 1e-6))
     step = _CONTROL_STEP / substeps
     return Simulation(timestep=step, contact_time=max(0.02, 2.0 * step), contact_margin=0.0, substeps=substeps)
