@@ -18,7 +18,7 @@
 #   docs, notebooks     links of the site, its front page in Chromium; the notebooks of examples
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
-#   robots              robots of others, in wheels (400 MB): they come in, with the same bits, and walk; minutes
+#   robots              robots of others, in wheels (320 MB): they come in, with the same bits, and walk; minutes
 #   bodies, survey, following, clip-sets    many bodies: bit-equality, walks, commands, clips; minutes to half an hour
 #   soak, fuzz, loopholes, mutants    memory over two million steps; damaged files; policies that cheat; planted mistakes (hours)
 

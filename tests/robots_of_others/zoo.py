@@ -88,6 +88,7 @@ ROBOTS = (
     Robot("solo8", "example_robot_data", "solo_description/robots/solo.urdf", NEW),
     Robot("a1_pybullet", "pybullet", "a1/a1.urdf", NEW),
     Robot("aliengo_pybullet", "pybullet", "aliengo/aliengo.urdf", NEW),
+    Robot("laikago_toes", "pybullet", "laikago/laikago_toes.urdf", NEW),
     Robot("spirit40", "pybullet", "quadruped/spirit40.urdf", NEW),
     Robot("vision60", "pybullet", "quadruped/vision60.urdf", NEW),
     Robot("ant_pybullet", "pybullet", "mjcf/ant.xml", NEW),
@@ -98,7 +99,6 @@ ROBOTS = (
     Robot("neuromechfly", "flygym_gymnasium", "mjcf/neuromechfly_seqik_kinorder_ypr.xml", ODD, "the torso"),
     Robot("minitaur", "pybullet", "quadruped/minitaur.urdf", ODD, "no standing pose"),
     Robot("microtaur", "pybullet", "quadruped/microtaur/microtaur.urdf", ODD, "origin rpy: expected 3 numbers"),
-    Robot("laikago_toes", "pybullet", "laikago/laikago_toes.urdf", ODD, "no standing pose"),
 )
 
 
