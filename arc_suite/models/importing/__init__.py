@@ -98,7 +98,7 @@ def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[Opened
 
     def tried(turn: str) -> tuple[Opened, Robot, Stance]:
         file = opening.opened(path, turn)
-        robot = tree.robot_of(file.model, file.root)
+        robot = tree.robot_of(file.model, file.root, file.notes)
         return file, robot, poses.stance(robot, home, feet)
 
     try:

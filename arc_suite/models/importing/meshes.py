@@ -11,9 +11,11 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite.robots.spec import MAX_SOURCE
+
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 
-MAX_TEXT = 3 << 19  # characters of all meshes of a body; beyond, the largest are reduced to their hulls
+MAX_TEXT = MAX_SOURCE - (1 << 17)  # characters of all meshes of a body; beyond, the largest are reduced to their hulls
 
 _INERTIAS = {
     mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX: "convex",
@@ -52,14 +54,14 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
     if not geoms:
         return {}
     names = {geom: model.mesh(int(model.geom_dataid[geom])).name for geom in geoms}
-    assets = {name: _asset(spec, spec.mesh(name)) for name in dict.fromkeys(names.values())}
-    for name in _too_large(assets):
-        assets[name] = None
+    wholes = {name: _asset(spec, spec.mesh(name)) for name in dict.fromkeys(names.values())}
+    hulls = {name: _hull(model, geom) for geom, name in names.items()}
+    whole = _that_fit(wholes, hulls)
     places = _places(spec)
     return {
-        geom: Mesh(name, True, assets[name], places.geom_pos[geom], places.geom_quat[geom])
-        if assets[name]
-        else Mesh(name, False, _hull(model, geom), model.geom_pos[geom], model.geom_quat[geom])
+        geom: Mesh(name, True, wholes[name], places.geom_pos[geom], places.geom_quat[geom])
+        if name in whole
+        else Mesh(name, False, hulls[name], model.geom_pos[geom], model.geom_quat[geom])
         for geom, name in names.items()
     }
 
@@ -95,15 +97,15 @@ def _asset(spec: mujoco.MjSpec, mesh) -> dict[str, str]:
     return {name: text for name, text in attributes.items() if text}
 
 
-def _too_large(assets: dict[str, dict[str, str]]) -> list[str]:
-    """Return the names of the largest meshes, without which the others are short enough."""
-    sizes = {name: sum(map(len, attributes.values())) for name, attributes in assets.items()}
-    total, large = sum(sizes.values()), []
-    for name in sorted(sizes, key=lambda name: -sizes[name]):
-        if total > MAX_TEXT:
-            total -= sizes[name]
-            large.append(name)
-    return large
+def _that_fit(wholes: dict[str, dict[str, str]], hulls: dict[str, dict[str, str]]) -> set[str]:
+    """Return the names of meshes that stay whole, so that the text is short enough: all but the largest."""
+    whole, reduced = ({name: sum(map(len, mesh.values())) for name, mesh in kind.items()} for kind in (wholes, hulls))
+    total = sum(whole.values())
+    for name in sorted(whole, key=lambda name: -whole[name]):
+        if total <= MAX_TEXT:
+            break
+        total += reduced[name] - whole.pop(name)
+    return set(whole)
 
 
 def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:

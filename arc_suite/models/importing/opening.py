@@ -17,6 +17,7 @@ MAX_BYTES = 1 << 24  # of a file; the largest of 45 has 200 kB
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
 _ENTITY = re.compile(rb"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
+_LINE = re.compile(r",? line \d+")
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 
 
@@ -82,18 +83,24 @@ def _read(
     """Return the file as a spec that is not compiled, its joints in its order, and notes."""
     if element.tag == "robot":
         cured, order, notes = urdf.cured(element, path.parent, turn)
-        return _said(lambda: mujoco.MjSpec.from_string(cured)), order, notes
+        return _said(lambda: mujoco.MjSpec.from_string(cured), lines=False), order, notes
     spec = _said(lambda: mujoco.MjSpec.from_file(str(path)))
     _drop_looks(spec)
     return spec, (), ()
 
 
-def _said(work):
-    """Return what `work` returns; MuJoCo's errors become a line."""
+def _said(work, lines: bool = True):
+    """Return what `work` returns; MuJoCo's errors become a line.
+
+    Args:
+        work: takes nothing.
+        lines: whether the numbers of lines in MuJoCo's errors are those of the file.
+    """
     try:
         return work()
     except ValueError as error:
-        raise SpecError(f"MuJoCo cannot read it: {checks.quoted(error)}") from None
+        reason = checks.quoted(error)
+        raise SpecError(f"MuJoCo cannot read it: {reason if lines else _LINE.sub('', reason)}") from None
 
 
 def _drop_looks(spec: mujoco.MjSpec) -> None:

@@ -105,14 +105,15 @@ def stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
             return _standing(robot, robot.model.key_qpos[key], f"keyframe {home}", ends, strict=False)
         except _Unfit as reason:
             raise SpecError(f"keyframe {home}: {reason}") from None
-    reasons = []
-    for origin, qpos in _poses(robot, ends):
-        try:
-            return _standing(robot, qpos, origin, ends)
-        except _Unfit as reason:
-            reasons.append(f"{origin}: {reason}")
+    reasons, poses = [], list(_poses(robot, ends))
+    for bent in (True, False):  # better straight legs than none
+        for origin, qpos in poses:
+            try:
+                return _standing(robot, qpos, origin, ends, bent)
+            except _Unfit as reason:
+                reasons.append(f"{origin}: {reason}")
     cure = "name a keyframe that stands with --home, or the feet with --feet"
-    raise NoStance(f"no standing pose ({'; '.join(reasons)}); {cure}")
+    raise NoStance(f"no standing pose ({'; '.join(dict.fromkeys(reasons))}); {cure}")
 
 
 def _known(name: str, valid: Sequence[str], kind: str) -> str:
@@ -159,6 +160,7 @@ def _poses(robot: Robot, ends: dict | None) -> Iterator[tuple[str, np.ndarray]]:
         if found is not None:
             yield "search for bent knees", found
     yield "middle of the ranges", _middle(robot)
+    yield "zero angles within the ranges", robot.clipped(model.qpos0)
 
 
 def _middle(robot: Robot) -> np.ndarray:
@@ -171,8 +173,18 @@ def _middle(robot: Robot) -> np.ndarray:
     return robot.clipped(qpos)
 
 
-def _standing(robot: Robot, qpos: np.ndarray, origin: str, ends: dict | None, strict: bool = True) -> Stance:
+def _standing(
+    robot: Robot, qpos: np.ndarray, origin: str, ends: dict | None, bent: bool = True, strict: bool = True
+) -> Stance:
     """Return the stance of a pose.
+
+    Args:
+        robot: the file's.
+        qpos: (nq,) the pose.
+        origin: where it comes from.
+        ends: colliders of feet that are named, by chain; None to find them.
+        bent: whether straight legs are refused.
+        strict: whether anything is refused.
 
     Raises:
         _Unfit: the robot does not stand in it; if not strict, only if it has no legs.
@@ -193,6 +205,7 @@ def _standing(robot: Robot, qpos: np.ndarray, origin: str, ends: dict | None, st
     if strict:
         _check_feet(robot, found, legs, height)
         _check_torso(robot, data, legs, height)
+    if strict and bent:
         _check_knees(data, legs, height)
     return Stance(data.qpos.copy(), legs, float(height), origin)
 

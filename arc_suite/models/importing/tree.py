@@ -65,8 +65,13 @@ class Robot(NamedTuple):
         return data
 
 
-def robot_of(model: mujoco.MjModel, root: int) -> Robot:
+def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Robot:
     """Return the robot whose torso is a body with a free joint.
+
+    Args:
+        model: of the file.
+        root: body of the torso.
+        notes: what was left out of the file, for an error.
 
     Raises:
         SpecError: it has ball joints, or nothing that collides.
@@ -89,7 +94,7 @@ def robot_of(model: mujoco.MjModel, root: int) -> Robot:
     if balls:
         raise SpecError(f"joint {balls[0]!r} is a ball joint; expected hinges")
     if not robot.colliders:
-        raise SpecError("no shape collides with anything; a leg needs one at its end")
+        raise SpecError("; ".join(("no shape collides with anything: a leg needs one at its end", *notes)))
     return robot
 
 

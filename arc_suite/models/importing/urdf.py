@@ -1,5 +1,6 @@
 """Cures of URDF: what MuJoCo refuses, and what gets lost on the way into it."""
 
+import collections
 import itertools
 import math
 import xml.etree.ElementTree as ElementTree
@@ -16,7 +17,14 @@ TURNS = (f"{math.pi / 2} 0 {math.pi / 2}", f"{math.pi / 2} 0 0")  # y points up,
 _OWN = "arc_suite_"  # begins the names of links that are added
 _READABLE = (".stl", ".obj", ".msh")
 _KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating")
+_LEAST = 1e-6  # of the inertia of a ball of the link's mass; a smaller one is none
+_LIGHT = 1e-4  # of the robot's mass, of a link that moves and has none
 _DENSITY = 1000.0  # kg/m^3, of the ball that a link without inertia is taken for
+_JOINT_NUMBERS = {
+    "axis": {"xyz": 3},
+    "limit": dict.fromkeys(("lower", "upper", "effort", "velocity"), 1),
+    "dynamics": dict.fromkeys(("damping", "friction"), 1),
+}
 _SCHEMES = ("package://", "file://", "model://")
 _DIAGONAL, _PRODUCTS = ("ixx", "iyy", "izz"), ("ixy", "ixz", "iyz")
 _ROUNDING = 1e-9  # of inertias in files, as a share of the largest
@@ -48,9 +56,9 @@ def cured(robot: ElementTree.Element, folder: Path, turn: str = LEVEL) -> tuple[
         for element in robot.findall(tag):
             robot.remove(element)
     links, joints = _named(robot, "link"), _named(robot, "joint")
-    notes = [*_cure_shapes(links, folder), *_cure_inertias(links), *_mimics(joints)]
     for name, joint in joints.items():
         _check_joint(name, joint, links)
+    notes = [*_cure_shapes(links, folder), *_cure_inertias(links), *_cure_masses(links, joints), *_mimics(joints)]
     _add_root(robot, links, joints, turn)
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", _COMPILER)
     order = tuple(name for name, joint in joints.items() if joint.get("type") not in ("fixed", "floating"))
@@ -138,15 +146,20 @@ def _cure_inertias(links: dict[str, ElementTree.Element]) -> Iterator[str]:
         least, middle, most = np.linalg.eigvalsh(_matrix(numbers))
         if least + middle < (1.0 - _ROUNDING) * most:  # the compiler then balances them
             repaired.append(name)
-        if least <= _ROUNDING * most:
+        ball = _ball(weight)
+        if least <= max(_ROUNDING * most, _LEAST * ball):
             repaired.append(name)
-            ball = 0.4 * weight * (0.75 * weight / (math.pi * _DENSITY)) ** (2.0 / 3.0)
             values = dict.fromkeys(_PRODUCTS, "0")
-            values |= {key: repr(numbers[key] if numbers[key] > 0.0 else ball) for key in _DIAGONAL}
+            values |= {key: repr(numbers[key] if numbers[key] > _LEAST * ball else ball) for key in _DIAGONAL}
         for key, text in values.items():
             inertia.set(key, text)
     if repaired:
         yield f"repaired: inertias of {len(set(repaired))} links that no solid has, such as of {repaired[0]}"
+
+
+def _ball(mass: float) -> float:
+    """Return the moment of inertia of a ball, kg m^2."""
+    return 0.4 * mass * (0.75 * mass / (math.pi * _DENSITY)) ** (2.0 / 3.0)
 
 
 def _matrix(numbers: dict[str, float]) -> np.ndarray:
@@ -160,6 +173,37 @@ def _mimics(joints: dict[str, ElementTree.Element]) -> Iterator[str]:
         yield f"left out: {len(found)} mimic joints move on their own, such as {found[0]}"
 
 
+def _cure_masses(links: dict[str, ElementTree.Element], joints: dict[str, ElementTree.Element]) -> Iterator[str]:
+    """Give links that move and weigh nothing, fixed ones included, a small mass; yield a note of these."""
+    masses = {name: float(link.find("inertial/mass").get("value")) for name, link in _weighed(links)}
+    fixed, moving = collections.defaultdict(list), []
+    for joint in joints.values():
+        parent, child = (joint.find(end).get("link") for end in ("parent", "child"))
+        fixed[parent] += [child] if joint.get("type") == "fixed" else []
+        moving += [child] if joint.get("type") != "fixed" else []
+    light = [name for name in moving if not any(masses.get(link) for link in _cluster(name, fixed))]
+    for name in light:
+        mass = _LIGHT * sum(masses.values())
+        inertial = ElementTree.SubElement(links[name], "inertial")
+        ElementTree.SubElement(inertial, "mass", value=repr(mass))
+        numbers = dict.fromkeys(_DIAGONAL, repr(_ball(mass))) | dict.fromkeys(_PRODUCTS, "0")
+        ElementTree.SubElement(inertial, "inertia", numbers)
+    if light:
+        yield f"repaired: {len(light)} links that move and weigh nothing get {mass:.2g} kg, such as {light[0]}"
+
+
+def _weighed(links: dict[str, ElementTree.Element]) -> Iterator[tuple[str, ElementTree.Element]]:
+    return ((name, link) for name, link in links.items() if link.find("inertial") is not None)
+
+
+def _cluster(name: str, fixed: dict[str, list[str]]) -> list[str]:
+    """Return a link and all that are fixed to it."""
+    found = [name]
+    for link in found:
+        found += [child for child in fixed[link] if child not in found]
+    return found
+
+
 def _check_joint(name: str, joint: ElementTree.Element, links: dict[str, ElementTree.Element]) -> None:
     if joint.get("type") not in _KINDS:
         raise SpecError(f"joint {name!r}: expected a type out of {', '.join(_KINDS)}, got {joint.get('type')!r}")
@@ -168,6 +212,14 @@ def _check_joint(name: str, joint: ElementTree.Element, links: dict[str, Element
         link = None if element is None else element.get("link")
         if link not in links:
             raise SpecError(f"joint {name!r}: its {end} is no link of the file: {link!r}")
+    tags = [element.tag for element in joint]
+    twice = next((tag for tag in tags if tags.count(tag) > 1), None)
+    if twice is not None:
+        raise SpecError(f"joint {name!r}: expected one element {twice!r}, got {tags.count(twice)}")
+    for tag, keys in _JOINT_NUMBERS.items():
+        element = joint.find(tag)
+        for key in [] if element is None else keys:
+            _numbers(f"joint {name!r}: {tag} {key}", element.get(key, "0" if tag != "axis" else "1 0 0"), keys[key])
 
 
 def _add_root(robot: ElementTree.Element, links: dict, joints: dict, turn: str) -> None:
