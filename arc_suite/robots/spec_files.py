@@ -42,12 +42,10 @@ def load_body(path: str | os.PathLike) -> Body:
     with files.reading(path), Path(path).open("rb") as file:
         data = file.read(MAX_IMPORTED + 1)
     try:
-        if len(data) > MAX_IMPORTED:
-            raise SpecError(f"expected at most {MAX_BYTES} bytes, or {MAX_IMPORTED} of a body with a source")
-        body = body_from_json(data)
-        if body.source is None and len(data) > MAX_BYTES:
-            raise SpecError(f"expected at most {MAX_BYTES} bytes")
-        return body
+        most = MAX_IMPORTED if b'"source"' in data else MAX_BYTES
+        if len(data) > most:
+            raise SpecError(f"expected at most {most} bytes")
+        return body_from_json(data)
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
 

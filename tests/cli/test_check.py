@@ -59,7 +59,7 @@ def test_a_file_that_holds_no_body_is_one_line(path):
     write(path, standing_height=-1)
     line = "torso.standing_height: expected a number from 1e-06 to 100, got -1"
     programs.refused(check(path), f"arc-suite check: {path}: {line}\n")
-    line = "expected a body in JSON, got XML: MJCF and URDF cannot be read; see docs/bodies.md"
+    line = "expected a body in JSON, got XML; the name of an MJCF file ends in .xml, that of a URDF file in .urdf"
     for text in ("<mujoco/>", '\n<?xml version="1.0"?>\n<robot name="a"/>'):
         path.write_text(text)
         programs.refused(check(path), f"arc-suite check: {path}: {line}\n")

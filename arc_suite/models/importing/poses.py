@@ -24,6 +24,7 @@ _SOLE = 0.05  # of the standing height, that a foot is high whose shape tells no
 
 # The search for a pose with bent knees.
 _REACH = 0.8  # of the leg's length, from the joint before the last down to the foot
+_ASIDE = 0.0  # of the leg's length, of the foot from where a straight leg has it: a wider stance is steadier
 _BEND = 0.65  # rad, of the thigh at first; the knee bends back twice as much
 _STEPS = 80
 _LARGEST_STEP = 0.2  # rad
@@ -315,7 +316,8 @@ def _bent(robot: Robot, zero: np.ndarray, chain: tuple[int, ...], end: tuple, si
     foot = data.xmat[body].reshape(3, 3).T @ (point - data.xpos[body])
     hip, knee = data.xanchor[chain[-2]].copy(), data.xanchor[chain[-1]].copy()
     length = np.linalg.norm(knee - hip) + np.linalg.norm(point - knee)
-    goal = np.array((hip[0], point[1] if len(chain) > 2 else hip[1], hip[2] - _REACH * length))
+    aside = point[1] + np.sign(point[1]) * _ASIDE * length if len(chain) > 2 else hip[1]
+    goal = np.array((hip[0], aside, hip[2] - _REACH * length))
     places, dofs = [robot.place(joint) for joint in chain], [int(model.jnt_dofadr[joint]) for joint in chain]
     qpos = zero.copy()
     qpos[places[-2:]] = _BEND * sign, -2.0 * _BEND * sign

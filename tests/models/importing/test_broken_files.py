@@ -77,7 +77,12 @@ REFUSED = {
     "a loop": (A1, 'parent link="trunk"/><child link="FR_hip', 'parent link="FR_foot"/><child link="FR_hip', ""),
     "two bases": (A1, "</robot>", '<link name="other"/></robot>', "got 2: base, other"),
     "two links of a name": (A1, '<link name="FL_hip">', '<link name="FR_hip">', "'FR_hip': the name occurs twice"),
-    "a limit that is no number": (A1, 'effort="1000"', 'effort="strong"', "'effort'"),
+    "a limit that is no number": (
+        A1,
+        'effort="1000"',
+        'effort="strong"',
+        "joint 'FR_hip_joint': limit effort: expected 1 number, got 'strong'",
+    ),
     "slides in legs": (HEXAPOD, "revolute", "prismatic", "slide joint; expected hinges"),
     "xacro": (A1, "</robot>", '<l xmlns:x="http://ros.org/wiki/xacro"><x:leg/></l></robot>', "with xacro first"),
     "no links": (A1, None, "<robot/>", "without a link"),

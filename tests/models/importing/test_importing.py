@@ -1,0 +1,238 @@
+"""An imported robot has the file's physics to the last bit, the suite's names, and a sketch that stands as the file."""
+
+import importlib.util
+import pathlib
+import struct
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite import registry
+from arc_suite.models.importing import imported
+from arc_suite.models.standing import stability_margin
+from arc_suite.robots import sources
+from arc_suite.robots.spec import SpecError
+from arc_suite.robots.spec_files import body_from_json, body_to_json
+
+TESTS = pathlib.Path(__file__).parents[2]
+FOLDER = TESTS / "fixtures" / "robots"
+GO2, A1, HEXAPOD = (FOLDER / name for name in ("go2_like.xml", "a1_like.urdf", "hexapod.urdf"))
+THREE = pytest.mark.parametrize("path", [GO2, A1, HEXAPOD], ids=lambda path: path.stem)
+
+# A robot whose hips turn about two axes in one body, with an arm, springs, a mesh, and masses of geoms.
+ODD = """
+<mujoco model="Odd Robot!">
+  <compiler angle="degree"/>
+  <asset><mesh name="hull" file="hull.stl" scale="0.1 0.2 0.1"/></asset>
+  <default>
+    <joint armature="0.01" damping="0.3" range="-80 80" limited="true"/>
+    <position kp="40" kv="1.5" forcerange="-20 20"/>
+  </default>
+  <worldbody>
+    <geom type="plane" size="0 0 1"/>
+    <body name="table" pos="3 0 0"><geom size="0.2"/></body>
+    <body name="base" pos="0.3 0.1 0.5" euler="0 0 30">
+      <geom type="mesh" mesh="hull" pos="0.01 0 0.02" euler="10 20 30" density="2000"/>
+      <geom type="box" size="0.2 0.1 0.02" contype="0" conaffinity="0" mass="2"/>
+      {legs}
+      <body name="arm" pos="0.2 0 0.1"><joint name="Arm joint" type="hinge" axis="0 1 0" stiffness="3" springref="20"/>
+        <geom type="capsule" fromto="0 0 0 0.1 0 0.1" size="0.02"/>
+        <body name="grip" pos="0.1 0 0.1"><joint name="grip" type="slide" axis="1 0 0" range="-0.01 0.02"/>
+          <geom size="0.01" mass="0.05"/></body></body>
+    </body>
+  </worldbody>
+  <actuator>{motors}<motor joint="Arm joint" gear="5" ctrlrange="-1 1" ctrllimited="true"/></actuator>
+</mujoco>"""
+LEG = """
+<body name="{name} thigh" pos="{x} {y} 0" euler="0 {bend} 0">
+  <joint name="{name} roll" axis="1 0 0" frictionloss="0.2"/><joint name="{name} pitch" axis="0 1 0" ref="10"/>
+  <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.02" margin="0.001"/>
+  <body pos="0 0 -0.2" euler="0 {back} 0"><joint name="{name} knee" axis="0 1 0"/>
+    <geom type="capsule" fromto="0 0 0 0 0 -0.2" size="0.015"/><geom name="{name} tip" size="0.03" pos="0 0 -0.2"/>
+  </body>
+</body>"""
+PLACES = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "HL": (-0.2, 0.1), "HR": (-0.2, -0.1)}
+
+
+def reference():
+    """The program that compares a file and its import, as a module."""
+    spec = importlib.util.spec_from_file_location("reference", TESTS / "robots_of_others" / "reference.py")
+    module = sys.modules.setdefault("reference", importlib.util.module_from_spec(spec))
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture
+def odd(tmp_path):
+    """Write the odd robot with its mesh, motors in another order than joints, and return its path."""
+    points = np.array([(-1, -1, -1), (1.2, -1, -1), (0, 1, -1), (0.1, 0, 0.5)], np.float32)
+    faces = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    rows = [struct.pack("<12fH", 0, 0, 0, *points[list(face)].ravel(), 0) for face in faces]
+    (tmp_path / "hull.stl").write_bytes(bytes(80) + struct.pack("<I", len(faces)) + b"".join(rows))
+    legs = [LEG.format(name=name, x=x, y=y, bend=35, back=-70) for name, (x, y) in PLACES.items()]
+    motors = [f'<position joint="{name} {joint}"/>' for joint in ("knee", "pitch", "roll") for name in PLACES]
+    path = tmp_path / "odd.xml"
+    path.write_text(ODD.format(legs="".join(legs), motors="".join(motors)))
+    return path
+
+
+def model(body):
+    return mujoco.MjModel.from_xml_string(body.source)
+
+
+@THREE
+def test_the_physics_are_the_files_to_the_last_bit(path):
+    assert reference().same_bits(path, imported(path).body) == 200
+
+
+def test_they_are_so_with_meshes_springs_and_masses_of_geoms(odd):
+    body = imported(odd).body
+    assert reference().same_bits(odd, body) == 200
+    assert model(body).body_mass.sum() == pytest.approx(mujoco.MjModel.from_xml_path(str(odd)).body_subtreemass[2])
+
+
+@THREE
+def test_a_file_of_the_body_gives_the_same_body(path):
+    body = imported(path).body
+    assert body_from_json(body_to_json(body)) == body
+    assert sources.check(body) is body
+
+
+@THREE
+def test_parts_and_joints_have_the_names_and_places_of_the_sketch(path):
+    body = imported(path).body
+    found = model(body)
+    data = mujoco.MjData(found)
+    mujoco.mj_resetDataKeyframe(found, data, 0)
+    mujoco.mj_kinematics(found, data)
+    assert list(data.qpos[:7]) == [0, 0, body.torso.standing_height, 1, 0, 0, 0]
+    origin = data.body("torso").xpos
+    for leg in body.legs:
+        for link, point in zip(leg.links, leg.points[:-1], strict=True):
+            joint = data.joint(leg.full_name(link.joint))
+            assert point == pytest.approx(joint.xanchor - origin, abs=2e-4)
+            assert link.joint.axis == pytest.approx(joint.xaxis)
+            assert found.body(leg.full_name(link)).id >= 0
+        assert leg.foot_position == pytest.approx(data.body(leg.full_name(leg.foot)).xpos - origin)
+        assert data.site(leg.full_name(leg.foot)).xpos[2] == pytest.approx(leg.foot.radius, abs=0.02)
+        assert found.site(leg.full_name(leg.foot)).size[0] == leg.foot.radius
+    assert found.joint("root").type == mujoco.mjtJoint.mjJNT_FREE
+    assert (found.geom_contype == 1).all() and (found.geom_conaffinity == 0).all()
+    assert found.nu == found.nsensor == found.ncam == found.nlight == found.ntendon == found.neq == 0
+
+
+@THREE
+def test_legs_are_named_from_front_to_rear_and_all_stand(path):
+    body = imported(path).body
+    feet = {leg.name: leg.foot_position for leg in body.legs}
+    for side, sign in (("l", 1), ("r", -1)):
+        own = [feet[f"{side}{rank + 1}"] for rank in range(len(feet) // 2)]
+        assert own == sorted(own, reverse=True) and all(sign * foot[1] > 0 for foot in own)
+    soles = np.array([leg.foot_position for leg in body.legs])
+    assert np.ptp(soles[:, 2]) < 0.05 * body.torso.standing_height
+    assert stability_margin((0, 0), soles) > 0.02 * body.torso.standing_height
+
+
+def test_ranges_count_from_the_standing_pose():
+    knee = imported(GO2).body.legs[0].joints[2]
+    assert knee.range_deg == pytest.approx(np.degrees((-2.7227 + 1.8, -0.83776 + 1.8)))
+    assert knee.alias == "FL_calf_joint" and (knee.armature, knee.damping) == (0.032, 0.2)
+
+
+def test_parts_of_an_odd_robot_have_names(odd):
+    body, notes = imported(odd)
+    assert body.name == "odd_robot"
+    assert [leg.name for leg in body.legs] == ["l1", "r1", "l2", "r2"]
+    found = model(body)
+    assert found.joint("l1_joint1").bodyid == found.joint("l1_joint2").bodyid == found.body("l1_link2").id
+    assert found.body("l1_link1").mass == 0 and found.body("l1_link1").parentid == found.body("l1_link2").id
+    assert [joint.name for joint in body.held] == ["arm_joint", "grip"]
+    assert found.joint("arm_joint").type == mujoco.mjtJoint.mjJNT_HINGE
+    assert "held: 2 joints outside of the legs stay in the standing pose (Arm joint, grip)" in notes
+    assert "left out: 1 other bodies in the world" in notes
+
+
+def test_the_order_of_joints_is_that_of_the_files_motors(odd):
+    body, notes = imported(odd)
+    assert body.file_joints[:5] == ("FL knee", "FR knee", "HL knee", "HR knee", "FL pitch")
+    assert {joint.alias for leg in body.legs for joint in leg.joints} == set(body.file_joints)
+    assert "joint map: places of the file's joints in an action: [2, 5, 8, 11, 1, 4, 7, 10, 0, 3, 6, 9]" in notes
+    assert imported(A1).body.file_joints[:3] == ("FR_hip_joint", "FR_thigh_joint", "FR_calf_joint")
+
+
+def test_gains_and_limits_are_those_of_position_actuators(odd):
+    body, notes = imported(odd)
+    servo = body.legs[0].joints[0].servo
+    assert (servo.stiffness, servo.damping, servo.limit) == (40.0, 1.5, 20.0)
+    assert body.held[0].servo.limit == 5.0
+    assert "limits: 20 N m of 12 motors, from forcerange" in notes
+    assert "gains: 12 of 12 servos have those of the file's position actuators, the others are sized" in notes
+
+
+def test_gains_that_the_file_does_not_have_are_sized():
+    knee = imported(GO2).body.legs[0].joints[2]
+    assert knee.servo.limit == 45.43
+    assert 0.0 < knee.servo.stiffness <= 10.0 * knee.servo.limit
+    notes = imported(A1).notes
+    assert "limits: 1000 N m of 12 motors is a placeholder, far above their load" in notes
+
+
+def test_a_keyframe_that_is_named_is_the_standing_pose(tmp_path):
+    path = tmp_path / "go2.xml"
+    keys = '<key name="low" qpos="0 0 0.2 1 0 0 0 0 1.2 -2.4 0 1.2 -2.4 0 1.2 -2.4 0 1.2 -2.4"/></keyframe>'
+    path.write_text(GO2.read_text().replace("</keyframe>", keys))
+    high, low = imported(path), imported(path, home="low")
+    assert low.body.torso.standing_height < 0.8 * high.body.torso.standing_height
+    assert any(note.startswith("standing pose: keyframe low, torso 0.1") for note in low.notes)
+    with pytest.raises(
+        SpecError, match=r"go2\.xml: unknown keyframe 'lo'; did you mean 'low'\? \(there are: lying, home, low\)$"
+    ):
+        imported(path, home="lo")
+
+
+def test_feet_can_be_named_by_geom_or_body():
+    assert imported(GO2, feet=["FL", "FR", "RL", "RR"]).body == imported(GO2).body
+    assert imported(GO2, feet=["FL_calf", "FR_calf", "RL_calf", "RR_calf"]).body == imported(GO2).body
+    with pytest.raises(SpecError, match=r"go2_like\.xml: unknown foot 'FL_claf'; did you mean 'FL_calf'\?"):
+        imported(GO2, feet=["FL_claf"])
+
+
+def test_two_feet_of_four_do_not_stand():
+    with pytest.raises(
+        SpecError, match=r"no standing pose \(keyframe home: the centre of mass is -0.194 m inside of the feet"
+    ):
+        imported(GO2, feet=["FL", "FR"])
+
+
+def test_a_urdf_whose_y_axis_points_up_is_turned(tmp_path):
+    path = tmp_path / "up.urdf"
+    turned = '<link name="first"/><joint name="turn" type="fixed"><origin rpy="-1.5707963267948966 0 0"/>'
+    turned += '<parent link="first"/><child link="base"/></joint></robot>'
+    path.write_text(A1.read_text().replace("</robot>", turned))
+    body, notes = imported(path)
+    assert "turned: the file's y axis points up, the torso's frame has z there" in notes
+    assert body.torso.standing_height == pytest.approx(imported(A1).body.torso.standing_height, rel=0.02)
+    assert reference().same_bits(path, body) == 200
+
+
+@pytest.mark.parametrize(
+    ("given", "name"), [("queen", "queen_imported"), ("Über-Bot 3000", "ber_bot_3000"), ("!", "a")]
+)
+def test_names_are_cleaned_and_no_robots(given, name, tmp_path):
+    path = tmp_path / "a.xml"
+    path.write_text(GO2.read_text().replace("quadruped 15 kg", given))
+    assert imported(path).body.name == name
+
+
+def test_paths_are_bodies_everywhere_and_follow_the_file(tmp_path):
+    path = tmp_path / "robot.xml"
+    path.write_text(GO2.read_text())
+    body = registry.body_of(str(path))
+    assert body == imported(path).body
+    assert registry.body_of(path) is body
+    path.write_text(GO2.read_text().replace("quadruped 15 kg", "other"))
+    assert registry.body_of(path).name == "other"
+    with pytest.raises(OSError, match=r"^cannot read .*none\.urdf: no such file or directory$"):
+        registry.body_of(str(tmp_path / "none.urdf"))
