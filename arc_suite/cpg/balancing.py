@@ -27,7 +27,7 @@ class BalancingParameters(NamedTuple):
 
     Attributes:
         feet: places of the soles at ease, for each rank of legs from the front: forward, outward and
-            up from the torso, in standing heights.
+            up from the torso, in standing heights; None for those of the standing pose.
         lift: of a foot in mid-swing, in standing heights.
         gain: of the motion's error, forward, left and turning.
         integral: of the same, a cycle of the gait.
@@ -40,7 +40,7 @@ class BalancingParameters(NamedTuple):
             feet follow.
     """
 
-    feet: tuple[tuple[float, float, float], ...]
+    feet: tuple[tuple[float, float, float], ...] | None
     lift: float
     gain: tuple[float, float, float]
     integral: float
@@ -75,15 +75,17 @@ class Balanced(CommandLaw):
         Raises:
             ValueError: `feet` is for another number of ranks of legs.
         """
-        body = task.scene.body
-        if len(parameters.feet) != (ranks := max(body.ranks) + 1):
-            raise ValueError(f"preset: {body.name} has {ranks} ranks of legs, and feet is for {len(parameters.feet)}")
+        body, feet = task.scene.body, parameters.feet
+        if feet is not None and len(feet) != (ranks := max(body.ranks) + 1):
+            raise ValueError(f"preset: {body.name} has {ranks} ranks of legs, and feet is for {len(feet)}")
         super().__init__(task, parameters)
         self.legs = Legs.of(self.body, _USED)
         self.duty_factor -= parameters.shorter
         self.stance = self.duty_factor / gait_of(task).frequency
-        self.places = np.array([parameters.feet[rank] for rank in body.ranks]) * self.pose.height
-        self.places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
+        self.places = self.pose.soles.copy()
+        if feet is not None:
+            self.places = np.array([feet[rank] for rank in body.ranks]) * self.pose.height
+            self.places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
         self._ride = -self.places[:, 2].mean()
         self._fall = math.sqrt(self._ride / GRAVITY)  # s, of an inverted pendulum as high
         self._damping = _DAMPING * self.pose.height
