@@ -17,8 +17,20 @@ from arc_suite.cli.programs import summary
 
 ROOT = pathlib.Path(__file__).parents[2]
 VERSION = f"arc_suite {arc_suite.__version__}\n"
-WITHOUT_TASK = {"play", "study", "benchmark", "doctor"}
-WRITING = ("build_model", "render", "animate", "play", "style", "tune_cpg", "train", "export", "transfer", "design")
+WITHOUT_TASK = {"import", "play", "study", "benchmark", "doctor"}
+WRITING = (
+    "build_model",
+    "import",
+    "render",
+    "animate",
+    "play",
+    "style",
+    "tune_cpg",
+    "train",
+    "export",
+    "transfer",
+    "design",
+)
 
 
 def run(*arguments):
@@ -135,7 +147,7 @@ def test_help_of_a_program(program):
 
 @pytest.mark.parametrize("program", main.PROGRAMS)
 def test_errors_of_a_program_name_it(program):
-    taking = ("check", "export", "study", "enter", "benchmark")  # an argument
+    taking = ("check", "import", "export", "study", "enter", "benchmark")  # an argument
     done = run(program, *(["--", "a.json"] if program in taking else []), "stray")
     programs.refused(done, f"arc-suite {program}: unexpected argument 'stray'; see --help\n")
 

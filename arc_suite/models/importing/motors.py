@@ -18,6 +18,7 @@ _TIMES = 10.0
 _LEAST_SHARE = 0.5  # of the leg's strongest load, by which a joint with a smaller one counts
 _LEAST_FREQUENCY = 25.0  # rad/s, of a joint with what it moves
 _DAMPING_RATIO = 0.7
+_CARRYING = 40.0  # rad/s, of a joint at most: a leg on the floor moves the torso, and not its links alone
 
 _STRENGTH = 30.0  # times the load, of a motor whose limit the file does not have
 _UNKNOWN = 1000.0  # N m; files have it, and larger ones, where nobody knew the motor
@@ -70,7 +71,8 @@ def _rule(load: float, inertia: float, limit: float, damping: float) -> tuple[fl
     """Return stiffness and damping of a servo."""
     wanted = max(_TIMES * load / _ERROR, inertia * _LEAST_FREQUENCY**2)
     stiffness = min(wanted, limit / _ERROR)
-    return stiffness, max(2.0 * _DAMPING_RATIO * np.sqrt(stiffness * inertia) - damping, 0.0)
+    moved = max(inertia, stiffness / _CARRYING**2)
+    return stiffness, max(2.0 * _DAMPING_RATIO * np.sqrt(stiffness * moved) - damping, 0.0)
 
 
 def _mechanics(robot: Robot, stance: Stance) -> tuple[dict[int, float], dict[int, float]]:

@@ -16,15 +16,15 @@ from arc_suite.robots.spec import SpecError
 _AGREE = 0.15  # by which feet on the floor may differ
 _HANG = 0.5  # of the deepest foot: a chain that reaches lower is a leg that hangs
 _LEAST_MARGIN = 0.02  # of the centre of mass inside the feet
-_BESIDE = 0.15  # of the centre of mass beside the line between two feet, which may be long
+_OFF = 0.15  # of the centre of mass from the line between two feet, which may be long
 
 _STRAIGHT = 0.96  # of a leg's length: one that is longer has no knee to bend
 _LEAST_THIGH = 0.2  # of the standing height; a shorter one does not make a leg straight
 _SOLE = 0.05  # of the standing height, that a foot is high whose shape tells nothing
 
 # The search for a pose with bent knees.
-_REACH = 0.8  # of the leg's length, from the joint before the last down to the foot
-_ASIDE = 0.0  # of the leg's length, of the foot from where a straight leg has it: a wider stance is steadier
+_REACH = 0.65  # of the leg's length, from the joint before the last down to the foot
+_ASIDE = 0.1  # of the leg's length, of the foot outwards from where a straight leg has it: a wide stance is steady
 _BEND = 0.65  # rad, of the thigh at first; the knee bends back twice as much
 _STEPS = 80
 _LARGEST_STEP = 0.2  # rad
@@ -269,7 +269,7 @@ def _check_torso(robot: Robot, data: mujoco.MjData, legs: tuple[Leg, ...], heigh
     if rest and tree.lowest(robot, data, rest)[0][2] < -height:
         raise _Unfit("the torso is lower than the feet")
     margin = stability_margin(data.subtree_com[robot.root], [leg.sole for leg in legs])
-    if margin < (_LEAST_MARGIN if len(legs) > 2 else -_BESIDE) * height:
+    if margin < (_LEAST_MARGIN if len(legs) > 2 else -_OFF) * height:
         raise _Unfit(f"the centre of mass is {margin:.3g} m inside of the feet")
 
 
