@@ -93,6 +93,8 @@ class Prescribed(NamedTuple):
         Raises:
             ValueError: it does not fit the body.
         """
+        if body.source:
+            raise ValueError(f"preset: gives torques, and {body.name} has servos, expected one such as medium or steered")
         legs, offsets = len(body.legs), len(preset.phase_offsets)
         if legs != offsets:
             raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")

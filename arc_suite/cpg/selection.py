@@ -8,7 +8,7 @@ from arc_suite import robots
 from arc_suite.cpg.balancing import Balanced, BalancingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
 from arc_suite.cpg.prescribed import PrescribedLaw, Preset
-from arc_suite.cpg.presets import DEFAULTS, PRESETS
+from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
 from arc_suite.cpg.stride import StrideLaw
@@ -52,7 +52,8 @@ def presets_of(body: Body) -> Mapping[str, Any]:
         ValueError: a body of a robot's name that has other joints.
     """
     own = robots.parameters(PRESETS, body, "presets") or {}
-    return own | {name: preset for name, preset in DEFAULTS.items() if name not in own}
+    defaults = DEFAULTS_OF_SERVOS if body.source else DEFAULTS
+    return own | {name: preset for name, preset in defaults.items() if name not in own}
 
 
 def preset_names() -> tuple[str, ...]:

@@ -35,8 +35,9 @@ def _cpg(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -
         raise ValueError(f"preset: expected one or more of {', '.join(preset_names())}, got none")
     demonstrators = [Demonstrator(task or body, preset) for preset in presets]
     made = demonstrators[0] if len(demonstrators) == 1 else Mixture(demonstrators, num_envs)
-    # Modified tasks alone take positions.
-    return Positioned(made, task) if task and task.actions == "position" else made  # type: ignore[arg-type]
+    # Demonstrators give positions to servos. Of motors, modified tasks alone take positions.
+    controlled = task and task.actions == "position" and not body.source
+    return Positioned(made, task) if controlled else made  # type: ignore[arg-type]
 
 
 def _zero(body: Body, presets: Sequence[str], num_envs: int, task: Task | None) -> Policy:
