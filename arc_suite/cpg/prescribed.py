@@ -94,7 +94,9 @@ class Prescribed(NamedTuple):
             ValueError: it does not fit the body.
         """
         if body.source:
-            raise ValueError(f"preset: gives torques, and {body.name} has servos, expected one such as medium or steered")
+            raise ValueError(
+                f"preset: gives torques, and {body.name} has servos, expected one such as medium or steered"
+            )
         legs, offsets = len(body.legs), len(preset.phase_offsets)
         if legs != offsets:
             raise ValueError(f"preset: {body.name} has {legs} legs, and phase_offsets is for {offsets}")

@@ -4,16 +4,20 @@ The input `observations` is (num_envs, size) float32, flat: the task's blocks on
 `actions` is (num_envs, joints) in [-1, 1]. The metadata hold what else a game needs, JSON by name; see `metadata`.
 """
 
+import dataclasses
 import json
 import os
 from collections.abc import Iterator
 from typing import Any
 
+import mujoco
 import numpy as np
 
 from arc_suite import files, versions
+from arc_suite.models import sizing, source
 from arc_suite.policies.graph import EPSILON, INPUT, Graph
 from arc_suite.policies.network import Network
+from arc_suite.robots.spec import Body
 
 OUTPUT = "actions"
 OPSET = 17  # the first with LayerNormalization
@@ -28,7 +32,11 @@ def metadata(network: Network) -> dict:
     control_timestep            s between two actions
     substeps                    of the simulation between them
     joints                      names, in the order of the actions
-    gears                       N m that an action of 1 is, by joint
+    gears                       N m that an action of 1 is, by joint; only of motors
+    servos                      by joint its name in the file that it comes from, angle in the standing pose and distance
+                                from it that an action of 1 asks for, rad, stiffness, N m/rad, damping, N m s/rad, and
+                                limit, N m; only of servos
+    file_joints                 names of the joints in the order of that file
     gait_clock                  how the block of that name follows from time; only where there is one
 
     Raises:
@@ -39,13 +47,16 @@ def metadata(network: Network) -> dict:
     setup, blocks = network.setup, network.blocks
     task, model = setup.prepared()
     step = task.scene.control_timestep
-    known = setup.to_dict() | {
-        "blocks": dict(blocks),
-        "control_timestep": step,
-        "substeps": round(step / model.opt.timestep),
-        "joints": list(task.scene.body.joint_names),
-        "gears": model.actuator_gear[:, 0].tolist(),
-    }
+    known = (
+        setup.to_dict()
+        | {
+            "blocks": dict(blocks),
+            "control_timestep": step,
+            "substeps": round(step / model.opt.timestep),
+            "joints": list(task.scene.body.joint_names),
+        }
+        | _driven(task.scene.body, model)
+    )
     if "gait_clock" in blocks and task.parameters is not None:
         frequency = task.parameters.gait_frequency
         known["gait_clock"] = {
@@ -53,6 +64,20 @@ def metadata(network: Network) -> dict:
             "rule": "sine and cosine of 2 pi frequency t, t = control_timestep x control steps since the start",
         }
     return known
+
+
+def _driven(body: Body, model: mujoco.MjModel) -> dict:
+    """Return what actions ask of the joints of a body."""
+    if not body.source:
+        return {"gears": model.actuator_gear[:, 0].tolist()}
+    home = source.angles_at_home(body)
+    servos = {
+        name: {"alias": joint.alias, "home": home[name], "reach": reach} | dataclasses.asdict(joint.servo)
+        for name, joint, reach in zip(
+            body.joint_names, (j for leg in body.legs for j in leg.joints), sizing.reaches(body).tolist(), strict=True
+        )
+    }
+    return {"servos": servos, "file_joints": list(body.file_joints)}
 
 
 def save(path: str | os.PathLike, network: Network) -> None:

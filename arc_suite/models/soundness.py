@@ -26,6 +26,8 @@ _LARGEST_TURN = 0.5  # rad, of a joint
 # bodies with random motors the mean error is 0.21; 118 are called weak, and 76 % of these stay below 0.7 as they walk.
 _BRISK = 7.0
 
+_LEAST_LEGS = 3
+
 _SPREADS = (1.1, 1.2, 1.3, 1.4, 1.5, 1.75, 2.0)  # of the legs' mounts, tried against overlaps
 
 
@@ -46,7 +48,7 @@ class Flaw(NamedTuple):
 def flaws(body: Body) -> list[Flaw]:
     """Return the flaws of a body, none for one that should walk."""
     pose = standing(body)
-    return [flaw for check in (_height, _support, _motors, _joints, _parts) for flaw in check(body, pose)]
+    return [flaw for check in (_height, _legs, _support, _motors, _joints, _parts) for flaw in check(body, pose)]
 
 
 def hopeless(body: Body) -> list[Flaw]:
@@ -131,10 +133,18 @@ def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
     if (given < held).any():
         yield _short(body, given, held, "hold the body up")
         return
+    if body.source:  # whose servos walk with less: the share below was measured on torques
+        return
     loads = _BRISK * sizing.loads(body)
     if (reached := _reached(body, (given / loads).clip(max=1.0))) < stride.LEAST_SHARE:
         slow = f"weak: reaches about {reached:.1f} of the target speed, as "
         yield _short(body, given, loads, "a brisk stride takes", slow)
+
+
+def _legs(body: Body, pose: Standing) -> Iterator[Flaw]:
+    """Find too few legs for any demonstrator."""
+    if len(body.legs) < _LEAST_LEGS:
+        yield Flaw(f"no demonstrator keeps its balance on {len(body.legs)} legs: 3 and more walk", False)
 
 
 def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str, effect: str = "") -> Flaw:
@@ -142,6 +152,8 @@ def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str, effe
     weak, worst = int((given < needed).sum()), int((needed / given).argmax())
     lacks = f"{needed[worst] - given[worst]:.3g} of the {needed[worst]:.3g} N m that {purpose}"
     others = f", as do those of {weak - 1} more joints" * (weak > 1)
+    if body.source:
+        return Flaw(f"{effect}the servo of {body.joint_names[worst]} lacks {lacks}{others}", False)
     cure = _unpowered(body, given < needed)
     fits = [joint.motor.gear for leg in sizing.sized(cure).legs for joint in leg.joints][worst]
     return Flaw(

@@ -181,6 +181,8 @@ def scaled(body: Body, factor: float) -> Body:
         ValueError: the factor, or a length of the scaled body, is out of range.
     """
     factor = checks.number("scale", factor, *SCALE)
+    if body.source:
+        raise ValueError(f"scale: {body.name} was imported, and keeps the size of its file")
 
     def times(lengths: Sequence[float]) -> tuple[float, ...]:
         return tuple(factor * length for length in lengths)

@@ -32,6 +32,7 @@ _GEARS = (1e-20, 1e30)
 _LARGEST = 1e35
 _LEAST_INERTIA = 1e-14  # kg m^2; MuJoCo's own bound is 1e-15
 MAX_NAME = 32  # characters
+DENSITY = 10.0  # kg/m^3, of the published robots
 MAX_ALIAS = 100  # characters of a name in a file of others
 MAX_SOURCE = 1 << 21  # bytes of the MJCF of an imported body; of 38 files the largest has 430,000
 PALETTES = ("moss", "rust", "bone", "coral", "night")  # see `palettes.colours`
@@ -497,7 +498,7 @@ class Body(_Spec):
     torso: Torso = _field(_check_instance, Torso)
     legs: tuple[Leg, ...] = _field(_check_items, Leg, 1, 64)
     camera: TrackingCamera | None = _field(_check_instance, TrackingCamera, default=None, optional=True)
-    density: float = _number(1e-9, _DENSEST, default=10.0)
+    density: float = _number(1e-9, _DENSEST, default=DENSITY)
     ballast: tuple[Ballast, ...] = _field(_check_items, Ballast, 0, 64, default=())
     simulation: Simulation | None = _field(_check_instance, Simulation, default=None, optional=True)
     agility: float = _number(0.1, 10.0, default=1.0)
@@ -539,6 +540,9 @@ class Body(_Spec):
             self._fail("legs", "expected a servo at every joint of a body with a source")
         elif self.ballast:
             self._fail("ballast", "expected none in a body with a source, which has its weights")
+        elif self.agility != 1.0 or self.density != DENSITY:
+            field = "agility" if self.agility != 1.0 else "density"
+            self._fail(field, "expected the default in a body with a source, which has its motors and weights")
         elif self.simulation is None:
             self._fail("simulation", "missing; a body with a source needs it")
 
