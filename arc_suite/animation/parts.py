@@ -1,27 +1,37 @@
-"""A decorated body as plain data: rigid parts, the shapes that they show, and materials."""
+"""A decorated body as plain data: rigid parts, the shapes that they show, and materials.
 
+The parts of an imported body are those of its kinematic sketch. Joints that are held stay as they stand.
+"""
+
+import itertools
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from arc_suite import models
-from arc_suite.models.standing import GEOMS
-from arc_suite.robots.spec import Body
+from arc_suite import models, rotations
+from arc_suite.animation.shapes import Mesh
+from arc_suite.models.standing import GEOMS, stood
+from arc_suite.robots.spec import Body, Link
 
 # Kinds of shapes by MuJoCo's number.
 KINDS = {int(geom): name for name, geom in GEOMS.items()}
+_MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+
+_AS_ABOVE = np.array((1.0, 0.0, 0.0, 0.0))
 
 
 class Shape(NamedTuple):
     """Something to be seen.
 
     Attributes:
-        kind: of `shapes.KINDS`.
+        kind: of `shapes.KINDS`, or mesh.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
         place: (3,) in the part's frame, m.
         quaternion: (4,) in the same frame, w first.
         material: name.
+        mesh: of a mesh; else None.
     """
 
     kind: str
@@ -29,6 +39,7 @@ class Shape(NamedTuple):
     place: np.ndarray
     quaternion: np.ndarray
     material: str
+    mesh: Mesh | None = None
 
 
 class Part(NamedTuple):
@@ -71,7 +82,7 @@ def parts(body: Body) -> tuple[list[Part], dict[str, Material]]:
     """Return the parts of a body in the order of its `part_names`, and the materials of what they show by name."""
     model = models.parsed(body, decorated=True).compile()
     ids = [model.body(name).id for name in body.part_names]
-    found = [_part(model, index, ids) for index in ids]
+    found = _sketched(model, body) if body.source else [_part(model, index, ids) for index in ids]
     names = sorted({shape.material for part in found for shape in part.shapes})
     return found, {name: _material(model, name) for name in names}
 
@@ -93,8 +104,65 @@ def _part(model: mujoco.MjModel, index: int, ids: list[int]) -> Part:
 
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
-    kind, material = KINDS[int(model.geom_type[geom])], model.material(model.geom_matid[geom]).name
-    return Shape(kind, model.geom_size[geom], model.geom_pos[geom], model.geom_quat[geom], material)
+    material, place = model.material(model.geom_matid[geom]).name, (model.geom_pos[geom], model.geom_quat[geom])
+    if model.geom_type[geom] == _MESH:
+        return Shape("mesh", model.geom_size[geom], *place, material, _mesh(model, model.geom_dataid[geom]))
+    return Shape(KINDS[int(model.geom_type[geom])], model.geom_size[geom], *place, material)
+
+
+def _mesh(model: mujoco.MjModel, index: int) -> Mesh:
+    """Return a mesh, in which a point has as many entries as it has normals."""
+    faces = slice(model.mesh_faceadr[index], model.mesh_faceadr[index] + model.mesh_facenum[index])
+    corners = np.stack([model.mesh_face[faces], model.mesh_facenormal[faces]], axis=-1).reshape(-1, 2)
+    pairs, triangles = np.unique(corners, axis=0, return_inverse=True)
+    points = model.mesh_vert[model.mesh_vertadr[index] + pairs[:, 0]].astype(float)
+    normals = model.mesh_normal[model.mesh_normaladr[index] + pairs[:, 1]].astype(float)
+    return Mesh(points, normals, triangles.reshape(-1, 3))
+
+
+def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
+    """Return the parts of an imported body, with the shapes of its model as it stands.
+
+    A shape belongs to the nearest part above it.
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = stood(model)
+    mujoco.mj_kinematics(model, data)
+    owners = {model.body(name).id: part for part, name in enumerate(body.part_names)}
+    for index in range(1, model.nbody):
+        owners.setdefault(index, owners.get(int(model.body_parentid[index])))
+    shapes: list[list[Shape]] = [[] for _ in body.part_names]
+    bones = _bones(body, *(data.body("torso").xpos, data.body("torso").xquat))
+    places, turns = frames(bones)
+    for geom in np.flatnonzero(model.geom_bodyid):  # those of the world are the ground's
+        part, turn = owners[int(model.geom_bodyid[geom])], np.empty(4)
+        mujoco.mju_mat2Quat(turn, (turns[part].T @ data.geom_xmat[geom].reshape(3, 3)).ravel())
+        place = turns[part].T @ (data.geom_xpos[geom] - places[part])
+        shapes[part].append(_shape(model, geom)._replace(place=place, quaternion=turn))
+    return [bone._replace(shapes=tuple(own)) for bone, own in zip(bones, shapes, strict=True)]
+
+
+def _bones(body: Body, place: np.ndarray, quaternion: np.ndarray) -> list[Part]:
+    """Return the parts of a body's spec without shapes, given where the torso is."""
+    found, joints = [Part("torso", None, place.copy(), quaternion.copy(), None, None, ())], itertools.count()
+    for leg in body.legs:
+        parent, end, turn = 0, leg.mount, rotations.turned(_AS_ABOVE, np.radians(leg.yaw_deg))
+        for part in leg.parts:
+            hinge = part.joint if isinstance(part, Link) else None
+            joint, axis = (next(joints), np.array(hinge.axis) / np.linalg.norm(hinge.axis)) if hinge else (None, None)
+            found.append(Part(leg.full_name(part), parent, np.array(end), turn, joint, axis, ()))
+            parent, end, turn = len(found) - 1, part.end if isinstance(part, Link) else None, _AS_ABOVE
+    return found
+
+
+def frames(parts: Sequence[Part]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the places (3,) and rotation matrices (3, 3) of parts in the standing pose."""
+    places, turns = [], []
+    for part in parts:
+        place, turn = (np.zeros(3), np.eye(3)) if part.parent is None else (places[part.parent], turns[part.parent])
+        places.append(place + turn @ part.place)
+        turns.append(turn @ rotations.matrix(part.quaternion))
+    return places, turns
 
 
 def _material(model: mujoco.MjModel, name: str) -> Material:

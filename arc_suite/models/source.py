@@ -122,7 +122,9 @@ def _add_servo(spec: mujoco.MjSpec, name: str, servo: Servo, home: float, reach:
 
 
 def add_releases(spec: mujoco.MjSpec, body: Body) -> None:
-    """Add to each servo a motor that takes a share of its torque away, so that joints can weaken or hang.
+    """Add to each servo of a leg a motor that takes a share of its torque away, so that joints can weaken or hang.
+
+    Servos of legs come first, then their releases in the same order, then the servos of held joints.
 
     The servo's torque is k (reach u + home - q) - d v for a control u. That of its release is -r (k (home - q) - d v)
     for a control r. With controls s u and 1 - s a joint has the share s of its torque.
@@ -132,6 +134,10 @@ def add_releases(spec: mujoco.MjSpec, body: Body) -> None:
         added = spec.add_actuator(name=f"{name}-release", target=name, ctrlrange=(0.0, 1.0), **_MOTOR)
         added.gaintype = mujoco.mjtGain.mjGAIN_AFFINE
         added.gainprm[:3] = -servo.biasprm[:3]
+    home = angles_at_home(body)
+    for joint in body.held:
+        spec.delete(spec.actuator(joint.name))
+        _add_servo(spec, joint.name, joint.servo, home[joint.name], 0.0)
 
 
 def _add_ground(spec: mujoco.MjSpec, body: Body, arena: Arena, decorated: bool) -> None:

@@ -134,6 +134,26 @@ def _evenly_spaced(indices) -> slice | np.ndarray:
     return np.array(indices)
 
 
+def pose(qpos, layout: Layout):
+    """Return poses (..., 7 + joints) of positions (..., nq): the torso's place and quaternion, and joint angles.
+
+    Angles are from the standing pose, rad.
+    """
+    if layout.home is None:
+        return qpos
+    numpy = qpos.__array_namespace__()
+    return numpy.concatenate([qpos[..., :7], qpos[..., layout.joint_angles] - layout.home], axis=-1)
+
+
+def positions(poses, layout: Layout, standing):
+    """Return the positions (..., nq) of poses (..., 7 + joints), in which held joints are as in `standing` (nq,)."""
+    if layout.home is None:
+        return poses
+    qpos = np.tile(standing, (*poses.shape[:-1], 1))
+    qpos[..., :7], qpos[..., layout.joint_angles] = poses[..., :7], poses[..., 7:] + layout.home
+    return qpos
+
+
 def component(vectors, index: int):
     """Return one component of vectors (..., n): (...).
 
@@ -157,25 +177,20 @@ def read(data, layout: Layout, arena: Arena, forces=None) -> Readings:
         The readings; arrays may be views of `data`.
     """
     qpos, xpos = data.qpos, data.xpos
-    position, feet, joints = qpos[..., 0:3], xpos[..., layout.feet, :], layout.joint_angles
-    if layout.home is None:
-        pose, efforts = qpos[..., 2 : joints.stop], None
-    else:
-        numpy = qpos.__array_namespace__()
-        pose = numpy.concatenate([qpos[..., 2:7], qpos[..., joints] - layout.home], axis=-1)
-        efforts = data.qfrc_actuator[..., layout.joint_velocities] / layout.limits
+    position, feet, posture = qpos[..., 0:3], xpos[..., layout.feet, :], pose(qpos, layout)[..., 2:]
+    efforts = None if layout.limits is None else data.qfrc_actuator[..., layout.joint_velocities] / layout.limits
     foot_heights = feet[..., 2]
     if not arena.is_level:  # a subtraction of 0 would change bits on level ground
         numpy = qpos.__array_namespace__()
-        pose = numpy.concatenate([arena.torso_clearance(position)[..., None], pose[..., 1:]], axis=-1)
+        posture = numpy.concatenate([arena.torso_clearance(position)[..., None], posture[..., 1:]], axis=-1)
         foot_heights = foot_heights - arena.height(feet[..., 0], feet[..., 1])
     forces = data.cfrc_ext[..., layout.parts, :] if forces is None else forces
     return Readings(
         qpos=qpos,
-        posture=pose,
+        posture=posture,
         torso_position=position,
-        torso_quaternion=pose[..., 1:5],
-        joint_angles=pose[..., 5:],
+        torso_quaternion=posture[..., 1:5],
+        joint_angles=posture[..., 5:],
         velocities=data.qvel[..., layout.velocities],
         contact_forces=forces.reshape(forces.shape[:-2] + (-1,)).clip(-1.0, 1.0),
         frame_position=xpos[..., layout.torso, :],

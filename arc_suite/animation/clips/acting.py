@@ -9,13 +9,14 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import Motion, Pose, standing
+from arc_suite.cpg.drives import drive
 from arc_suite.cpg.kinematics import Legs
-from arc_suite.cpg.law import torques
 from arc_suite.models import sizing
 from arc_suite.models.outline import solid_corners
-from arc_suite.models.standing import posed
+from arc_suite.models.standing import posed, stood
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
+from arc_suite.tasks import readings
 
 # Durations are multiples of sqrt(h / g), speeds of sqrt(g h), h being the standing height.
 _BLOW = 0.5  # change of the torso's velocity, backwards
@@ -61,7 +62,7 @@ def hit(body: Body, rest: Pose) -> Motion:
     steps = _steps(body, _STAGGER)
     backwards = -_BLOW * math.sqrt(sizing.GRAVITY * body.torso.standing_height)
     recording = _driven(body, rest, np.tile(_holding(body, rest), (steps + 1, 1)), push=backwards)
-    return standing(recording, 0, len(recording.qpos) - 1)
+    return standing(recording, 0, len(recording.poses) - 1)
 
 
 def rise(body: Body, rest: Pose) -> Motion:
@@ -75,8 +76,8 @@ def rise(body: Body, rest: Pose) -> Motion:
     joints, _ = sunk(body, rest, share * _depth(body, rest))
     recording = _driven(body, rest, joints + _holding(body, rest) - rest.joints)
     first = sizing.simulation(body).substeps * (sink + hold)
-    _check_lies(body, rest, recording.qpos[first])
-    return standing(recording, first, len(recording.qpos) - 1 - first)
+    _check_lies(body, rest, recording.poses[first])
+    return standing(recording, first, len(recording.poses) - 1 - first)
 
 
 def death(body: Body, rest: Pose) -> Motion:
@@ -89,8 +90,8 @@ def death(body: Body, rest: Pose) -> Motion:
     joints, _ = sunk(body, rest, np.append(_eased(give), 1.0) * _depth(body, rest))
     limp = np.full((fall, len(rest.joints)), np.nan)
     recording = _driven(body, rest, np.concatenate([joints, limp]), damping=_FLACCID)
-    _check_lies(body, rest, recording.qpos[-1])
-    return standing(recording, 0, len(recording.qpos) - 1)
+    _check_lies(body, rest, recording.poses[-1])
+    return standing(recording, 0, len(recording.poses) - 1)
 
 
 def _depth(body: Body, rest: Pose) -> float:
@@ -98,11 +99,11 @@ def _depth(body: Body, rest: Pose) -> float:
     return rest.position[2] + min(solid_corners(solid)[:, 2].min() for solid in body.torso.solids)
 
 
-def _check_lies(body: Body, rest: Pose, qpos: np.ndarray) -> None:
+def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
     """Raise a ValueError if a torso stands still."""
     if (
-        qpos[2] > _LIES * rest.position[2]
-        and qpos[2] - rest.position[2] + _depth(body, rest) > _NEAR * rest.position[2]
+        pose[2] > _LIES * rest.position[2]
+        and pose[2] - rest.position[2] + _depth(body, rest) > _NEAR * rest.position[2]
     ):
         raise ValueError("the legs do not fold far enough to lie down")
 
@@ -120,9 +121,8 @@ def _holding(body: Body, rest: Pose) -> np.ndarray:
     """Return the target angles (joints,), rad, at which position control holds a pose under the body's weight."""
     sized = sizing.sized(body)
     pose = posed(sized, rest.joints)
-    stiffness, _ = sizing.position_gains(sized, pose.inertias)
-    gears = np.array([joint.torque for leg in sized.legs for joint in leg.joints])
-    return rest.joints + pose.loads / (gears * stiffness)
+    limits = np.array([joint.torque for leg in sized.legs for joint in leg.joints])
+    return rest.joints + pose.loads / (limits * drive(sized, pose.inertias).stiffness)
 
 
 def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damping: float = 1.0) -> Recording:
@@ -139,20 +139,24 @@ def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damp
         A pose for every substep.
     """
     sized = sizing.sized(body)
-    gains = sizing.position_gains(sized, posed(sized, rest.joints).inertias)
+    driven = drive(sized, posed(sized, rest.joints).inertias)
     model = copy.copy(compiled(body))
     model.dof_damping[6:] *= damping
+    layout = readings.layout(model, body.joint_names, body.part_names, body.foot_names)
     data, step = mujoco.MjData(model), sizing.control_timestep(body)
-    data.qpos[:] = np.concatenate(rest)
+    data.qpos[:] = readings.positions(np.concatenate(rest), layout, stood(model))
     data.qvel[0] = push
-    poses = [data.qpos.copy()]
+    moved, count = [data.qpos.copy()], len(body.joint_names)
     for target, later in zip(targets[:-1], targets[1:], strict=True):
-        speeds = data.qvel[6:] - (later - target) / step
-        data.ctrl[:] = np.nan_to_num(torques(target, data.qpos[7:], speeds, *gains))
+        angles, speeds = readings.pose(data.qpos, layout)[7:], data.qvel[layout.joint_velocities]
+        actions = driven.actions(target, (later - target) / step, angles, speeds)
+        data.ctrl[:count] = np.nan_to_num(actions)
+        if body.source:
+            data.ctrl[count : 2 * count] = np.isnan(actions)  # releases of servos
         for _ in range(sized.simulation.substeps):
             mujoco.mj_step(model, data)
-            poses.append(data.qpos.copy())
-    return Recording(model.opt.timestep, sized.simulation.substeps, np.stack(poses))
+            moved.append(data.qpos.copy())
+    return Recording(model.opt.timestep, sized.simulation.substeps, readings.pose(np.stack(moved), layout))
 
 
 def sunk(body: Body, rest: Pose, depths: np.ndarray) -> tuple[np.ndarray, float]:

@@ -46,7 +46,7 @@ class Draft(NamedTuple):
 
     def contacts(self, body: Body) -> tuple[float, list[FootContact]]:
         """Return the median height of soles in stance, m, and the foot contact events; none without a gait."""
-        heights = sole_heights(compiled(body), body, self.motion.qpos())
+        heights = sole_heights(compiled(body), body, self.motion.poses())
         if self.stands:
             return float(np.median(heights)), []
         found, stance = foot_contacts(self.motion, body, heights, self.cycle, self.loops)

@@ -6,7 +6,9 @@ import mujoco
 import numpy as np
 
 from arc_suite.animation.clips.root_motion import Motion
+from arc_suite.models.standing import stood
 from arc_suite.robots.spec import Body
+from arc_suite.tasks import readings
 
 TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 
@@ -33,19 +35,21 @@ class FootContact(NamedTuple):
     time: float
 
 
-def sole_heights(model: mujoco.MjModel, body: Body, qpos: np.ndarray) -> np.ndarray:
+def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.ndarray:
     """Return the heights (samples, feet), m, of the feet's lowest points over a level floor.
 
     Args:
         model: of the body.
         body: its spec.
-        qpos: (samples, nq)
+        poses: (samples, 7 + joints)
     """
     data = mujoco.MjData(model)
     feet = [model.body(name).id for name in body.foot_names]
-    heights = np.empty((len(qpos), len(feet)))
-    for pose, row in zip(qpos, heights, strict=True):
-        data.qpos[:] = pose
+    layout = readings.layout(model, body.joint_names, body.part_names, body.foot_names)
+    positions = readings.positions(poses, layout, stood(model))
+    heights = np.empty((len(poses), len(feet)))
+    for qpos, row in zip(positions, heights, strict=True):
+        data.qpos[:] = qpos
         mujoco.mj_kinematics(model, data)
         row[:] = data.xpos[feet, 2]
     return heights - [leg.foot.radius for leg in body.legs]

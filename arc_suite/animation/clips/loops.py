@@ -30,7 +30,7 @@ def period(recording: Recording) -> float | None:
     It is the first minimum of the mean distance of two poses by the time between them, among those that
     are well below the largest distance.
     """
-    joints = recording.qpos[:, 7:]
+    joints = recording.poses[:, 7:]
     longest = len(joints) // 2
     first = joints[:longest:_STRIDE]
     distances = np.array(
@@ -67,9 +67,9 @@ def closings(recording: Recording, cycle: float, most: int) -> Mapping[int, Clos
         # A cycle of a whole number of control steps is one up to rounding.
         lengths = {substeps * int(np.floor(length + 1e-6)), substeps * int(np.ceil(length - 1e-6))}
         loops = [
-            Closing(float(_seams(recording.qpos[:-samples], recording.qpos[samples:]).min()), samples)
+            Closing(float(_seams(recording.poses[:-samples], recording.poses[samples:]).min()), samples)
             for samples in lengths
-            if 0 < samples < len(recording.qpos)
+            if 0 < samples < len(recording.poses)
         ]
         if loops:
             found[cycles] = min(loops)
@@ -106,16 +106,16 @@ def usual(recording: Recording, samples: int) -> int:
         recording: to choose from.
         samples: of the loop.
     """
-    place = places(recording.qpos)
+    place = places(recording.poses)
     mean = logarithm(relative(place[:-samples], place[samples:]))
     speed, (_, left, turning) = np.hypot(mean[:, 0], mean[:, 1]).mean(), mean.mean(axis=0)
-    seams = _seams(recording.qpos[:-samples], recording.qpos[samples:])
+    seams = _seams(recording.poses[:-samples], recording.poses[samples:])
     bound = max(CLOSED, min(_NEAREST * seams.min(), OPEN), seams.min())
     firsts = np.flatnonzero(seams <= bound)
     firsts = firsts[:: -(-len(firsts) // _TRIED)]
     displacements = np.stack([_rooted(place[first : first + samples + 1])[0] for first in firsts])
     wrong = abs(np.hypot(displacements[:, 0], displacements[:, 1]) - speed)
-    astray = abs(displacements[:, 1] - left) + recording.qpos[:, 2].mean() * abs(displacements[:, 2] - turning)
+    astray = abs(displacements[:, 1] - left) + recording.poses[:, 2].mean() * abs(displacements[:, 2] - turning)
     return int(firsts[(_SPEED * wrong + astray).argmin()])
 
 
@@ -127,11 +127,11 @@ def loop(recording: Recording, first: int, samples: int) -> Motion:
         first: sample with which it begins.
         samples: of it; the sample after the last is the first one again.
     """
-    qpos = recording.qpos[first : first + samples + 1]
-    displacement, local = _rooted(places(qpos))
-    root = along(displacement, np.linspace(0.0, 1.0, len(qpos)))
-    motion = closed(on_root(recording.step, qpos, root, local))
-    return motion._replace(twist=displacement / motion.seconds, seam=float(_seams(qpos[:1], qpos[-1:])[0]))
+    poses = recording.poses[first : first + samples + 1]
+    displacement, local = _rooted(places(poses))
+    root = along(displacement, np.linspace(0.0, 1.0, len(poses)))
+    motion = closed(on_root(recording.step, poses, root, local))
+    return motion._replace(twist=displacement / motion.seconds, seam=float(_seams(poses[:1], poses[-1:])[0]))
 
 
 def closed(motion: Motion) -> Motion:

@@ -62,8 +62,8 @@ def _nearer(legs: Legs, height: float, motion: Motion, stances, fastest: np.ndar
     for leg, radius in enumerate(legs.radii):
         corrections[:, leg] = _corrections(feet[:, leg], radius, stances[leg], not loops)
     rows = slice(count, 2 * count + 1) if loops else slice(None)
-    feet, corrections, qpos = feet[rows], corrections[rows], around.qpos()[rows]
-    turns, places, angles = rotations.matrix(qpos[:, 3:7]), qpos[:, None, :3], legs.by_leg(qpos[:, 7:])
+    feet, corrections, poses = feet[rows], corrections[rows], around.poses()[rows]
+    turns, places, angles = rotations.matrix(poses[:, 3:7]), poses[:, None, :3], legs.by_leg(poses[:, 7:])
     centres, found, waits = _centres(legs), angles, np.ones(len(legs.radii), bool)
     for share in _SHARES:
         goals = feet + corrections * (share, share, 1.0)
@@ -89,9 +89,9 @@ def _centres(legs: Legs) -> Legs:
 
 def _feet(legs: Legs, motion: Motion) -> np.ndarray:
     """Return the places (samples, legs, 3) of the centres of feet in the world, m."""
-    qpos = motion.qpos()
+    poses = motion.poses()
     places = _centres(legs).soles(legs.by_leg(motion.joints))[0]
-    return (rotations.matrix(qpos[:, 3:7])[:, None] @ places[..., None])[..., 0] + qpos[:, None, :3]
+    return (rotations.matrix(poses[:, 3:7])[:, None] @ places[..., None])[..., 0] + poses[:, None, :3]
 
 
 def _paces(angles: np.ndarray) -> np.ndarray:

@@ -161,7 +161,7 @@ class Recorder:
 def _periodic(recording: Recording) -> Recorded:
     cycle = loops.period(recording)
     if cycle is None:
-        seconds = len(recording.qpos) * recording.step / 2.0
+        seconds = len(recording.poses) * recording.step / 2.0
         raise ValueError(f"the pose does not return within {seconds:.3g} s")
     return Recorded(recording, cycle)
 

@@ -9,6 +9,7 @@ from mujoco import rollout
 
 from arc_suite.envs.dm import Environment
 from arc_suite.policies import Policy, alone
+from arc_suite.tasks.readings import pose
 
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
@@ -19,12 +20,13 @@ class Recording(NamedTuple):
     Attributes:
         step: s between two poses.
         substeps: of a control step.
-        qpos: (samples, nq): torso position and quaternion in the world, joint angles in rad.
+        poses: (samples, 7 + joints): torso position and quaternion in the world, joint angles from the standing pose,
+            rad.
     """
 
     step: float
     substeps: int
-    qpos: np.ndarray
+    poses: np.ndarray
 
 
 def record(
@@ -63,8 +65,9 @@ def record(
         if timestep.last():
             raise ValueError(f"the episode ends after {count + 1} control steps, {settle + steps} are needed")
         controls.append(data.ctrl.copy())
-    substeps = environment.task.definition.scene.substeps
-    controls = np.repeat(controls[settle:], substeps, axis=0)
+    scene = environment.task.definition.scene
+    controls = np.repeat(controls[settle:], scene.substeps, axis=0)
     states, _ = rollout.rollout(model, mujoco.MjData(model), state, controls[None], initial_warmstart=warmstart)
     # Of the full state, time comes first and then the positions.
-    return Recording(model.opt.timestep, substeps, np.concatenate([start[None], states[0, :, 1 : 1 + model.nq]]))
+    qpos = np.concatenate([start[None], states[0, :, 1 : 1 + model.nq]])
+    return Recording(model.opt.timestep, scene.substeps, pose(qpos, scene.layout))

@@ -54,8 +54,8 @@ class Motion(NamedTuple):
         """Duration, s."""
         return self.step * (len(self.joints) - 1)
 
-    def qpos(self) -> np.ndarray:
-        """Return MuJoCo's positions in the world, (samples, 7 + joints)."""
+    def poses(self) -> np.ndarray:
+        """Return poses in the world, (samples, 7 + joints); see `Recording`."""
         heading = self.root[:, 2]
         ahead, left, height = self.positions.T
         across = rotations.headed(np.stack([ahead, left], axis=-1), -heading)
@@ -100,8 +100,8 @@ class Motion(NamedTuple):
 
     def on_root(self, root: np.ndarray) -> "Motion":
         """Return the same motion in the world on another path (samples, 3) of the root."""
-        qpos = self.qpos()
-        return on_root(self.step, qpos, root, relative(root, places(qpos)))._replace(twist=self.twist, seam=self.seam)
+        poses = self.poses()
+        return on_root(self.step, poses, root, relative(root, places(poses)))._replace(twist=self.twist, seam=self.seam)
 
     def meeting(self, pose: Pose, end: int, samples: int) -> "Motion":
         """Return the motion with a pose at one of its ends.
@@ -114,7 +114,7 @@ class Motion(NamedTuple):
             end: 0 or -1.
             samples: over which the difference of the poses fades.
         """
-        place = places(self.qpos()[[end]])[0]
+        place = places(self.poses()[[end]])[0]
         wanted = after(place, relative(_place(pose), np.zeros(3)))
         error = relative(self.root[end], wanted) * (1.0, 1.0, 0.0)
         error[2] = rotations.wrapped(wanted[2] - self.root[end, 2])
@@ -165,9 +165,9 @@ def fading(share: np.ndarray) -> np.ndarray:
     return 1.0 - share**2 * (3.0 - 2.0 * share)
 
 
-def places(qpos) -> np.ndarray:
+def places(poses) -> np.ndarray:
     """Return where the torso is, seen from above: (samples, 3) x, y, m, and yaw, rad, that does not jump."""
-    return np.concatenate([qpos[:, :2], np.unwrap(rotations.yaw(qpos[:, 3:7]))[:, None]], axis=-1)
+    return np.concatenate([poses[:, :2], np.unwrap(rotations.yaw(poses[:, 3:7]))[:, None]], axis=-1)
 
 
 def passage(recording: Recording, first: int, samples: int, window: int) -> Motion:
@@ -179,27 +179,27 @@ def passage(recording: Recording, first: int, samples: int, window: int) -> Moti
         samples: of it, without the last.
         window: samples that the mean is taken over, a gait cycle.
     """
-    place = places(recording.qpos)
+    place = places(recording.poses)
     low, sums = first - window // 2, np.cumsum(np.concatenate([np.zeros((1, 3)), place]), axis=0)
     path = (sums[low + window : low + window + samples + 1] - sums[low : low + samples + 1]) / window
     rows = slice(first, first + samples + 1)
-    motion = on_root(recording.step, recording.qpos[rows], relative(path[0], path), relative(path, place[rows]))
+    motion = on_root(recording.step, recording.poses[rows], relative(path[0], path), relative(path, place[rows]))
     return motion._replace(twist=logarithm(motion.root[-1]) / motion.seconds)
 
 
 def standing(recording: Recording, first: int, samples: int) -> Motion:
     """Return a part of a recording whose root stays below the torso of its first sample."""
-    qpos = recording.qpos[first : first + samples + 1]
-    place, root = places(qpos), np.zeros((len(qpos), 3))
-    return on_root(recording.step, qpos, root, relative(place[0], place))
+    poses = recording.poses[first : first + samples + 1]
+    place, root = places(poses), np.zeros((len(poses), 3))
+    return on_root(recording.step, poses, root, relative(place[0], place))
 
 
-def on_root(step: float, qpos, root, local) -> Motion:
+def on_root(step: float, poses, root, local) -> Motion:
     """Put poses onto a root, given where the torso is (samples, 3) in the root's frame, seen from above."""
-    turn = local[:, 2] - rotations.yaw(qpos[:, 3:7])
-    positions = np.concatenate([local[:, :2], qpos[:, 2:3]], axis=-1)
-    quaternions = _continuous(rotations.turned(qpos[:, 3:7], turn))
-    return Motion(step, root, positions, quaternions, qpos[:, 7:].copy(), np.zeros(3))
+    turn = local[:, 2] - rotations.yaw(poses[:, 3:7])
+    positions = np.concatenate([local[:, :2], poses[:, 2:3]], axis=-1)
+    quaternions = _continuous(rotations.turned(poses[:, 3:7], turn))
+    return Motion(step, root, positions, quaternions, poses[:, 7:].copy(), np.zeros(3))
 
 
 def _place(pose: Pose) -> np.ndarray:

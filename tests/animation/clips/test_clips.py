@@ -63,7 +63,7 @@ def assert_kinematics(body, file, clips):
             motion = clip.motion._replace(root=0.0 * clip.motion.root) if in_place else clip.motion
             world = gltf_reader.played(file, name)
             world = np.stack(np.broadcast_arrays(*(world[part] for part in body.part_names)), axis=1)
-            places, turns = placed(body, motion.qpos(), body.part_names)
+            places, turns = placed(body, motion.poses(), body.part_names)
             assert abs(world[..., :3, 3] - places[..., axes]).max() < near
             assert abs(world[..., :3, :3] - turns[..., axes, :][..., axes]).max() < 1e-5
 
@@ -214,7 +214,7 @@ def test_presets_return(robot, preset):
     environment = arc_suite.load(body, "walk", {"random": 0})
     recording = recordings.record(environment, policy("cpg", body, preset), 200, 700)
     # Of the torso, whose sway is taken out by a mean over a gait cycle.
-    cycle, sums = round(clip.motion.seconds / clip.cycles / recording.step), recording.qpos[:, :2].cumsum(axis=0)
+    cycle, sums = round(clip.motion.seconds / clip.cycles / recording.step), recording.poses[:, :2].cumsum(axis=0)
     path = (sums[cycle:] - sums[:-cycle]) / cycle
     speed = np.hypot(*np.diff(path, axis=0).T).mean() / recording.step
     assert np.hypot(*clip.motion.twist[:2]) == pytest.approx(speed, rel=0.01)
@@ -311,7 +311,7 @@ def test_soles_stand_on_the_ground(robot):
     body = ROBOTS[robot]
     for name in ("walk", "turn_left"):
         clip = made(robot)[name]
-        soles = feet_of(body, clip.motion.qpos())[..., 2] - [leg.foot.radius for leg in body.legs]
+        soles = feet_of(body, clip.motion.poses())[..., 2] - [leg.foot.radius for leg in body.legs]
         stance = np.zeros(soles.shape, bool)
         for leg, foot in enumerate(body.foot_names):
             events = [contact for contact in clip.foot_contacts if contact.foot == foot]
@@ -327,7 +327,7 @@ def test_idle_breathes_on_its_feet(robot):
     body, clip = ROBOTS[robot], made(robot)["idle"]
     assert clip.cycles == 0 and not clip.foot_contacts and not clip.moves
     height = body.torso.standing_height
-    feet = feet_of(body, clip.motion.qpos())
+    feet = feet_of(body, clip.motion.poses())
     assert np.ptp(feet, axis=0).max() < 0.012 * height
     assert abs(feet[..., 2] - [leg.foot.radius for leg in body.legs]).max() < 0.012 * height
     assert 0.001 * height < np.ptp(clip.motion.positions[:, 2]) < 0.013 * height
@@ -353,7 +353,7 @@ def test_between_frames_a_clip_is_near_the_physics(robot):
     fine = export.clips(Setup(body), ["walk"], fps=1000.0 / 2.0)[0]
     coarse = gltf_reader.read(export.glb(body, export.clips(Setup(body), ["walk"])))
     world = gltf_reader.played(coarse, "walk_loop", fine.times)
-    feet = feet_of(body, fine.motion.qpos())
+    feet = feet_of(body, fine.motion.poses())
     for leg, foot in enumerate(body.foot_names):
         miss = np.linalg.norm(world[foot][:, :3, 3] - feet[:, leg][:, [1, 2, 0]], axis=-1)
         assert miss.max() < 0.006
@@ -368,7 +368,7 @@ def test_the_recording_is_the_episode_to_the_bit():
     for _ in range(15):
         timestep = environment.step(act(timestep))
         poses.append(environment.physics.data.qpos.copy())
-    np.testing.assert_array_equal(recording.qpos[:: recording.substeps], poses[9:])
+    np.testing.assert_array_equal(recording.poses[:: recording.substeps], poses[9:])
 
 
 @pytest.mark.parametrize(

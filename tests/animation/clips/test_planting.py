@@ -24,7 +24,7 @@ def made(plant):
 def soles(motion):
     """Places (samples, feet, 3) of the lowest points of the feet in the world."""
     radii = np.array([leg.foot.radius for leg in BODY.legs])
-    return placed(BODY, motion.qpos(), BODY.foot_names)[0] - radii[:, None] * (0.0, 0.0, 1.0)
+    return placed(BODY, motion.poses(), BODY.foot_names)[0] - radii[:, None] * (0.0, 0.0, 1.0)
 
 
 def slip(motion):

@@ -51,8 +51,8 @@ def test_along_adds_small_steps_and_relative_undoes_after():
 def test_the_period_is_the_cycle_if_the_pose_returns():
     recording = walk(TWISTS[0])
     assert loops.period(recording) == pytest.approx(CYCLE, abs=STEP)
-    random = np.random.default_rng(0).normal(size=(len(recording.qpos), 2)).cumsum(axis=0)
-    assert loops.period(recording._replace(qpos=np.concatenate([recording.qpos[:, :7], random], axis=-1))) is None
+    random = np.random.default_rng(0).normal(size=(len(recording.poses), 2)).cumsum(axis=0)
+    assert loops.period(recording._replace(poses=np.concatenate([recording.poses[:, :7], random], axis=-1))) is None
 
 
 @pytest.mark.parametrize("twist", TWISTS)
@@ -70,13 +70,13 @@ def test_a_loop(twist):
     # The root runs below the torso, and the whole is what was recorded.
     np.testing.assert_allclose(loop.positions[:-1, :2].mean(axis=0), 0.0, atol=1e-3)
     np.testing.assert_allclose(rotations.yaw(loop.quaternions[:-1]).mean(), 0.0, atol=1e-3)
-    qpos = loop.qpos()
-    there = np.concatenate([recording.qpos[:, :2], rotations.yaw(recording.qpos[:, 3:7])[:, None]], axis=-1)[137:413]
-    here = np.concatenate([qpos[:, :2], rotations.yaw(qpos[:, 3:7])[:, None]], axis=-1)
+    poses = loop.poses()
+    there = np.concatenate([recording.poses[:, :2], rotations.yaw(recording.poses[:, 3:7])[:, None]], axis=-1)[137:413]
+    here = np.concatenate([poses[:, :2], rotations.yaw(poses[:, 3:7])[:, None]], axis=-1)
     difference = root_motion.relative(here[0], here) - root_motion.relative(there[0], there)
     np.testing.assert_allclose(difference[:, :2], 0.0, atol=1e-9)
     np.testing.assert_allclose(rotations.wrapped(difference[:, 2]), 0.0, atol=1e-9)
-    np.testing.assert_allclose(qpos[:, 7:], recording.qpos[137:413, 7:], atol=1e-9)
+    np.testing.assert_allclose(poses[:, 7:], recording.poses[137:413, 7:], atol=1e-9)
 
 
 def test_a_seam_is_spread():
@@ -85,7 +85,7 @@ def test_a_seam_is_spread():
     assert loop.seam == pytest.approx(0.02 * CYCLE, rel=0.01)
     assert loops.closings(recording, CYCLE, 4)[1] == pytest.approx((loop.seam, 275))
     assert (loop.joints[0] == loop.joints[-1]).all() and (loop.quaternions[0] == loop.quaternions[-1]).all()
-    correction = loop.joints[:, 1] - recording.qpos[10:286, 8]
+    correction = loop.joints[:, 1] - recording.poses[10:286, 8]
     np.testing.assert_allclose(np.diff(correction)[:-1], -0.02 * STEP, atol=1e-12)
     jumps = abs(np.diff(loop.quaternions, axis=0)).max(axis=-1)
     assert jumps[[0, -1]].max() < 1.2 * np.median(jumps) + 1e-3
@@ -95,11 +95,11 @@ def test_a_seam_is_spread():
 def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
     """Of four cycles the last leads further: a loop of the first three goes as fast as the walk does on the mean."""
     recording = walk(twist, seconds=4 * CYCLE)
-    qpos = recording.qpos.copy()
-    qpos[825:, :2] += np.outer(np.arange(276) / 275.0, 0.3 * (qpos[-1, :2] - qpos[825, :2]))
-    first = loops.usual(Recording(STEP, 25, qpos), 275)
+    poses = recording.poses.copy()
+    poses[825:, :2] += np.outer(np.arange(276) / 275.0, 0.3 * (poses[-1, :2] - poses[825, :2]))
+    first = loops.usual(Recording(STEP, 25, poses), 275)
     assert first < 600
-    speed = np.hypot(*loops.loop(Recording(STEP, 25, qpos), first, 275).twist[:2])
+    speed = np.hypot(*loops.loop(Recording(STEP, 25, poses), first, 275).twist[:2])
     mean = np.hypot(*twist[:2])
     assert mean < speed < 1.3 * mean
 
@@ -107,22 +107,22 @@ def test_of_the_loops_that_close_the_usual_one_is_taken(twist):
 def test_a_loop_that_closes_goes_before_a_usual_one():
     """Two cycles: the first is slower, the pose of the second returns."""
     recording = walk(TWISTS[0], seconds=2 * CYCLE)
-    qpos = recording.qpos.copy()
-    qpos[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)
-    qpos[275:, 0] += 0.05 * np.cos(2.5) * np.arange(276) / 275.0
-    qpos[275:, 1] += 0.05 * np.sin(2.5) * np.arange(276) / 275.0
-    first = loops.usual(Recording(STEP, 25, qpos), 275)
-    assert loops.loop(Recording(STEP, 25, qpos), first, 275).seam <= loops.CLOSED
+    poses = recording.poses.copy()
+    poses[:275, 8] += 0.1 * (1.0 - np.arange(275) / 275.0)
+    poses[275:, 0] += 0.05 * np.cos(2.5) * np.arange(276) / 275.0
+    poses[275:, 1] += 0.05 * np.sin(2.5) * np.arange(276) / 275.0
+    first = loops.usual(Recording(STEP, 25, poses), 275)
+    assert loops.loop(Recording(STEP, 25, poses), first, 275).seam <= loops.CLOSED
 
 
 def test_no_loop_is_taken_whose_seam_is_over_the_bound():
     """The least seam is 1.9 degrees; one of 2.2 degrees would be more usual."""
     recording = walk(TWISTS[0], seconds=2 * CYCLE)
-    qpos = recording.qpos[:-1].copy()
-    qpos[:275, 8] += np.radians(np.where(np.arange(275) < 11, 1.9, 2.2))
-    qpos[:11, :2] += 0.05  # a longer way than that of the others
-    first = loops.usual(Recording(STEP, 25, qpos), 275)
-    assert np.radians(1.8) < loops.loop(Recording(STEP, 25, qpos), first, 275).seam <= loops.OPEN
+    poses = recording.poses[:-1].copy()
+    poses[:275, 8] += np.radians(np.where(np.arange(275) < 11, 1.9, 2.2))
+    poses[:11, :2] += 0.05  # a longer way than that of the others
+    first = loops.usual(Recording(STEP, 25, poses), 275)
+    assert np.radians(1.8) < loops.loop(Recording(STEP, 25, poses), first, 275).seam <= loops.OPEN
 
 
 def test_the_least_number_of_cycles_that_refuses_the_fewest():
@@ -149,7 +149,7 @@ def test_an_end_meets_a_pose_and_feet_stay_where_they_are(end):
     assert met.seam == pytest.approx(root_motion.seam(pose.relative(passage.pose(end))), rel=0.2)
     # Beyond the samples over which the pose fades, the motion in the world is as it was.
     rows = slice(220, 580) if end == 0 else slice(20, 380)
-    before, after = (root_motion.places(motion.qpos()[rows]) for motion in (passage, met))
+    before, after = (root_motion.places(motion.poses()[rows]) for motion in (passage, met))
     np.testing.assert_allclose(
         root_motion.relative(after[0], after), root_motion.relative(before[0], before), atol=1e-9
     )
@@ -162,8 +162,8 @@ def test_a_straight_loop_goes_where_it_is_to():
     np.testing.assert_allclose(straight.twist, (np.hypot(*loop.twist[:2]), 0.0, 0.0), atol=1e-12)
     np.testing.assert_allclose(straight.root[:, 1:], 0.0, atol=1e-12)
     # In the first moment the torso moves over the ground in the direction that it had, seen from itself.
-    ways = [np.diff(root_motion.places(motion.qpos())[:2], axis=0)[0] for motion in (loop, straight)]
-    headings = [rotations.yaw(motion.qpos()[0, 3:7]) for motion in (loop, straight)]
+    ways = [np.diff(root_motion.places(motion.poses())[:2], axis=0)[0] for motion in (loop, straight)]
+    headings = [rotations.yaw(motion.poses()[0, 3:7]) for motion in (loop, straight)]
     seen = [rotations.headed(way[:2], heading) for way, heading in zip(ways, headings, strict=True)]
     np.testing.assert_allclose(seen[0], seen[1], atol=1e-5)
 
@@ -191,11 +191,11 @@ def test_frames_lie_between_samples():
 def test_a_passage_keeps_the_way():
     recording = walk((0.5, 0.0, 0.3))
     passage = root_motion.passage(recording, 500, 600, 275)
-    there = recording.qpos[500:1101]
-    qpos = passage.qpos()
-    turn = rotations.yaw(qpos[:1, 3:7])[0] - rotations.yaw(there[:1, 3:7])[0]
+    there = recording.poses[500:1101]
+    poses = passage.poses()
+    turn = rotations.yaw(poses[:1, 3:7])[0] - rotations.yaw(there[:1, 3:7])[0]
     way = rotations.headed(there[:, :2] - there[0, :2], -turn)
-    np.testing.assert_allclose(qpos[:, :2] - qpos[0, :2], way, atol=1e-9)
+    np.testing.assert_allclose(poses[:, :2] - poses[0, :2], way, atol=1e-9)
     np.testing.assert_allclose(passage.root[0], 0.0, atol=1e-12)
     speeds = np.hypot(*np.diff(passage.root[:, :2], axis=0).T) / STEP
     np.testing.assert_allclose(speeds, 0.5, rtol=0.05)  # the torso's own varies by 0.8
