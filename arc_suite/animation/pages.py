@@ -106,6 +106,8 @@ def plain(value, digits: int | None = _DIGITS):
         return {name: plain(item, digits) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item, digits) for item in value]
+    if isinstance(value, np.ndarray) and value.dtype.kind == "i":
+        return value.tolist()
     if isinstance(value, np.ndarray):
         return (value.astype(float) if digits is None else value.astype(float).round(digits)).tolist()
     if isinstance(value, float) and digits is not None:

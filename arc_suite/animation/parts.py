@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from arc_suite import models, rotations
-from arc_suite.animation.shapes import Mesh
 from arc_suite.models.standing import GEOMS, stood
 from arc_suite.robots.spec import Body, Link
 
@@ -22,16 +21,28 @@ _MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
 _AS_ABOVE = np.array((1.0, 0.0, 0.0, 0.0))
 
 
+class Hull(NamedTuple):
+    """A convex polyhedron.
+
+    Attributes:
+        points: (n, 3) m.
+        triangles: (m, 3) indices of points, counter-clockwise as seen from outside.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+
+
 class Shape(NamedTuple):
     """Something to be seen.
 
     Attributes:
-        kind: of `shapes.KINDS`, or mesh.
+        kind: of `shapes.KINDS`, or hull.
         size: (3,) half-extents as MuJoCo has them for the kind, m.
         place: (3,) in the part's frame, m.
         quaternion: (4,) in the same frame, w first.
         material: name.
-        mesh: of a mesh; else None.
+        hull: of the kind hull; else None.
     """
 
     kind: str
@@ -39,7 +50,7 @@ class Shape(NamedTuple):
     place: np.ndarray
     quaternion: np.ndarray
     material: str
-    mesh: Mesh | None = None
+    hull: Hull | None = None
 
 
 class Part(NamedTuple):
@@ -106,18 +117,22 @@ def _part(model: mujoco.MjModel, index: int, ids: list[int]) -> Part:
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
     material, place = model.material(model.geom_matid[geom]).name, (model.geom_pos[geom], model.geom_quat[geom])
     if model.geom_type[geom] == _MESH:
-        return Shape("mesh", model.geom_size[geom], *place, material, _mesh(model, model.geom_dataid[geom]))
+        return Shape("hull", model.geom_size[geom], *place, material, _hull(model, model.geom_dataid[geom]))
     return Shape(KINDS[int(model.geom_type[geom])], model.geom_size[geom], *place, material)
 
 
-def _mesh(model: mujoco.MjModel, index: int) -> Mesh:
-    """Return a mesh, in which a point has as many entries as it has normals."""
-    faces = slice(model.mesh_faceadr[index], model.mesh_faceadr[index] + model.mesh_facenum[index])
-    corners = np.stack([model.mesh_face[faces], model.mesh_facenormal[faces]], axis=-1).reshape(-1, 2)
-    pairs, triangles = np.unique(corners, axis=0, return_inverse=True)
-    points = model.mesh_vert[model.mesh_vertadr[index] + pairs[:, 0]].astype(float)
-    normals = model.mesh_normal[model.mesh_normaladr[index] + pairs[:, 1]].astype(float)
-    return Mesh(points, normals, triangles.reshape(-1, 3))
+def _hull(model: mujoco.MjModel, index: int) -> Hull:
+    """Return the convex hull of a mesh, which is what touches; the mesh itself may have thirty times the points.
+
+    MuJoCo's graph of a hull has the numbers of its points and faces, where the edges of each point begin, the points'
+    indices in the mesh, the edges, and the corners of its faces as indices in the mesh.
+    """
+    graph = model.mesh_graph[model.mesh_graphadr[index] :]
+    points, faces = graph[:2]
+    corners = graph[2 + 3 * points + 3 * faces :][: 3 * faces]
+    used, triangles = np.unique(corners, return_inverse=True)
+    points = model.mesh_vert[model.mesh_vertadr[index] + used].astype(float)
+    return Hull(points, triangles.reshape(-1, 3))
 
 
 def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation import shapes
+from arc_suite.animation.clips import shapes
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.gltf import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
 from arc_suite.animation.clips.metadata import ROOT_MOTIONS, animations, metadata
+from arc_suite.animation.clips.shapes import Mesh
 from arc_suite.animation.parts import Material, Part, frames
 from arc_suite.animation.parts import parts as described
-from arc_suite.animation.shapes import Mesh
 from arc_suite.robots.spec import Body
 
 RIGS = ("skin", "nodes")
@@ -67,7 +67,7 @@ def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
     """Return the shapes of a part by material, those of one as one mesh in the part's frame."""
     meshes: dict[str, list[Mesh]] = {}
     for shape in part.shapes:
-        mesh = shape.mesh or shapes.shape(shape.kind, shape.size, tolerance)
+        mesh = shapes.polyhedron(*shape.hull) if shape.hull else shapes.shape(shape.kind, shape.size, tolerance)
         meshes.setdefault(shape.material, []).append(mesh.moved(shape.place, rotations.matrix(shape.quaternion)))
     return {material: shapes.joined(several) for material, several in meshes.items()}
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from arc_suite.animation import shapes
+from arc_suite.animation.clips import shapes
 
 SIZE = (0.3, 0.2, 0.5)
 BALL, TUBE, BRICK = 4.0 / 3.0 * math.pi * 0.3**3, math.pi * 0.3**2 * 0.4, 0.3 * 0.2 * 0.5

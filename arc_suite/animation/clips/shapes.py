@@ -54,6 +54,14 @@ def shape(kind: str, size, tolerance: float) -> Mesh:
     return _ball(count, np.full(3, size[0]), size[1] if kind == "capsule" else 0.0)
 
 
+def polyhedron(points: np.ndarray, triangles: np.ndarray) -> Mesh:
+    """Return triangles (m, 3) of points (n, 3) with flat faces."""
+    corners = points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-30)
+    return Mesh(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), np.arange(corners[..., 0].size).reshape(-1, 3))
+
+
 def segments(radius: float, tolerance: float) -> int:
     """Return into how many segments, an even number, a circle is cut for a chord to be within a tolerance of it."""
     count = math.pi / math.acos(max(1.0 - tolerance / radius, 0.0))
