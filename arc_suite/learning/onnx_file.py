@@ -33,9 +33,9 @@ def metadata(network: Network) -> dict:
     substeps                    of the simulation between them
     joints                      names, in the order of the actions
     gears                       N m that an action of 1 is, by joint; only of motors
-    servos                      by joint its name in the file that it comes from, angle in the standing pose and distance
-                                from it that an action of 1 asks for, rad, stiffness, N m/rad, damping, N m s/rad, and
-                                limit, N m; only of servos
+    servos                      by joint: its name in the file that it comes from, its angle in the standing pose and
+                                how far from it an action of 1 is, rad, stiffness, N m/rad, damping, N m s/rad, limit,
+                                N m; only of servos
     file_joints                 names of the joints in the order of that file
     gait_clock                  how the block of that name follows from time; only where there is one
 

@@ -73,6 +73,10 @@ class Physics(dm_mujoco.Physics):
             self._change(self._lasting)
         self._unchanged = {name: self._unchanged[name] for name in self._lasting}
 
+    def after_reset(self) -> None:
+        """Compute what follows from the start; servos act in it, where dm_control disables motors."""
+        self.forward()
+
     def change_model(self, fields: Mapping[str, np.ndarray], lasting: bool = False) -> None:
         """Set fields of the model.
 

@@ -110,9 +110,10 @@ def test_an_action_of_0_stands_and_of_1_is_the_farther_limit(body):
     assert data.actuator_force[index] == pytest.approx(joint.servo.stiffness * 0.1 * reach, rel=1e-6)
 
 
-def test_a_vector_is_as_many_environments(body):
-    vector = VectorEnv(body, "steer", 3, 2, task_kwargs={"kicks": 1.0})
-    singles = [Env(body, "steer", {"kicks": 1.0}) for _ in range(3)]
+@pytest.mark.parametrize("settings", [{}, {"kicks": 1.0, "motor_strength": (0.5, 1.0), "actuator_failure": True}])
+def test_a_vector_is_as_many_environments(body, settings):
+    vector = VectorEnv(body, "walk", 3, 2, task_kwargs=settings)
+    singles = [Env(body, "walk", settings) for _ in range(3)]
     observations, _ = vector.reset(seed=5)
     for index, single in enumerate(singles):
         np.testing.assert_array_equal(observations[index], single.reset(seed=5 + index)[0])
