@@ -51,7 +51,7 @@ export class Law {
     this.state = { command: zero, integral: zero, motion: zero, size: 0, phase: 0 };
   }
 
-  // Returns actions of the motors for blocks of an observation, and remembers what the next step needs.
+  // Returns actions of motors or servos for blocks of an observation, and remembers what the next step needs.
   act({ posture, velocities, command, gait_clock: clock }) {
     const c = this.constants, state = this.state;
     const going = clock[0] !== 0 || clock[1] !== 0;
@@ -69,8 +69,9 @@ export class Law {
     this.state = { command: smooth, integral, motion: requested, size, phase: phase + advance };
     const { targets, changes } = this.planned(requested, size, phase, advance, posture.slice(1, 5));
     return targets.map((target, joint) => {
-      const speed = velocities[6 + joint] - changes[joint] / c.step;
-      return clamp(c.stiffness[joint] * (target - posture[5 + joint]) - c.damping[joint] * speed, -1, 1);
+      const speed = changes[joint] / c.step, stiffness = c.stiffness[joint], damping = c.damping[joint];
+      if (c.reach) return clamp((target + (damping * speed) / stiffness) / c.reach[joint], -1, 1); // a servo's angle
+      return clamp(stiffness * (target - posture[5 + joint]) - damping * (velocities[6 + joint] - speed), -1, 1);
     });
   }
 

@@ -3,8 +3,10 @@ import * as THREE from "three";
 
 export const quaternion = ([w, x, y, z]) => new THREE.Quaternion(x, y, z, w);
 
-export function geometry({ kind, size: [a, b, c] }) {
+export function geometry({ kind, size: [a, b, c], hull }) {
   switch (kind) {
+    case "hull":
+      return polyhedron(hull);
     case "box":
       return new THREE.BoxGeometry(2 * a, 2 * b, 2 * c);
     case "ellipsoid":
@@ -18,6 +20,15 @@ export function geometry({ kind, size: [a, b, c] }) {
   }
 }
 
+// Triangles with flat faces.
+function polyhedron({ points, triangles }) {
+  const shape = new THREE.BufferGeometry().setIndex(triangles.flat());
+  shape.setAttribute("position", new THREE.Float32BufferAttribute(points.flat(), 3));
+  const flat = shape.toNonIndexed();
+  flat.computeVertexNormals();
+  return flat;
+}
+
 export function materials(looks) {
   return Object.fromEntries(
     Object.entries(looks).map(([name, { colour, emission, roughness }]) => {
@@ -29,7 +40,7 @@ export function materials(looks) {
 }
 
 // A rigid part with its shapes, as Python's `parts` gives it.
-export function partOf({ name, shapes }, looks) {
+function partOf({ name, shapes }, looks) {
   const group = new THREE.Group();
   group.name = name;
   for (const shape of shapes) {
@@ -40,4 +51,28 @@ export function partOf({ name, shapes }, looks) {
     group.add(mesh);
   }
   return group;
+}
+
+// A body as Python's `parts` gives it: parts hang on one another, from the torso on.
+export class Figure {
+  constructor(parts, looks) {
+    this.parts = parts.map((part) => partOf(part, looks));
+    parts.forEach((part, index) => {
+      this.parts[index].position.set(...part.place);
+      this.parts[index].quaternion.copy(quaternion(part.quaternion));
+      if (part.parent !== null) this.parts[part.parent].add(this.parts[index]);
+    });
+    this.torso = this.parts[0];
+    this.hinges = parts.flatMap(({ joint, axis, quaternion: rest }, index) =>
+      joint === null ? [] : [{ part: this.parts[index], joint, axis: new THREE.Vector3(...axis), rest: quaternion(rest) }],
+    );
+  }
+
+  // Turns the joints by angles from the standing pose, rad; the torso is moved by itself.
+  bend(angles) {
+    const turn = new THREE.Quaternion();
+    for (const { part, joint, axis, rest } of this.hinges)
+      part.quaternion.copy(rest).multiply(turn.setFromAxisAngle(axis, angles[joint]));
+    this.torso.updateMatrixWorld(true);
+  }
 }

@@ -4,7 +4,7 @@ import * as THREE from "three";
 import { bytes, unpacked } from "./data.js";
 import { grounds, triangles } from "./ground.js";
 import { Inputs } from "./inputs.js";
-import { materials, partOf } from "./parts.js";
+import { Figure, materials, quaternion } from "./parts.js";
 import { Simulation } from "./simulation.js";
 import { View } from "./view.js";
 
@@ -22,13 +22,14 @@ class Play {
     const { height } = body, { field } = this.simulation;
     this.body = body;
     this.view = new View(canvas, height, body.reach, (field ? 20 : 34) * height);
-    const looks = materials(body.materials), made = grounds(height);
-    this.parts = body.parts.map((part) => partOf(part, looks));
+    const made = grounds(height);
+    this.figure = new Figure(body.parts, materials(body.materials));
+    this.parts = this.figure.parts;
     this.floor = made(field ? triangles(field) : new THREE.PlaneGeometry(100 * height, 100 * height), 1);
     const rope = new THREE.BufferGeometry().setFromPoints([new THREE.Vector3(), new THREE.Vector3(1, 1, 1)]);
     this.rope = new THREE.Line(rope, new THREE.LineBasicMaterial({ color: "#ffd23f", depthTest: false }));
     this.rope.frustumCulled = false;
-    this.view.scene.add(...this.parts, this.floor, this.rope);
+    this.view.scene.add(this.figure.torso, this.floor, this.rope);
     this.debt = 0; // s of simulation that are due
     this.lain = 0; // s since a fall
     this.pace = 1; // share of real time
@@ -59,12 +60,10 @@ class Play {
   }
 
   pose() {
-    const { xpos, xquat } = this.simulation.data, first = this.body.task.torso;
-    this.parts.forEach((part, index) => {
-      const [w, x, y, z] = xquat.subarray(4 * (first + index), 4 * (first + index) + 4);
-      part.position.fromArray(xpos, 3 * (first + index));
-      part.quaternion.set(x, y, z, w);
-    });
+    const { qpos } = this.simulation.data, { torso } = this.figure, { joints, home } = this.body.task;
+    torso.position.fromArray(qpos);
+    torso.quaternion.copy(quaternion(qpos.subarray(3, 7)));
+    this.figure.bend(joints.map((place, joint) => qpos[place] - home[joint]));
     const { pull } = this.simulation;
     this.rope.visible = pull !== null;
     if (pull) this.rope.geometry.setFromPoints([pull.point, pull.target].map((point) => new THREE.Vector3(...point)));
@@ -96,12 +95,12 @@ class Play {
     const ray = new THREE.Raycaster();
     const aim = ({ x, y }) => ray.setFromCamera(new THREE.Vector2(x, y), this.view.camera);
     aim(place);
-    const [hit] = ray.intersectObjects(this.parts, true);
+    const [hit] = ray.intersectObject(this.figure.torso, true);
     if (!hit) return null;
     const index = this.parts.indexOf(hit.object.parent);
     const facing = this.view.camera.getWorldDirection(new THREE.Vector3());
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, hit.point);
-    this.simulation.grab(index, this.parts[index].worldToLocal(hit.point.clone()).toArray(), hit.point.toArray());
+    this.simulation.grab(index, hit.point.toArray());
     return (next) => {
       aim(next);
       const point = ray.ray.intersectPlane(plane, new THREE.Vector3());

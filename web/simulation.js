@@ -82,9 +82,13 @@ export class Simulation {
     if (this.count % substeps === 0) task.after(data);
   }
 
-  // Takes hold of a part at a point in its frame, which is at a point of the world, m.
-  grab(part, place, point) {
-    this.pull = { body: this.body.task.torso + part, place, point, target: point };
+  // Takes hold of a part at a point of the world, m.
+  grab(part, point) {
+    const { data, body: { task } } = this, body = task.parts[part];
+    const turn = data.xmat.subarray(9 * body, 9 * body + 9);
+    const arm = point.map((value, i) => value - data.xpos[3 * body + i]);
+    const place = [0, 1, 2].map((i) => dot(arm, [turn[i], turn[3 + i], turn[6 + i]])); // in the body's frame
+    this.pull = { body, place, point, target: point };
   }
 
   // Pulls a part at a point towards a target, like a damped spring: a distance of h weighs STIFFNESS times the body.

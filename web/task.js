@@ -38,7 +38,7 @@ export class Task {
   }
 
   placed({ xpos, qpos }) {
-    const { torso } = this.constants;
+    const torso = this.constants.parts[0];
     return [xpos[3 * torso], xpos[3 * torso + 1], yaw(qpos.subarray(3, 7))];
   }
 
@@ -65,7 +65,7 @@ export class Task {
   }
 
   fallen({ qpos, cfrc_ext: forces }) {
-    const { lowest, lying, least_upright: least, weight, torso } = this.constants;
+    const { lowest, lying, least_upright: least, weight, parts: [torso] } = this.constants;
     const [, x, y] = qpos.subarray(3, 7);
     return !(this.height(qpos) >= lowest && forces[6 * torso + 5] / weight < lying && 1 - 2 * (x * x + y * y) >= least);
   }
@@ -76,12 +76,14 @@ export class Task {
 
   // Returns the blocks of an observation by name.
   observe(data) {
-    const { headed: commanded } = this.constants, qpos = data.qpos, qvel = data.qvel;
+    const { headed: commanded, joints, dofs, home } = this.constants, { qpos, qvel } = data;
     const heading = commanded ? yaw(qpos.subarray(3, 7)) : this.course;
     const shown = this.going ? 1 : 0;
+    const angles = joints.map((place, joint) => qpos[place] - home[joint]);
+    const speeds = dofs.map((place) => qvel[place]);
     return {
-      posture: [this.height(qpos), ...turned(qpos.subarray(3, 7), -heading), ...qpos.subarray(7)],
-      velocities: [...headed(qvel[0], qvel[1], heading), ...qvel.subarray(2)],
+      posture: [this.height(qpos), ...turned(qpos.subarray(3, 7), -heading), ...angles],
+      velocities: [...headed(qvel[0], qvel[1], heading), ...qvel.subarray(2, 6), ...speeds],
       contact_forces: this.forces(data.cfrc_ext, heading),
       gait_clock: [shown * Math.sin(this.phase), shown * Math.cos(this.phase)],
       command: [...this.desired, ...this.motion],
@@ -90,11 +92,11 @@ export class Task {
 
   // Torque and force on each part, in units of the task, as a heading shows them.
   forces(forces, heading) {
-    const { torso, parts, force_unit: unit } = this.constants;
-    return Array.from({ length: parts }, (_, part) => {
-      const force = Array.from(forces.subarray(6 * (torso + part), 6 * (torso + part + 1)), (value, i) => value / unit[i]);
+    const { parts, force_unit: unit } = this.constants;
+    return parts.flatMap((part) => {
+      const force = Array.from(forces.subarray(6 * part, 6 * part + 6), (value, i) => value / unit[i]);
       const across = [0, 3].flatMap((i) => [...headed(force[i], force[i + 1], heading), force[i + 2]]);
       return across.map((value) => Math.min(Math.max(value, -1), 1));
-    }).flat();
+    });
   }
 }

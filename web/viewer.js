@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { drawGait, drawReward, extent, gaitTime, rewardTime } from "./charts.js";
 import { unpacked } from "./data.js";
 import { grounds, triangles } from "./ground.js";
-import { geometry, materials, partOf, quaternion } from "./parts.js";
+import { Figure, geometry, materials, quaternion } from "./parts.js";
 import { View } from "./view.js";
 
 const DARK = new THREE.MeshStandardMaterial({ color: 0x121214 }); // of a leg whose motors have failed
@@ -15,19 +15,10 @@ const byId = (id) => document.getElementById(id);
 const meshesOf = (part) => part.children.filter((child) => child.isMesh);
 
 // A body whose parts turn as a walk tells; the frame is MuJoCo's: x ahead, y left, z up.
-class Creature {
+class Creature extends Figure {
   constructor(walk) {
+    super(walk.parts, materials(walk.materials));
     this.walk = walk;
-    const looks = materials(walk.materials);
-    this.parts = walk.parts.map((part) => partOf(part, looks));
-    walk.parts.forEach(({ place, quaternion: turn }, index) => {
-      this.parts[index].position.set(...place);
-      this.parts[index].quaternion.copy(quaternion(turn));
-    });
-    walk.parts.forEach((part, index) => part.parent !== null && this.parts[part.parent].add(this.parts[index]));
-    this.torso = this.parts[0];
-    this.axes = walk.parts.map((part) => part.axis && new THREE.Vector3(...part.axis));
-    this.rests = walk.parts.map((part) => quaternion(part.quaternion));
     this.looks = new Map(this.parts.flatMap(meshesOf).map((mesh) => [mesh, mesh.material]));
   }
 
@@ -41,21 +32,15 @@ class Creature {
 
   seek(time) {
     const { before, after, share } = this.row(time);
-    const { positions, quaternions, joints, parts } = this.walk;
+    const { positions, quaternions, joints } = this.walk;
     const mix = (values, index) => (1 - share) * values[before][index] + share * values[after][index];
     this.torso.position.set(...[0, 1, 2].map((axis) => mix(positions, axis)));
     this.torso.quaternion.copy(quaternion(quaternions[before])).slerp(quaternion(quaternions[after]), share);
-    const turn = new THREE.Quaternion();
-    parts.forEach((part, index) => {
-      if (part.joint === null) return;
-      turn.setFromAxisAngle(this.axes[index], mix(joints, part.joint));
-      this.parts[index].quaternion.copy(this.rests[index]).multiply(turn);
-    });
+    this.bend(joints[before].map((_, joint) => mix(joints, joint)));
     const failed = this.walk.scenery.failed[before] ?? [];
     for (const part of this.parts) {
       for (const mesh of meshesOf(part)) mesh.material = failed.includes(part.name) ? DARK : this.looks.get(mesh);
     }
-    this.torso.updateMatrixWorld(true);
   }
 
   // Names of the parts that are dark.

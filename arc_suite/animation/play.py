@@ -84,13 +84,13 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
 def _ground(body: Body, arena: str) -> dict[str, Any]:
     """The MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
     task, model = Setup.of(body, _TASK, {"arena": arena}).prepared()
-    root = models.assemble(body, task.scene.arena)
+    text = models.text(body, task.scene.arena)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
-        root.option.integrator = "Euler"
+        text = text.replace('integrator="implicitfast"', 'integrator="Euler"')
     data = mujoco.MjData(model)
     data.qpos[:] = task.scene.standing
     mujoco.mj_forward(model, data)
-    return {"xml": models.written(root), "start": pages.plain(task.cleared(task.read(data)), digits=None)}
+    return {"xml": text, "start": pages.plain(task.cleared(task.read(data)), digits=None)}
 
 
 def _task(task: Task, steer: Task) -> dict[str, Any]:
@@ -103,10 +103,13 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
     headed = "command" in task.commands
     context, health = (task if headed else steer).context, steer.health  # type: ignore[attr-defined]  # of commands
     scene, (force_unit,) = steer.scene, context.force_unit
+    layout, angles = scene.layout, np.r_[scene.layout.joint_angles]
     return {
         "headed": headed,
-        "torso": scene.layout.torso,
-        "parts": len(scene.body.part_names),
+        "parts": np.r_[layout.parts],
+        "joints": angles,
+        "dofs": np.r_[layout.joint_velocities],
+        "home": scene.standing[angles],
         "step": scene.control_timestep,
         "turn": clock.TWO_PI * task.parameters.gait_frequency * scene.control_timestep,
         "units": context.units,
@@ -139,8 +142,8 @@ def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:
     blocks, task = made.blocks, made.setup.definition
     if unknown := [block for block in blocks if block not in _BLOCKS]:
         raise ValueError(f"policy {name}: observes {unknown[0]}, and a page has {', '.join(_BLOCKS)} alone")
-    if task.actions != "torque":
-        raise ValueError(f"policy {name}: its actions are a {task.actions} a joint, and a page takes torques")
+    if task.actions != steer.actions:
+        raise ValueError(f"policy {name}: its actions are a {task.actions} a joint, and a page takes {steer.actions}s")
     nodes = [[node.operator, *node.inputs] for node in made.graph.nodes]
     arrays = {array: _array(values) for array, values in made.graph.arrays.items()}
     return task, {"kind": "graph", "constants": {"blocks": list(blocks), "nodes": nodes, "arrays": arrays}}

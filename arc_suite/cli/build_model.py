@@ -100,4 +100,4 @@ def _arena(body: Body) -> Arena:
 def _text(body: Body, arena: Arena) -> str:
     if FLAGS.json:
         return spec_files.body_to_json(body)
-    return models.written(models.assemble(body, None if FLAGS.no_arena else arena, decorated=FLAGS.visuals))
+    return models.text(body, None if FLAGS.no_arena else arena, decorated=FLAGS.visuals)

@@ -1,6 +1,6 @@
 """From a spec to MJCF: builder, standing pose, sizing, visuals."""
 
-from arc_suite.models.assembly import assemble, parsed
+from arc_suite.models.assembly import assemble, parsed, text
 from arc_suite.models.writing import written
 
-__all__ = ["assemble", "parsed", "written"]
+__all__ = ["assemble", "parsed", "text", "written"]

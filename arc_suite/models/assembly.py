@@ -1,11 +1,13 @@
 """Whole models: a body in its arena, as PyMJCF, with or without visuals."""
 
+import xml.etree.ElementTree as ElementTree
+
 import mujoco
 import numpy as np
 from dm_control import mjcf
 
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.models import builder, sizing, source, visuals
+from arc_suite.models import builder, sizing, source, visuals, writing
 from arc_suite.robots.spec import Body
 
 
@@ -13,7 +15,7 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
     """Assemble a body in an arena.
 
     Args:
-        body: the spec; what it leaves open is sized.
+        body: the spec, without a source; what it leaves open is sized.
         arena: where it moves; None leaves free joint, ground, options, sky and light to the scene that takes the body.
         decorated: add visuals, which leave the dynamics unchanged but cost about a tenth of the speed.
 
@@ -30,6 +32,15 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
     if decorated:
         visuals.decorate(root, body)
     return root
+
+
+def text(body: Body, arena: Arena | None = FLAT, decorated: bool = False) -> str:
+    """Return the MJCF of a body in an arena, as MuJoCo and dm_control's PyMJCF read it; see `assemble`."""
+    if body.source:
+        tree = source.tree(sizing.sized(body), arena, decorated)
+        ElementTree.indent(tree)
+        return ElementTree.tostring(tree, encoding="unicode") + "\n"
+    return writing.written(assemble(body, arena, decorated))
 
 
 def parsed(body: Body, arena: Arena = FLAT, decorated: bool = False) -> mujoco.MjSpec:

@@ -1,11 +1,11 @@
-"""Models of imported bodies: their source, edited by MuJoCo's `MjSpec` and never rebuilt.
+"""Models of imported bodies: their source with what it lacks, never rebuilt.
 
 A source is MJCF of one free body `torso` alone, whose parts and joints have the names of the body's legs. It stays
 the record of the physics. Servos, cameras and a sensor are added, and the ground.
 """
 
 import functools
-from typing import Any
+import xml.etree.ElementTree as ElementTree
 
 import mujoco
 import numpy as np
@@ -14,71 +14,56 @@ from dm_control import mjcf
 from arc_suite.arenas import Arena
 from arc_suite.models import builder, visuals
 from arc_suite.models.visuals import scene
+from arc_suite.models.writing import exact, written
 from arc_suite.robots.spec import Body, Servo, SpecError
 
 HOME = "home"  # keyframe of the standing pose
 
-# Of elements of the ground and of its looks, by the list of a spec that has them: all that a default class of the
-# source could change is among them.
-_FIELDS = {
-    "hfields": ("name", "size", "nrow", "ncol", "userdata"),
-    "textures": ("name", "type", "builtin", "mark", "width", "height", "rgb1", "rgb2", "markrgb"),
-    "materials": ("name", "textures", "texuniform", "texrepeat", "emission", "specular", "shininess", "rgba"),
-}
-_GEOM = ("name", "type", "size", "pos", "quat", "hfieldname", "material", "rgba", "group", "mass", "density")
-_TOUCH = ("contype", "conaffinity", "condim", "priority", "friction", "solmix", "solref", "solimp", "margin", "gap")
-_LIGHT = ("name", "mode", "type", "castshadow", "pos", "dir", "diffuse", "specular")
-
-_MATERIAL_ALONE = (0.5, 0.5, 0.5, 1.0)  # colour of a geom that has that of its material
-
-_MOTOR = {"trntype": mujoco.mjtTrn.mjTRN_JOINT, "ctrllimited": mujoco.mjtLimited.mjLIMITED_TRUE}
-_AFFINE = mujoco.mjtGain.mjGAIN_AFFINE, mujoco.mjtBias.mjBIAS_AFFINE
+_OF_SCENES = ("option", "keyframe")  # sections that a scene has itself
+_INERT = {"mass": "0", "group": "2", "contype": "0", "conaffinity": "0"}
 
 
-def parsed(body: Body, arena: Arena | None = None, decorated: bool = False) -> mujoco.MjSpec:
-    """Return the spec of an imported body's model.
+def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: bool = False) -> ElementTree.Element:
+    """Return the MJCF of an imported body.
 
     Args:
         body: with a source.
-        arena: where it moves; None for nowhere.
+        arena: where it moves; None leaves free joint, options and ground to the scene that takes the body.
         decorated: whether it has looks; colliders are what is seen.
+        releases: whether legs can weaken or hang; see `_add_servos`.
 
     Raises:
         SpecError: a source that MuJoCo cannot read, or that lacks a part of the body.
     """
-    spec, home = read(body), angles_at_home(body)
-    spec.modelname = body.name
-    spec.option.timestep = body.simulation.timestep
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
-    torso = spec.body("torso")
-    for leg in body.legs:
-        for joint in leg.joints:
-            reach = np.radians(np.abs(joint.range_deg)).max()
-            _add_servo(spec, leg.full_name(joint), joint.servo, home[leg.full_name(joint)], reach)
-    for joint in body.held:
-        _add_servo(spec, joint.name, joint.servo, home[joint.name], 0.0)
+    bare(body)  # finds out at once whether MuJoCo reads it
+    root = ElementTree.fromstring(body.source)
+    root.set("model", body.name)
+    bodies = {part.get("name"): part for part in root.iter("body")}
+    _add_servos(root, body, releases)
     for name, camera in builder.cameras(body).items():
-        torso.add_camera(name=name, mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, **camera)
-    acceleration = {"type": mujoco.mjtSensor.mjSENS_ACCELEROMETER, "objtype": mujoco.mjtObj.mjOBJ_SITE}
-    spec.add_sensor(name="torso_acceleration", objname="torso", **acceleration)
+        attributes = {key: exact(value) for key, value in camera.items()}
+        _add(bodies["torso"], "camera", name=name, mode="trackcom", **attributes)
+    _add(_add(root, "sensor"), "accelerometer", name="torso_acceleration", site="torso")
     if decorated:
-        _show_colliders(spec, body)
-    if arena is not None:
-        _add_ground(spec, body, arena, decorated)
+        _show_colliders(bodies, body)
+    if arena is None:
+        bodies["torso"].remove(bodies["torso"].find("joint"))
+        for section in [each for each in root if each.tag in _OF_SCENES]:
+            root.remove(section)
+    else:
+        _set_options(root, body)
+    _add_ground(root, bodies["torso"], _ground(body, arena, decorated))
+    return root
+
+
+def parsed(body: Body, arena: Arena, decorated: bool = False) -> mujoco.MjSpec:
+    """Return the spec of an imported body's model; without looks, its servos have releases. See `tree`."""
+    root = tree(body, arena, decorated, releases=not decorated)
+    heights = [np.array(field.attrib.pop("elevation").split(), float) for field in root.iter("hfield")]
+    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    for field, values in zip(spec.hfields, heights, strict=True):  # as numbers: see `assembly.parsed`
+        field.userdata = values.reshape(field.nrow, field.ncol)[::-1].ravel()
     return spec
-
-
-def read(body: Body) -> mujoco.MjSpec:
-    """Return the spec of a source as it is.
-
-    Raises:
-        SpecError: MuJoCo cannot read it.
-    """
-    try:
-        return mujoco.MjSpec.from_string(body.source)
-    except ValueError as error:
-        raise _refused(body, error) from None
 
 
 @functools.lru_cache(maxsize=64)
@@ -86,17 +71,17 @@ def bare(body: Body) -> mujoco.MjModel:
     """Return the compiled model of a source as it is, whose keyframe is the standing pose.
 
     Raises:
-        SpecError: MuJoCo cannot compile it, or it lacks the keyframe, a part or a joint of the body.
+        SpecError: MuJoCo cannot read it, or it lacks the keyframe, a part or a joint of the body.
     """
     try:
-        model = read(body).compile()
+        model = mujoco.MjModel.from_xml_string(body.source)
         model.key(HOME)
         for name in body.part_names:
             model.body(name)
         for name in (*body.joint_names, *(joint.name for joint in body.held)):
             model.joint(name)
     except (ValueError, KeyError) as error:
-        raise _refused(body, error) from None
+        raise SpecError(" ".join(str(error).split())[:200], "source", f"Body({body.name})") from None
     return model
 
 
@@ -107,79 +92,78 @@ def angles_at_home(body: Body) -> dict[str, float]:
     return {model.joint(joint).name: float(model.key(HOME).qpos[model.jnt_qposadr[joint]]) for joint in hinges}
 
 
-def _refused(body: Body, error: Exception) -> SpecError:
-    return SpecError(" ".join(str(error).split())[:200], "source", f"Body({body.name})")
+def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
+    return ElementTree.SubElement(parent, tag, attributes)
 
 
-def _add_servo(spec: mujoco.MjSpec, name: str, servo: Servo, home: float, reach: float) -> None:
-    """Add a servo that holds a joint at `home` for a control of 0, and `reach` away from it for 1, rad."""
-    added = spec.add_actuator(name=name, target=name, ctrlrange=(-1.0, 1.0), **_MOTOR)
-    added.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-    added.gainprm[0] = servo.stiffness * reach
-    added.biasprm[:3] = servo.stiffness * home, -servo.stiffness, -servo.damping
-    joint = spec.joint(name)  # the sum of what acts on a joint is limited
-    joint.actfrclimited, joint.actfrcrange = mujoco.mjtLimited.mjLIMITED_TRUE, (-servo.limit, servo.limit)
+def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
+    """Add the servos of all joints, those of held joints last.
 
-
-def add_releases(spec: mujoco.MjSpec, body: Body) -> None:
-    """Add to each servo of a leg a motor that takes a share of its torque away, so that joints can weaken or hang.
-
-    Servos of legs come first, then their releases in the same order, then the servos of held joints.
-
-    The servo's torque is k (reach u + home - q) - d v for a control u. That of its release is -r (k (home - q) - d v)
-    for a control r. With controls s u and 1 - s a joint has the share s of its torque.
+    A servo holds its joint in the standing pose for a control of 0, and a reach away from it for 1. Its torque is
+    k (reach u + home - q) - d v for a control u. That of its release is -r (k (home - q) - d v) for a control r. With
+    controls s u and 1 - s a joint has the share s of its torque. Releases follow the servos of legs, in their order.
     """
-    for name in body.joint_names:
-        servo = spec.actuator(name)
-        added = spec.add_actuator(name=f"{name}-release", target=name, ctrlrange=(0.0, 1.0), **_MOTOR)
-        added.gaintype = mujoco.mjtGain.mjGAIN_AFFINE
-        added.gainprm[:3] = -servo.biasprm[:3]
-    home = angles_at_home(body)
+    joints, home = {joint.get("name"): joint for joint in root.iter("joint")}, angles_at_home(body)
+    legs = [
+        (leg.full_name(joint), joint.servo, np.radians(np.abs(joint.range_deg)).max())
+        for leg in body.legs
+        for joint in leg.joints
+    ]
+    actuator = _add(root, "actuator")
+
+    def add(name: str, joint: str, low: float, **attributes: str) -> None:
+        _add(actuator, "general", name=name, joint=joint, ctrllimited="true", ctrlrange=exact((low, 1.0)), **attributes)
+
+    def hold(name: str, servo: Servo, reach: float) -> None:
+        bias = exact((servo.stiffness * home[name], -servo.stiffness, -servo.damping))
+        add(name, name, -1.0, biastype="affine", gainprm=exact(servo.stiffness * reach), biasprm=bias)
+        limit = exact((-servo.limit, servo.limit))  # of the sum of what acts on the joint
+        joints[name].attrib |= {"actuatorfrclimited": "true", "actuatorfrcrange": limit}
+
+    for each in legs:
+        hold(*each)
+    for name, servo, _ in legs if releases else ():
+        gain = exact((-servo.stiffness * home[name], servo.stiffness, servo.damping))
+        add(f"{name}-release", name, 0.0, gaintype="affine", gainprm=gain)
     for joint in body.held:
-        spec.delete(spec.actuator(joint.name))
-        _add_servo(spec, joint.name, joint.servo, home[joint.name], 0.0)
+        hold(joint.name, joint.servo, 0.0)
 
 
-def _add_ground(spec: mujoco.MjSpec, body: Body, arena: Arena, decorated: bool) -> None:
-    root = mjcf.RootElement(model="ground")
-    root.compiler.angle = "radian"
-    root.worldbody.add("body", name="torso")  # which lights ride on
-    arena.add_to(root, **builder.contact(body.simulation))
-    if decorated:
-        scene.add_scene(root, body.torso.standing_height)
-        visuals.add_materials(root, body)
-    ground = mujoco.MjSpec.from_string(root.to_xml_string())
-    for kind, fields in _FIELDS.items():
-        for element in getattr(ground, kind):
-            _copy(element, getattr(spec, f"add_{kind.removesuffix('s')}")(), fields)
-    for each in ground.worldbody.geoms:
-        _copy(each, spec.worldbody.add_geom(), (*_GEOM, *_TOUCH))
-    for obstacle in ground.worldbody.bodies:
-        if obstacle.name == "torso":
-            for light in obstacle.lights:
-                _copy(light, spec.body("torso").add_light(), _LIGHT)
-            continue
-        added = spec.worldbody.add_body()
-        _copy(obstacle, added, ("name", "mocap", "pos", "quat"))
-        for each in obstacle.geoms:
-            _copy(each, added.add_geom(), (*_GEOM, *_TOUCH))
-    if decorated:
-        for part in ("global_", "quality", "map", "rgba", "headlight"):
-            setattr(spec.visual, part, getattr(ground.visual, part))
-        spec.stat.extent, spec.stat.center = ground.stat.extent, ground.stat.center
-
-
-def _copy(old: Any, new: Any, fields: tuple[str, ...]) -> None:
-    for field in fields:
-        setattr(new, field, getattr(old, field))
-
-
-def _show_colliders(spec: mujoco.MjSpec, body: Body) -> None:
+def _show_colliders(bodies: dict[str, ElementTree.Element], body: Body) -> None:
     """Give the colliders materials, and the feet spheres that can show a reward."""
-    torso = {"torso"}
-    for part in spec.bodies:
-        for geom in part.geoms:
-            geom.material, geom.group, geom.rgba = "shell" if part.name in torso else "limb", 0, _MATERIAL_ALONE
+    for name, part in bodies.items():
+        for geom in part.findall("geom"):
+            geom.set("material", "shell" if name == "torso" else "limb")
     for leg, name in zip(body.legs, body.foot_names, strict=True):
-        ball = spec.body(name).add_geom(name=f"visual-{name}", type=mujoco.mjtGeom.mjGEOM_SPHERE, material="glow")
-        ball.size[0], ball.mass, ball.group, ball.contype, ball.conaffinity = 1.04 * leg.foot.radius, 0.0, 2, 0, 0
+        size = exact(1.04 * leg.foot.radius)
+        _add(bodies[name], "geom", name=f"visual-{name}", type="sphere", size=size, material="glow", **_INERT)
+
+
+def _set_options(root: ElementTree.Element, body: Body) -> None:
+    option = root.find("option")
+    option = _add(root, "option") if option is None else option
+    option.attrib |= {"timestep": exact(body.simulation.timestep), "integrator": "implicitfast"}
+    flag = option.find("flag")
+    (_add(option, "flag") if flag is None else flag).set("island", "disable")
+
+
+def _ground(body: Body, arena: Arena | None, decorated: bool) -> ElementTree.Element:
+    """Return the MJCF of an arena and of a body's materials, in which lights stand in a body `torso`."""
+    root = mjcf.RootElement(model="ground")
+    root.worldbody.add("body", name="torso")
+    if arena is not None:
+        arena.add_to(root, **builder.contact(body.simulation))
+    if decorated:
+        if arena is not None:
+            scene.add_scene(root, body.torso.standing_height)
+        visuals.add_materials(root, body)
+    return ElementTree.fromstring(written(root))
+
+
+def _add_ground(root: ElementTree.Element, torso: ElementTree.Element, ground: ElementTree.Element) -> None:
+    root.extend([section for section in ground if section.tag in ("asset", "visual", "statistic")])
+    for element in ground.find("worldbody"):
+        if element.get("name") == "torso":
+            torso.extend(element)
+        else:
+            root.find("worldbody").append(element)

@@ -1,5 +1,6 @@
 """The text of a model, as MuJoCo and dm_control's PyMJCF read it."""
 
+import numpy as np
 from dm_control import mjcf
 from lxml import etree
 
@@ -25,5 +26,10 @@ def written(root: mjcf.RootElement) -> str:
         angles = [0.0 for joint in root.find_all("joint") if joint.tag == "joint"]
         qpos = (*root.find("body", "torso").pos, 1.0, 0.0, 0.0, 0.0, *angles)
         home = etree.SubElement(etree.SubElement(text, "keyframe"), "key", name="home")
-        home.set("qpos", " ".join(f"{value:.17g}" for value in qpos))
+        home.set("qpos", exact(qpos))
     return etree.tostring(text, encoding="unicode", pretty_print=True)
+
+
+def exact(values) -> str:
+    """Return numbers as text that is read back as the same bits."""
+    return " ".join(str(number) if isinstance(number, int) else repr(number) for number in np.ravel(values).tolist())

@@ -10,7 +10,7 @@ import numpy as np
 
 from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
-from arc_suite.models import direct, source
+from arc_suite.models import direct
 from arc_suite.models.sizing import sized
 from arc_suite.robots.spec import Body
 
@@ -60,8 +60,6 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
     spec = direct.on_flat_ground(sized(body)) if arena == FLAT else models.parsed(body, arena)
-    if body.source:
-        source.add_releases(spec, body)
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()

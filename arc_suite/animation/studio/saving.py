@@ -53,7 +53,7 @@ def spec(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> by
 def mjcf(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
     """Return the model, on the ground of the task, as MuJoCo loads it."""
     arena = creature.environment.task.definition.scene.arena
-    return models.written(models.assemble(creature.setup.body, arena)).encode()
+    return models.text(creature.setup.body, arena).encode()
 
 
 def glb(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:

@@ -14,6 +14,7 @@ from arc_suite.models.importing.meshes import Mesh
 from arc_suite.models.importing.naming import Names
 from arc_suite.models.importing.poses import Leg, Stance
 from arc_suite.models.importing.tree import HINGE, Robot
+from arc_suite.models.writing import exact
 
 SITE = {"group": "4"}
 
@@ -78,10 +79,10 @@ def source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, Mesh]) 
     for body in robot.bodies:
         parent = world if body == robot.root else elements[int(robot.model.body_parentid[body])]
         elements[body] = _add_body(parent, robot, body, names, placed)
-    _add(elements[robot.root], "site", name="torso", size=_text(0.01), **SITE)
+    _add(elements[robot.root], "site", name="torso", size=exact(0.01), **SITE)
     for label, leg in zip(names.legs, stance.legs, strict=True):
         _add_leg_bodies(elements, robot, stance, names, label, leg)
-    _add(_add(root, "keyframe"), "key", name="home", qpos=_text(_home(robot, stance)))
+    _add(_add(root, "keyframe"), "key", name="home", qpos=exact(_home(robot, stance)))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -90,14 +91,9 @@ def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTre
     return ElementTree.SubElement(parent, tag, attributes)
 
 
-def _text(values) -> str:
-    """Return numbers as text that is read back as the same bits."""
-    return " ".join(str(number) if isinstance(number, int) else repr(number) for number in np.ravel(values).tolist())
-
-
 def _differing(plain: dict[str, Iterable], given: dict[str, Iterable]) -> dict[str, str]:
     """Return the attributes whose numbers are not those that MuJoCo takes where they are left out."""
-    return {name: _text(value) for name, value in given.items() if not np.array_equal(value, plain[name])}
+    return {name: exact(value) for name, value in given.items() if not np.array_equal(value, plain[name])}
 
 
 def _add_option(root: ElementTree.Element, model: mujoco.MjModel) -> None:
@@ -106,7 +102,7 @@ def _add_option(root: ElementTree.Element, model: mujoco.MjModel) -> None:
     for name, words in _OPTIONS.items():
         value = getattr(option, name)
         if not np.array_equal(value, getattr(plain, name)):
-            attributes[name] = _text(value) if words is None else words[int(value)]
+            attributes[name] = exact(value) if words is None else words[int(value)]
     element = _add(root, "option", **attributes)
     flags = {name: "disable" for name, bit in _FLAGS.items() if option.disableflags & int(bit)}
     if flags:
@@ -139,8 +135,8 @@ def _add_body(
     element = _add(parent, "body", name=names.bodies[body], **_differing(_BODY, given))
     if model.body_mass[body] > 0.0:
         given = {"quat": model.body_iquat[body], "diaginertia": model.body_inertia[body]}
-        mass = {"pos": _text(model.body_ipos[body]), "mass": _text(model.body_mass[body])}
-        _add(element, "inertial", **mass, **{name: _text(value) for name, value in given.items()})
+        mass = {"pos": exact(model.body_ipos[body]), "mass": exact(model.body_mass[body])}
+        _add(element, "inertial", **mass, **{name: exact(value) for name, value in given.items()})
     for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
         own = _free(model, joint) if body == robot.root else _joint(model, joint)
         _add(element, "joint", name=names.joints.get(joint, "root"), **own)
@@ -179,11 +175,11 @@ def _joint(model: mujoco.MjModel, joint: int) -> dict[str, str]:
         "solreflimit": model.jnt_solref[joint],
         "solimplimit": model.jnt_solimp[joint],
     }
-    attributes = {"type": "hinge" if model.jnt_type[joint] == HINGE else "slide", "axis": _text(model.jnt_axis[joint])}
+    attributes = {"type": "hinge" if model.jnt_type[joint] == HINGE else "slide", "axis": exact(model.jnt_axis[joint])}
     if model.jnt_limited[joint]:
-        attributes |= {"limited": "true", "range": _text(model.jnt_range[joint])}
+        attributes |= {"limited": "true", "range": exact(model.jnt_range[joint])}
     if model.jnt_actfrclimited[joint]:
-        attributes |= {"actuatorfrclimited": "true", "actuatorfrcrange": _text(model.jnt_actfrcrange[joint])}
+        attributes |= {"actuatorfrclimited": "true", "actuatorfrcrange": exact(model.jnt_actfrcrange[joint])}
     if model.jnt_actgravcomp[joint]:
         attributes["actuatorgravcomp"] = "true"
     return attributes | _differing(_JOINT, given)
@@ -202,7 +198,7 @@ def _geom(model: mujoco.MjModel, geom: int, mesh: dict[str, str] | None) -> dict
     if mesh is None:
         kind, sizes = _GEOMS[mujoco.mjtGeom(model.geom_type[geom])]
         place = {"pos": model.geom_pos[geom], "quat": model.geom_quat[geom]}
-        mesh = {"type": kind, "size": _text(model.geom_size[geom][:sizes]), **_differing(_BODY, place)}
+        mesh = {"type": kind, "size": exact(model.geom_size[geom][:sizes]), **_differing(_BODY, place)}
     return mesh | touch
 
 
@@ -217,8 +213,8 @@ def _add_leg_bodies(
     last = int(robot.model.jnt_bodyid[leg.joints[-1]])
     data = robot.placed(stance.qpos)
     place = data.xmat[last].reshape(3, 3).T @ (leg.centre - data.xpos[last])
-    foot = _add(elements[last], "body", name=f"{label}_foot", pos=_text(place))
-    _add(foot, "site", name=f"{label}_foot", size=_text(leg.radius), **SITE)
+    foot = _add(elements[last], "body", name=f"{label}_foot", pos=exact(place))
+    _add(foot, "site", name=f"{label}_foot", size=exact(leg.radius), **SITE)
 
 
 def _home(robot: Robot, stance: Stance) -> list[float]:
