@@ -56,13 +56,13 @@ def _check_walk(spec: str, body: Body) -> int:
         print(f"{spec}: {_said(tried)}")
         return 0
     cure = first_walk.left_out(body, tried.quality)
-    advice = (
-        f"leaving out {', '.join(first_walk.FIELDS)} of its joints does not help"
-        if cure is None
-        else f"leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
-    )
+    advice, given = "", first_walk.given_fields(body)
+    if cure is not None:
+        advice = f": leave out {' and '.join(cure[0])} of its joints: it then {_said(cure[1])}"
+    elif given:
+        advice = f": leaving out {', '.join(given)} of its joints does not help"
     flaw = f"falls after {tried.length} control steps" if tried.fell else f"is slow: {_said(tried)}"
-    print(f"{spec}: {body.name} {flaw}: {advice}")
+    print(f"{spec}: {body.name} {flaw}{advice}")
     return 1
 
 

@@ -9,7 +9,8 @@ from arc_suite.evaluation import protocol
 from arc_suite.models.stride import LEAST_SHARE
 from arc_suite.robots.spec import Body, Link
 
-STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
+_STEPS = 100  # control steps: five seconds of the four robots; the first two are a start
+_STEPS_OF_IMPORTED = 1000  # 20 s, as some of their robots fall late
 FIELDS = ("motor", "damping", "armature")  # of joints, which are sized where a spec leaves them out
 
 
@@ -17,19 +18,16 @@ class FirstWalk(NamedTuple):
     """A walk of the demonstrator from seed 0 in the task walk.
 
     Attributes:
-        length: control steps until a fall or divergence, `STEPS` without one.
+        length: control steps until a fall or divergence, or of the whole walk.
+        fell: whether the walk ended in one.
         speed: m/s forward.
         target: m/s that the task wants.
     """
 
     length: int
+    fell: bool
     speed: float
     target: float
-
-    @property
-    def fell(self) -> bool:
-        """Whether the walk ended in a fall."""
-        return self.length < STEPS
 
     @property
     def share(self) -> float:
@@ -49,8 +47,18 @@ def walk(body: Body) -> FirstWalk:
         ValueError: a body that cannot walk whatever the demonstrator does.
     """
     environment = Setup.of(body, "walk", {"on_divergence": "terminate"}).load()
-    episode = protocol.run(environment, Demonstrator(environment, "medium"), 0, STEPS)
-    return FirstWalk(episode.length, episode.progress["speed"], environment.task.definition.parameters.target_velocity)
+    steps, target = (
+        _STEPS_OF_IMPORTED if body.source else _STEPS,
+        environment.task.definition.parameters.target_velocity,
+    )
+    episode = protocol.run(environment, Demonstrator(environment, "medium"), 0, steps)
+    return FirstWalk(episode.length, episode.length < steps, episode.progress["speed"], target)
+
+
+def given_fields(body: Body) -> list[str]:
+    """Return the fields of joints that a spec has and could leave out: none of an imported body."""
+    joints = [joint for leg in body.legs for joint in leg.joints if not body.source]
+    return [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
 
 
 def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | None:
@@ -62,9 +70,7 @@ def left_out(body: Body, quality: int) -> tuple[tuple[str, ...], FirstWalk] | No
         body: to leave fields out of.
         quality: of its own walk; None is returned if no other has a higher one.
     """
-    joints = [joint for leg in body.legs for joint in leg.joints]
-    given = [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
-    better = {}
+    given, better = given_fields(body), {}
     for count in range(1, len(given) + 1):
         walks = {names: walk(_leaving_out(body, names)) for names in itertools.combinations(given, count)}
         better |= {names: each for names, each in walks.items() if each.quality > quality}
