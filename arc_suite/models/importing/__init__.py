@@ -5,6 +5,7 @@ import functools
 import hashlib
 import math
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from arc_suite.models.importing.naming import Names, clean, names_of
 from arc_suite.models.importing.opening import Opened
 from arc_suite.models.importing.poses import Stance
 from arc_suite.models.importing.tree import Robot
+from arc_suite.models.standing import GRAVITY
 from arc_suite.robots import ROBOTS, sources
 from arc_suite.robots.spec import MAX_NAME, Body, Held, Simulation, SpecError
 
@@ -53,7 +55,9 @@ def imported(path: str | os.PathLike, home: str | None = None, feet: Sequence[st
     """
     path = Path(path)
     try:
-        return _imported(path, home, feet)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of MuJoCo, about attributes of the file that it will drop
+            return _imported(path, home, feet)
     except SpecError as error:
         raise SpecError(f"{path}: {error}") from None
 
@@ -160,10 +164,10 @@ def _notes(
     yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"
     yield from limits
     yield from file.notes
-    yield from _left_out(file, robot, names)
+    yield from _left_out(file, robot, stance, names)
 
 
-def _left_out(file: Opened, robot: Robot, names: Names) -> Iterator[str]:
+def _left_out(file: Opened, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:
     model = file.model
     others = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody)) - 1
     hulls = sorted(
@@ -174,6 +178,7 @@ def _left_out(file: Opened, robot: Robot, names: Names) -> Iterator[str]:
     counts = {
         "tendons": model.ntendon,
         "equality constraints": model.neq,
+        "actuators that are no motors of single joints": model.nu - motors.count(robot),
         "sensors": model.nsensor,
         "other bodies in the world": others,
     }
@@ -181,6 +186,12 @@ def _left_out(file: Opened, robot: Robot, names: Names) -> Iterator[str]:
         if count:
             yield f"left out: {count} {what}"
     yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
+    wheels = [robot.chains[leg.body][-1] for leg in stance.legs if robot.chains[leg.body][-1] != leg.joints[-1]]
+    if wheels:
+        yield f"left out: {len(wheels)} wheels, which are held, such as {robot.name(wheels[0])}"
+    gravity = float(np.linalg.norm(model.opt.gravity))
+    if abs(gravity - GRAVITY) > 0.05 * GRAVITY:
+        yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
     if names.held:
         shown = ", ".join(robot.name(joint) for joint in names.held[:4])
         yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({shown})"

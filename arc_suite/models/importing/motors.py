@@ -106,13 +106,19 @@ def _driven(robot: Robot) -> Iterator[tuple[int, int, float]]:
     model = robot.model
     for actuator in range(model.nu):
         joint = int(model.actuator_trnid[actuator, 0])
-        if model.actuator_trntype[actuator] in _OF_JOINTS and joint in robot.joints:
+        muscle = model.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_MUSCLE
+        if model.actuator_trntype[actuator] in _OF_JOINTS and joint in robot.joints and not muscle:
             yield actuator, joint, abs(float(model.actuator_gear[actuator, 0]))
 
 
 def actuated(robot: Robot) -> list[int]:
     """Return the joints that actuators drive, in their order."""
     return list(dict.fromkeys(joint for _, joint, _ in _driven(robot)))
+
+
+def count(robot: Robot) -> int:
+    """Return how many actuators drive a joint of the robot."""
+    return sum(1 for _ in _driven(robot))
 
 
 def _gains(robot: Robot) -> Iterator[tuple[int, tuple[float, float]]]:

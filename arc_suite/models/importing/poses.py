@@ -33,6 +33,7 @@ _MISS = 0.05  # of the leg's length
 
 _TILT = 0.05  # of the directions from which the sole of a flat foot is felt
 _LEVEL = 0.01  # of the standing height, by which shapes of one foot that touch the floor differ
+_HUB = 0.1  # of a wheel's radius, by which the joint may miss its middle
 _RANGE = 6.0  # rad; a joint that turns farther has no middle
 
 # numpy's integers are equal to MuJoCo's enumerations, but not in a tuple of them.
@@ -217,19 +218,29 @@ def _within(robot: Robot, joint: int, qpos: np.ndarray) -> bool:
 
 
 def _legs(robot: Robot, data: mujoco.MjData, ends: dict, low: dict, height: float) -> tuple[Leg, ...]:
-    """Return the legs of chains that end low; joints that several of them share belong to none."""
+    """Return the legs of chains that end low; joints that several of them share, and wheels, belong to none."""
     legs = []
-    for chain, (_, geom) in sorted(low.items()):
+    for chain, (point, geom) in sorted(low.items()):
         others = {joint for other in low if other != chain for joint in other}
         own = tuple(joint for joint in chain if joint not in others)
+        if own and _is_wheel(robot, data, own[-1], point, geom):
+            own = own[:-1]
         if not own:
-            raise _Unfit(f"several feet hang on joint {robot.name(chain[-1])}")
+            raise _Unfit(f"joint {robot.name(chain[-1])} turns a wheel or several feet")
         body = int(robot.model.geom_bodyid[geom])
         sole, radius = _sole(robot, data, ends[chain], height)
         legs.append(Leg(own, body, geom, sole, sole + (0.0, 0.0, radius), radius))
     if len(legs) < 2:
         raise _Unfit(f"{len(legs)} foot on the floor")
     return tuple(legs)
+
+
+def _is_wheel(robot: Robot, data: mujoco.MjData, joint: int, point: np.ndarray, geom: int) -> bool:
+    """Return whether a joint turns a foot without end about the foot's own middle."""
+    low, high = robot.range(joint)
+    axis = data.xaxis[joint]
+    middle, sole = (np.linalg.norm(np.cross(axis, end - data.xanchor[joint])) for end in (data.geom_xpos[geom], point))
+    return bool(high - low > _RANGE and abs(axis[2]) < 0.5 and middle < _HUB * sole)
 
 
 def _sole(robot: Robot, data: mujoco.MjData, geoms: Sequence[int], height: float) -> tuple[np.ndarray, float]:
