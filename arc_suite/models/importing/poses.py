@@ -107,13 +107,15 @@ def stance(robot: Robot, home: str | None, feet: Sequence[str]) -> Stance:
             return _standing(robot, robot.model.key_qpos[key], f"keyframe {home}", ends, strict=False)
         except _Unfit as reason:
             raise SpecError(f"keyframe {home}: {reason}") from None
-    reasons, poses = [], list(_poses(robot, ends))
-    for bent in (True, False):  # better straight legs than none
+    reasons, tried = [], []
+    for bent, poses in ((True, _poses(robot, ends)), (False, tried)):  # better straight legs than none
         for origin, qpos in poses:
             try:
                 return _standing(robot, qpos, origin, ends, bent)
             except _Unfit as reason:
                 reasons.append(f"{origin}: {reason}")
+            if bent:
+                tried.append((origin, qpos))
     cure = "name a keyframe that stands with --home, or the feet with --feet"
     raise NoStance(f"no standing pose ({'; '.join(dict.fromkeys(reasons))}); {cure}")
 
@@ -334,7 +336,7 @@ def _bent(robot: Robot, zero: np.ndarray, chain: tuple[int, ...], end: tuple, si
     qpos[places[-2:]] = _BEND * sign, -2.0 * _BEND * sign
     for _ in range(_STEPS):
         qpos = robot.clipped(qpos)
-        data = robot.placed(qpos)
+        robot.placed(qpos, data)
         reached = data.xpos[body] + data.xmat[body].reshape(3, 3) @ foot
         jacobian = np.zeros((3, model.nv))
         mujoco.mj_jac(model, data, jacobian, None, reached, body)

@@ -54,9 +54,9 @@ class Robot(NamedTuple):
             qpos[self.place(joint)] = np.clip(qpos[self.place(joint)], *self.range(joint))
         return qpos
 
-    def placed(self, qpos: np.ndarray) -> mujoco.MjData:
-        """Return the state of a pose (nq,), with the torso's frame as the world's."""
-        data = mujoco.MjData(self.model)
+    def placed(self, qpos: np.ndarray, data: mujoco.MjData | None = None) -> mujoco.MjData:
+        """Return the state of a pose (nq,), with the torso's frame as the world's: a new one, or `data`."""
+        data = mujoco.MjData(self.model) if data is None else data
         start = self.model.jnt_qposadr[self.model.body_jntadr[self.root]]
         data.qpos[:] = qpos
         data.qpos[start : start + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
