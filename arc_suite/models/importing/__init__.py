@@ -6,19 +6,17 @@ import hashlib
 import math
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import files
-from arc_suite.models.importing import motors, opening, poses, sketch, tree, urdf, writing
-from arc_suite.models.importing.naming import Names, clean, names_of
+from arc_suite.models.importing import motors, notes, opening, poses, sketch, tree, urdf, writing
+from arc_suite.models.importing.naming import clean, names_of
 from arc_suite.models.importing.opening import Opened
 from arc_suite.models.importing.poses import Stance
 from arc_suite.models.importing.tree import Robot
-from arc_suite.models.standing import GRAVITY
 from arc_suite.robots import ROBOTS, sources
 from arc_suite.robots.spec import MAX_NAME, Body, Held, Simulation, SpecError
 
@@ -69,8 +67,7 @@ def body_of(path: str | os.PathLike) -> Body:
         SpecError: as `imported`.
         OSError: as `imported`.
     """
-    with files.reading(path):
-        return _body(os.path.realpath(path), hashlib.sha256(Path(path).read_bytes()).digest())
+    return _body(os.path.realpath(path), hashlib.sha256(opening.content(Path(path))).digest())
 
 
 @functools.lru_cache(maxsize=64)
@@ -94,7 +91,10 @@ def _imported(path: Path, home: str | None, feet: Sequence[str]) -> Imported:
         held=tuple(Held(name=names.joints[joint], servo=driven.servos[joint]) for joint in names.held),
         file_joints=tuple(robot.name(joint) for joint in order),
     )
-    return Imported(sources.check(body), tuple(_notes(file, robot, stance, names, body, order, driven.notes)))
+    told = notes.notes(robot, stance, names, order)
+    return Imported(
+        sources.check(body), (*told, *driven.notes, *file.notes, *notes.left_out(file, robot, stance, names))
+    )
 
 
 def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[Opened, Robot, Stance]:
@@ -146,52 +146,3 @@ def _order(robot: Robot, stance: Stance, given: tuple[str, ...]) -> list[int]:
     named = {robot.name(joint): joint for joint in robot.joints}
     orders = (motors.actuated(robot), [named[name] for name in given if name in named], robot.joints)
     return next([joint for joint in order if joint in legs] for order in orders if set(legs) <= set(order))
-
-
-def _notes(
-    file: Opened, robot: Robot, stance: Stance, names: Names, body: Body, order: list[int], limits: Sequence[str]
-) -> Iterator[str]:
-    """Yield what a user is to know, a line each."""
-    kinds = sorted({len(leg.joints) for leg in stance.legs})
-    legs = ", ".join(names.legs)
-    yield f"legs: {len(stance.legs)} ({legs}), {' or '.join(map(str, kinds))} joints each"
-    pairs = ", ".join(f"{robot.name(joint)} {names.joints[joint]}" for joint in order)
-    places = {name: place for place, name in enumerate(body.joint_names)}
-    same = [places[names.joints[joint]] for joint in order]
-    yield f"joints in the file's order, each with its name in the suite: {pairs}"
-    what = "the file's order" if same == sorted(same) else f"places of the file's joints in an action: {same}"
-    yield f"joint map: {what}"
-    yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"
-    yield from limits
-    yield from file.notes
-    yield from _left_out(file, robot, stance, names)
-
-
-def _left_out(file: Opened, robot: Robot, stance: Stance, names: Names) -> Iterator[str]:
-    model = file.model
-    others = sum(model.body_parentid[body] == 0 for body in range(1, model.nbody)) - 1
-    hulls = sorted(
-        {file.meshes[geom].name for geom in robot.colliders if geom in file.meshes and not file.meshes[geom].whole}
-    )
-    if hulls:
-        yield f"reduced: {len(hulls)} large meshes to their hulls, such as {hulls[0]}; contacts differ by some digits"
-    counts = {
-        "tendons": model.ntendon,
-        "equality constraints": model.neq,
-        "actuators that are no motors of single joints": model.nu - motors.count(robot),
-        "sensors": model.nsensor,
-        "other bodies in the world": others,
-    }
-    for what, count in counts.items():
-        if count:
-            yield f"left out: {count} {what}"
-    yield "left out: contacts of the robot with itself; looks, as pictures show the colliders"
-    wheels = [robot.chains[leg.body][-1] for leg in stance.legs if robot.chains[leg.body][-1] != leg.joints[-1]]
-    if wheels:
-        yield f"left out: {len(wheels)} wheels, which are held, such as {robot.name(wheels[0])}"
-    gravity = float(np.linalg.norm(model.opt.gravity))
-    if abs(gravity - GRAVITY) > 0.05 * GRAVITY:
-        yield f"units: the file's gravity is {gravity:g}; speeds and times of the tasks count on {GRAVITY:g} m/s^2"
-    if names.held:
-        shown = ", ".join(robot.name(joint) for joint in names.held[:4])
-        yield f"held: {len(names.held)} joints outside of the legs stay in the standing pose ({shown})"

@@ -50,13 +50,21 @@ def opened(path: Path, turn: str = urdf.LEVEL) -> Opened:
         SpecError: it is neither, or MuJoCo cannot compile it.
         OSError: it cannot be read.
     """
-    with files.reading(path), path.open("rb") as file:
-        data = file.read(MAX_BYTES + 1)
-    element = _parsed(data)
+    element = _parsed(content(path))
     spec, order, notes = _read(path, element, turn)
     model, left_out = _compiled(spec)
     model, root, freed = _freed(spec, model)
     return Opened(model, root, meshes_of(spec, model), order, (*notes, *left_out, *freed))
+
+
+def content(path: Path) -> bytes:
+    """Return the bytes of a file, at most one more than it may have.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with files.reading(path), path.open("rb") as file:
+        return file.read(MAX_BYTES + 1)
 
 
 def _parsed(data: bytes) -> ElementTree.Element:

@@ -158,7 +158,7 @@ def test_the_order_of_joints_is_that_of_the_files_motors(odd):
     body, notes = imported(odd)
     assert body.file_joints[:5] == ("FL knee", "FR knee", "HL knee", "HR knee", "FL pitch")
     assert {joint.alias for leg in body.legs for joint in leg.joints} == set(body.file_joints)
-    assert "joint map: places of the file's joints in an action: [2, 5, 8, 11, 1, 4, 7, 10, 0, 3, 6, 9]" in notes
+    assert "joint map: places of the file in an action: [2, 5, 8, 11, 1, 4, 7, 10, 0, 3, 6, 9]" in notes
     assert imported(A1).body.file_joints[:3] == ("FR_hip_joint", "FR_thigh_joint", "FR_calf_joint")
 
 
