@@ -121,15 +121,21 @@ def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> No
     )
 
 
-def cameras(body: Body) -> dict[str, dict]:
-    """Return the cameras by name: `tracking`, of the spec, and `portrait` and `profile`, which frame the body."""
+def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
+    """Return the cameras by name: `tracking`, of the spec, and `portrait` and `profile`, which frame the body.
+
+    Args:
+        body: the spec.
+        points: (n, 3) in the torso's frame that they show; None for those of `outline`.
+    """
+    points = outline(body) if points is None else points
     tracking = {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}
-    views = {name: {"fovy": _FOVY, **_framing(body, azimuth, elevation)} for name, azimuth, elevation in _VIEWS}
+    views = {name: {"fovy": _FOVY, **_framing(points, azimuth, elevation)} for name, azimuth, elevation in _VIEWS}
     return {"tracking": tracking, **views}
 
 
-def _framing(body: Body, azimuth: float, elevation: float) -> dict:
-    """Return the nearest position from which a camera in a given direction sees the whole standing body.
+def _framing(points: np.ndarray, azimuth: float, elevation: float) -> dict:
+    """Return the nearest position from which a camera in a given direction sees all points (n, 3).
 
     With a point (u, v, b) along the camera's right, up and back, the camera at (cu, cv, cb) and t
     the tangent of half its field of view, the point is in view if |u - cu| <= t (cb - b), and
@@ -140,7 +146,7 @@ def _framing(body: Body, azimuth: float, elevation: float) -> dict:
     )
     right = np.array((-math.sin(azimuth), math.cos(azimuth), 0.0))
     axes = np.stack((right, np.cross(back, right), back))
-    points = outline(body) @ axes.T
+    points = points @ axes.T
     half_field = math.tan(math.radians(_FOVY / 2.0)) / _MARGIN * np.array((_ASPECT, 1.0))
     depth = half_field * points[:, 2:]
     high, low = (points[:, :2] + depth).max(axis=0), (points[:, :2] - depth).min(axis=0)

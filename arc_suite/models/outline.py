@@ -8,7 +8,7 @@ import numpy as np
 
 from arc_suite.robots.spec import Body, Leg, Solid
 
-_CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+CORNERS = np.array([(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 
 
 def solid_corners(solid: Solid) -> np.ndarray:
@@ -16,7 +16,7 @@ def solid_corners(solid: Solid) -> np.ndarray:
     rotation, quaternion = np.empty(9), np.empty(4)
     mujoco.mju_euler2Quat(quaternion, np.radians(solid.euler_deg), "xyz")
     mujoco.mju_quat2Mat(rotation, quaternion)
-    return solid.position + (_CORNERS * _half_extents(solid)) @ rotation.reshape(3, 3).T
+    return solid.position + (CORNERS * _half_extents(solid)) @ rotation.reshape(3, 3).T
 
 
 def _half_extents(solid: Solid) -> tuple[float, ...]:
@@ -40,5 +40,5 @@ def leg_points(leg: Leg) -> Iterator[tuple[np.ndarray, float]]:
 def outline(body: Body) -> np.ndarray:
     """Return points in the torso's frame whose convex hull holds the standing body: (n, 3)."""
     solids = [solid_corners(solid) for solid in (*body.torso.solids, *body.ballast)]
-    legs = [point + radius * _CORNERS for leg in body.legs for point, radius in leg_points(leg)]
+    legs = [point + radius * CORNERS for leg in body.legs for point, radius in leg_points(leg)]
     return np.concatenate(solids + legs)

@@ -13,6 +13,7 @@ from dm_control import mjcf
 
 from arc_suite.arenas import Arena
 from arc_suite.models import builder, visuals
+from arc_suite.models.outline import CORNERS, outline
 from arc_suite.models.visuals import scene
 from arc_suite.models.writing import exact, written
 from arc_suite.robots.spec import Body, Servo, SpecError
@@ -40,7 +41,7 @@ def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: boo
     root.set("model", body.name)
     bodies = {part.get("name"): part for part in root.iter("body")}
     _add_servos(root, body, releases)
-    for name, camera in builder.cameras(body).items():
+    for name, camera in _cameras(body).items():
         attributes = {key: exact(value) for key, value in camera.items()}
         _add(bodies["torso"], "camera", name=name, mode="trackcom", **attributes)
     _add(_add(root, "sensor"), "accelerometer", name="torso_acceleration", site="torso")
@@ -127,6 +128,26 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
         add(f"{name}-release", name, 0.0, gaintype="affine", gainprm=gain)
     for joint in body.held:
         hold(joint.name, joint.servo, 0.0)
+
+
+def _cameras(body: Body) -> dict[str, dict]:
+    """Return the cameras by name, which frame the standing body with its colliders.
+
+    MuJoCo keeps a camera where it is seen from the centre of mass in the pose of all joints at zero.
+    """
+    model = bare(body)
+    data, centres = mujoco.MjData(model), []
+    for qpos in (model.qpos0, model.key(HOME).qpos):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        centres.append(data.subtree_com[1] - data.xpos[1])
+    middles, halves = model.geom_aabb[:, None, :3], model.geom_aabb[:, None, 3:]
+    turns = data.geom_xmat.reshape(-1, 3, 3).swapaxes(-1, -2)
+    boxes = (middles + CORNERS * halves) @ turns + data.geom_xpos[:, None] - data.xpos[1]
+    points = np.concatenate([outline(body), boxes.reshape(-1, 3)])
+    moved = centres[0] - centres[1]
+    return {name: camera | {"pos": camera["pos"] + moved} for name, camera in builder.cameras(body, points).items()}
 
 
 def _show_colliders(bodies: dict[str, ElementTree.Element], body: Body) -> None:

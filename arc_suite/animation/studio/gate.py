@@ -15,7 +15,7 @@ from viser import _messages as messages
 from websockets.asyncio import server as websockets
 from websockets.http11 import Request, Response
 
-from arc_suite.robots.spec_files import MAX_BYTES
+from arc_suite.robots.spec_files import MAX_IMPORTED
 
 LONGEST_TEXT = 10_000  # characters of a text field
 _MOST_PARTS = 16  # of an upload; a browser sends half a megabyte in each
@@ -49,7 +49,7 @@ class Server(viser.ViserServer):
         for kind, handler, taken in (
             (messages.GuiUpdateMessage, gui._handle_gui_updates, self._offers),
             (messages.FileTransferStartUpload, gui._handle_file_transfer_start, _fits),
-            (messages.FileTransferPart, gui._handle_file_transfer_part, lambda part: len(part.content) <= MAX_BYTES),
+            (messages.FileTransferPart, gui._handle_file_transfer_part, lambda part: len(part.content) <= MAX_IMPORTED),
         ):
             connection.unregister_handler(kind, handler)
             connection.register_handler(kind, _checking(handler, taken))
@@ -77,7 +77,7 @@ def offers(handle: Any, value: Any) -> bool:
 
 
 def _fits(upload: messages.FileTransferStartUpload) -> bool:
-    return 0 <= upload.size_bytes <= MAX_BYTES and 0 <= upload.part_count <= _MOST_PARTS
+    return 0 <= upload.size_bytes <= MAX_IMPORTED and 0 <= upload.part_count <= _MOST_PARTS
 
 
 def _spans(handle, value) -> bool:

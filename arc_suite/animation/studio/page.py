@@ -26,7 +26,7 @@ from arc_suite.cpg.selection import preset_names, presets_of
 from arc_suite.policies import POLICIES
 from arc_suite.robots import gaits, generator
 from arc_suite.robots.spec import PALETTES
-from arc_suite.robots.spec_files import MAX_BYTES
+from arc_suite.robots.spec_files import MAX_IMPORTED
 from arc_suite.simulation.opengl import RenderingUnavailable
 from arc_suite.tasks import TASKS
 
@@ -229,7 +229,7 @@ class Page:
         self._session.ask(sketch)
 
     def _uploaded(self, event: viser.GuiEvent) -> None:
-        text = event.target.value.content[: MAX_BYTES + 1].decode("utf-8", "replace")
+        text = event.target.value.content[: MAX_IMPORTED + 1].decode("utf-8", "replace")
         self._apply(opened_file(self._read(), text))
 
     def _command(self) -> None:

@@ -13,6 +13,7 @@ from arc_suite.animation.clips.shapes import Mesh
 from arc_suite.animation.scenery import ground
 from arc_suite.animation.studio.creature import Creature
 from arc_suite.markers import Marker
+from arc_suite.tasks import readings
 
 _TOLERANCE = 0.01  # of the unit, by which a face may cut into a round shape
 _AROUND = 14.0  # units of ground to each side of the torso, where it is not endless
@@ -67,16 +68,17 @@ class View:
             qpos: (nq,) positions.
             markers: of the task.
         """
-        place = qpos[:3] / self._unit
+        now = readings.pose(qpos, self._creature.environment.task.definition.scene.layout)
+        place = now[:3] / self._unit
         if self._ground_is_stale(place):
             self._draw_ground()
-        half = 0.5 * qpos[7:][[joint for _, joint in self._hinges], None]
+        half = 0.5 * now[7:][[joint for _, joint in self._hinges], None]
         turned = rotations.product(self._standing, np.concatenate([np.cos(half), np.sin(half) * self._axes], axis=-1))
-        floor = float(self._arena.height(qpos[0], qpos[1])) / self._unit
+        floor = float(self._arena.height(*now[:2])) / self._unit
         self._height += _FOLLOW * (floor - self._height)
         with self._server.atomic():
             self._world.position = (-place[0], -place[1], -self._height)
-            self._frames[0].position, self._frames[0].wxyz = place, qpos[3:7]
+            self._frames[0].position, self._frames[0].wxyz = place, now[3:7]
             for (index, _), wxyz in zip(self._hinges, turned, strict=True):
                 self._frames[index].wxyz = wxyz
             self._anchor.position = place * (1.0, 1.0, 0.0)
