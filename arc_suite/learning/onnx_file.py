@@ -10,7 +10,6 @@ import os
 from collections.abc import Iterator
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from arc_suite import files, versions
@@ -66,7 +65,7 @@ def metadata(network: Network) -> dict:
     return known
 
 
-def _driven(body: Body, model: mujoco.MjModel) -> dict:
+def _driven(body: Body, model: Any) -> dict:
     """Return what actions ask of the joints of a body."""
     if not body.source:
         return {"gears": model.actuator_gear[:, 0].tolist()}

@@ -86,7 +86,7 @@ def posed(body: Body, angles: np.ndarray | None = None, feet: np.ndarray | None 
     mujoco.mj_fullM(model, data, matrix)
     loads, carrying = np.zeros(len(soles)), np.ones(len(soles), bool) if feet is None else feet
     if carrying.any():
-        loads[carrying] = _foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - centre[:2])
+        loads[carrying] = foot_loads(mass * -model.opt.gravity[2], soles[carrying, :2] - centre[:2])
     held = np.concatenate([load * jacobian[2] for load, jacobian in zip(loads, jacobians, strict=True)])
     return Standing(
         height=body.torso.standing_height,
@@ -152,7 +152,7 @@ def compiled(body: Body) -> mujoco.MjModel:
     return spec.compile()
 
 
-def _foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
+def foot_loads(weight: float, soles: np.ndarray) -> np.ndarray:
     """Return vertical forces (legs,) that carry a weight over the soles (legs, 2) relative to the centre of mass.
 
     The least-norm solution of the balance of force and moments. Every foot carries at least a quarter

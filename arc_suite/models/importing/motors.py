@@ -9,7 +9,7 @@ import numpy as np
 
 from arc_suite.models.importing.poses import Leg, Stance
 from arc_suite.models.importing.tree import Robot
-from arc_suite.models.standing import _foot_loads as foot_loads
+from arc_suite.models.standing import foot_loads
 from arc_suite.robots.spec import Servo
 
 # The rule for gains: this error calls for so many times the torque that holds the standing pose.
