@@ -47,7 +47,7 @@ def shaped(body: Body, **changes) -> Body:
         if nothing changes.
 
     Raises:
-        ValueError: a value or a length out of range, or a link that the body does not have.
+        ValueError: a value or a length out of range, a link that the body does not have, or an imported body.
     """
     shape = Shape(**changes)
     factors = {
@@ -61,6 +61,8 @@ def shaped(body: Body, **changes) -> Body:
     fan = checks.number("fan", shape.fan, *FAN)
     if shape._replace(links={}) == Shape() and set(factors.values()) <= {1.0}:
         return body
+    if body.source:
+        raise ValueError(f"shape: {body.name} was imported, and keeps the shape of its file")
     furthest = max(abs(leg.mount[0]) for leg in body.legs) or 1.0
     legs = tuple(_leg(leg, factors, torso, fan * leg.mount[0] / furthest) for leg in body.legs)
     solids = tuple(_stretched(solid, torso) for solid in body.torso.solids)

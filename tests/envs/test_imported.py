@@ -20,7 +20,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.models import source
 from arc_suite.models.standing import standing
-from arc_suite.robots import generator
+from arc_suite.robots import generator, shaping
 from arc_suite.robots.spec import SpecError
 from arc_suite.tasks import TASKS
 
@@ -222,6 +222,8 @@ def test_settings_that_servos_cannot_have_are_refused():
     expected = "expected the default in a body with a source, which has its motors and weights"
     with refused(f"Body(quadruped_15_kg).agility: {expected}", SpecError):
         QUADRUPED.replace(agility=2.0)
+    with refused("shape: quadruped_15_kg was imported, and keeps the shape of its file"):
+        shaping.shaped(QUADRUPED, length=2.0)
     with refused("scale: quadruped_15_kg was imported, and keeps the size of its file"):
         generator.scaled(QUADRUPED, 2.0)
 
