@@ -9,7 +9,6 @@ from typing import Any
 
 import dm_env
 import numpy as np
-from dm_control import mujoco
 from dm_control.rl import control
 from dm_env import specs
 
@@ -309,8 +308,9 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         self._commands.put(name, value)
 
     def action_spec(self, physics):
-        """Return the spec of one control in [-1, 1] for each motor."""
-        return mujoco.action_spec(physics)
+        """Return the spec of one control in [-1, 1] for each motor or servo of the legs."""
+        joints = (len(self.body.joint_names),)
+        return specs.BoundedArray(joints, float, -np.ones(joints), np.ones(joints))
 
     def observation_spec(self, physics):
         """Return the specs of the observation's blocks by name, or of the flat vector."""

@@ -17,7 +17,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.policies import alone, network, policy, universal
 from arc_suite.robots import ROBOTS, generator
 
-OTHERS = [imports.body(file) for file in ("go2_like.xml", "hexapod.urdf", "a1_like.urdf")]
+OTHERS = [imports.quadruped(), imports.hexapod(), imports.body("a1_like.urdf"), imports.with_arm()]
 BODIES = {body.name: body for body in (*ROBOTS.values(), *map(generator.random_body, range(10)), *OTHERS)}
 STEPS = 200  # 10 s for the robots, 4 s for those of others
 
@@ -79,6 +79,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
         ("random_4", "surefooted", 64),
         ("quadruped_15_kg", "steered", 200),
         ("hexapod_2kg", "steered", 200),
+        ("with_arm", "steered", 200),
     ],
 )
 def test_a_short_walk_is_that_of_python(script, name, preset, steps):
@@ -92,17 +93,19 @@ def test_walks_of_ten_seconds_are_those_of_python(script, name):
     assert_walks_agree(script, BODIES[name], STEPS)
 
 
-def assert_networks_agree(script, setup, driver, name):
+def assert_networks_agree(script, setup, driver, name, tolerance=1e-9):
     """In states that Python went through, a network observes and does the same."""
     given = commands(16) if setup.definition.commands else [(0.0, 0.0, 0.0)] * 16  # else they turn the course
     start, positions, actions, observations = played(setup, driver, given)
     creature = play.creature(setup.body, name)
     episode = {"creature": creature, "ground": "level", "commands": given, "replayed": actions.tolist(), **start}
     (found,) = nodes.run(script, [episode])
-    np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=tolerance)
     for block in creature["policy"]["constants"]["blocks"]:
         ported = [observation[block] for observation in found["observations"]]
-        np.testing.assert_allclose(ported, [observation[block] for observation in observations], rtol=0.0, atol=1e-8)
+        np.testing.assert_allclose(
+            ported, [observation[block] for observation in observations], rtol=0.0, atol=10.0 * tolerance
+        )
     np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=1e-5)  # float32: sums differ by processor
 
 
@@ -124,6 +127,14 @@ def test_layers_of_all_kinds_and_all_blocks_are_those_of_python(script, tmp_path
     assert set(made.blocks) == {"posture", "velocities", "contact_forces", "gait_clock", "command"}
     network.save(tmp_path / "policy.npz", made)
     assert_networks_agree(script, made.setup, made, str(tmp_path))
+
+
+@pytest.mark.slow
+@nodes.needs_node
+def test_a_network_of_servos_beside_an_arm_is_that_of_python(script, tmp_path):
+    made = networks.made(BODIES["with_arm"], "steer")
+    network.save(tmp_path / "policy.npz", made)
+    assert_networks_agree(script, made.setup, made, str(tmp_path), tolerance=1e-6)
 
 
 @pytest.mark.slow

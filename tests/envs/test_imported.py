@@ -170,12 +170,15 @@ def test_weak_servos_give_their_share():
     np.testing.assert_allclose(abs(torques(weak)), 0.5 * limits)
 
 
-def test_a_failed_leg_hangs():
-    opened = environment(QUADRUPED, actuator_failure=0)
+@pytest.mark.parametrize("body", [QUADRUPED, imports.with_arm()], ids=["no arm", "an arm"])
+def test_a_failed_leg_hangs(body):
+    opened = environment(body, actuator_failure=0)
+    assert opened.action_spec().shape == (12,)  # held joints take no actions
     for count in range(60):
         opened.step(np.full(12, 0.1))
         assert (torques(opened)[:3] == 0.0).all() == (count >= 40)
         assert (torques(opened)[3:] != 0.0).all()
+    assert not opened.physics.data.ctrl[24:].any()
 
 
 def test_late_actions_arrive_at_servos():

@@ -1,5 +1,6 @@
 """The text of a model, in MuJoCo, in dm_control's PyMJCF, and in scenes of others."""
 
+import imports
 import mujoco
 import numpy as np
 import pytest
@@ -119,3 +120,35 @@ def test_a_body_without_arena_leaves_the_rest_to_the_scene():
     assert (model.geom_bodyid > 0).all()
     assert "<option" not in text and "<visual>" not in text
     assert "<option" in models.written(models.assemble(registry.body_of("tick"), FLAT))
+
+
+@pytest.mark.parametrize("body", [imports.hexapod, imports.with_arm])
+@pytest.mark.parametrize("decorated", [False, True])
+def test_the_text_of_an_imported_body_has_its_bits(body, decorated):
+    """PyMJCF reads it, too; what weakens motors in simulations is not in it."""
+    body = body()
+    text = models.text(body, FLAT, decorated)
+    model, parsed = mujoco.MjModel.from_xml_string(text), models.parsed(body, FLAT, decorated).compile()
+    servos = [*body.joint_names, *(joint.name for joint in body.held)]
+    assert [model.actuator(index).name for index in range(model.nu)] == servos
+    for name in ("qpos0", "key_qpos", "body_mass", "body_inertia", "geom_pos", "geom_quat", "mesh_vert", "cam_pos"):
+        np.testing.assert_array_equal(getattr(model, name), getattr(parsed, name))
+    states = accelerations(model, ["root", *body.joint_names]), accelerations(parsed, ["root", *body.joint_names])
+    np.testing.assert_array_equal(*states)
+    assert by_pymjcf(text).nv == model.nv
+
+
+def test_releases_stand_before_the_servos_of_an_arm():
+    body = imports.with_arm()
+    model, joints = models.parsed(body).compile(), list(body.joint_names)
+    names = [model.actuator(index).name for index in range(model.nu)]
+    assert names == [*joints, *(f"{joint}-release" for joint in joints), "arm"]
+
+
+@pytest.mark.parametrize("decorated", [False, True])
+def test_a_scene_takes_an_imported_body_without_arena(decorated):
+    text = models.text(imports.with_arm(), None, decorated)
+    scene, body = mujoco.MjSpec(), mujoco.MjSpec.from_string(text)
+    scene.attach(body, prefix="other/", frame=scene.worldbody.add_frame(pos=(0.0, 0.0, 1.0)))
+    model = scene.compile()
+    assert model.nq == 13 and model.nkey == 0 and "floor" not in text

@@ -1,0 +1,42 @@
+"""What the studio shows of an imported body is what is simulated."""
+
+import imports
+import mujoco
+import numpy as np
+import pytest
+
+from arc_suite import rotations
+from arc_suite.animation.studio.creature import opened
+from arc_suite.animation.studio.sketch import Sketch, cured
+from arc_suite.models.standing import stood
+from arc_suite.tasks import readings
+
+viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
+from arc_suite.animation.studio.view import View  # noqa: E402
+
+
+@pytest.fixture
+def server():
+    made = viser.ViserServer(port=8190, verbose=False)
+    yield made
+    made.stop()
+
+
+@pytest.mark.parametrize("body", [imports.hexapod(), imports.with_arm()], ids=["six legs", "an arm"])
+def test_frames_are_where_the_simulation_has_the_feet(server, body):
+    view, creature = View(server), opened(cured(Sketch(task="steer"), body))
+    view.show(creature)
+    physics, layout = creature.environment.physics, creature.environment.task.definition.scene.layout
+    model, data = physics.model.ptr, physics.data.ptr
+    angles = np.random.default_rng(0).uniform(-0.3, 0.3, len(body.joint_names))
+    pose = np.concatenate([(0.1, 0.2, 0.5, 1.0, 0.0, 0.0, 0.0), angles])
+    data.qpos[:] = readings.positions(pose, layout, stood(model))
+    mujoco.mj_kinematics(model, data)
+    view.pose(data.qpos.copy(), [])
+    places, turns = [], []
+    for part, frame in zip(creature.parts, view._frames, strict=True):
+        place, turn = (np.zeros(3), np.eye(3)) if part.parent is None else (places[part.parent], turns[part.parent])
+        places.append(place + turn @ frame.position * creature.unit)
+        turns.append(turn @ rotations.matrix(np.array(frame.wxyz)))
+    shown = [places[body.part_names.index(name)] for name in body.foot_names]
+    np.testing.assert_allclose(shown, data.xpos[layout.feet], atol=1e-6)
