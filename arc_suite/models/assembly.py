@@ -21,7 +21,12 @@ def assemble(body: Body, arena: Arena | None = FLAT, decorated: bool = False) ->
 
     Returns:
         The model; `writing.written` makes a text of it.
+
+    Raises:
+        ValueError: an imported body, of which there is a text alone.
     """
+    if body.source:
+        raise ValueError(f"{body.name} was imported: `models.text` has its MJCF")
     body = sizing.sized(body)
     root = builder.build(body)
     if arena is None:

@@ -5,6 +5,7 @@ import mujoco
 import numpy as np
 import pytest
 from dm_control import mjcf
+from refusals import refused
 
 from arc_suite import models, registry
 from arc_suite.arenas import ARENAS, FLAT
@@ -152,3 +153,8 @@ def test_a_scene_takes_an_imported_body_without_arena(decorated):
     scene.attach(body, prefix="other/", frame=scene.worldbody.add_frame(pos=(0.0, 0.0, 1.0)))
     model = scene.compile()
     assert model.nq == 13 and model.nkey == 0 and "floor" not in text
+
+
+def test_an_imported_body_has_no_root_element():
+    with refused("hexapod_2kg was imported: `models.text` has its MJCF"):
+        models.assemble(imports.hexapod())
