@@ -13,9 +13,11 @@ from tqdm import tqdm
 from arc_suite.animation import clips as export
 from arc_suite.animation.clips.catalogue import CLIPS
 from arc_suite.envs.setup import Setup
+from arc_suite.models.importing import imported
 from arc_suite.robots import ROBOTS, generator, spec_files
 from arc_suite.simulation.model import compiled
 
+OTHERS = pathlib.Path(__file__).parents[1] / "fixtures" / "robots"  # files of robots that are imported
 FEW = ("walk", "turn_left", "stop", "idle")
 WHOLE = "queen"  # has all clips
 
@@ -30,12 +32,14 @@ def main(folder: str, few: str = "") -> None:
     if not few:
         bodies |= {name: spec_files.load_body(name) for name in spec_files.EXAMPLES}
         bodies |= {f"random_{seed}": generator.random_body(seed) for seed in range(100)}
+        bodies |= {path.stem: imported(path).body for path in sorted(OTHERS.iterdir())}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
         names = tuple(CLIPS) if name == WHOLE else export.DEFAULT if name in spec_files.EXAMPLES else FEW
         clips = export.clips(Setup.of(body, "steer"), names)
-        for rig in export.RIGS if name in ROBOTS else ("skin",):
+        for rig in export.RIGS if name in ROBOTS or body.source else ("skin",):
             (out / f"{name}-{rig}.glb").write_bytes(export.glb(body, clips, rig))
-        np.savez(out / f"{name}.npz", **truth(body, clips))
+        if not body.source:  # whose bones stand at the joints, not where MuJoCo's bodies do
+            np.savez(out / f"{name}.npz", **truth(body, clips))
 
 
 def truth(body, clips) -> dict[str, np.ndarray]:
@@ -45,7 +49,7 @@ def truth(body, clips) -> dict[str, np.ndarray]:
     for clip in clips:
         for motion, end in ((clip.motion, ""), (clip.motion._replace(root=0.0 * clip.motion.root), "_in_place")):
             frames = []
-            for pose in motion.qpos():
+            for pose in motion.poses():
                 data.qpos[:] = pose
                 mujoco.mj_kinematics(model, data)
                 frames.append(data.xpos[parts][:, [1, 2, 0]])

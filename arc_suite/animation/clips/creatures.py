@@ -54,6 +54,8 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         scene.append(_skinned(document, body.name, parts, meshes, [root, *nodes], materials))
     else:
         for part, own, node in zip(parts, meshes, nodes, strict=True):
+            if not own:  # a link of an imported body may show nothing
+                continue
             primitives = [_primitive(document, mesh, materials[name]) for name, mesh in own.items()]
             mesh = document.add("meshes", {"name": part.name, "primitives": primitives})
             document.json["nodes"][node]["mesh"] = mesh

@@ -50,6 +50,13 @@ def test_servos_walk_hold_and_let_go(name):
             np.testing.assert_allclose(one, other, atol=1e-6)
 
 
+def test_a_part_that_shows_nothing_has_no_mesh():
+    file = gltf_reader.read(export.glb(imports.hexapod(), [], "nodes"))
+    empty = {node["name"] for node in file.json["nodes"] if "mesh" not in node}
+    assert empty == {"root", *(f"{leg.name}_link1" for leg in imports.hexapod().legs)}
+    assert all(mesh["primitives"] for mesh in file.json["meshes"])
+
+
 def test_a_body_with_an_arm_stands_and_dies():
     """The servo of the arm is not taken for a release of one of the legs."""
     body = imports.with_arm()
