@@ -33,7 +33,7 @@ _SIGHTED = SightedParameters(lead=0.24, longer=0.12, trust=0.5)
 DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_commanded(_SIGHTED, share=0.05, level=1.0)}
 
 # Of imported bodies. Feedback on the motion, which comes late, tips robots with quick motors; their servos need little.
-_STEERED = SteeringParameters(lift=0.12, gain=(0.3, 0.3, 0.3), integral=0.2, share=0.05, level=1.0)
+_STEERED = SteeringParameters(lift=0.12, gain=(0.3, 0.3, 0.3), integral=0.3, share=0.05, level=1.0)
 _BALANCED = BalancingParameters(
     feet=None,
     lift=0.2,
