@@ -3,6 +3,7 @@
 import pickle
 
 import gymnasium
+import imports
 import numpy as np
 import pytest
 from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
@@ -81,10 +82,10 @@ def test_different_bodies_change_too():
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_every_field_moves_what_follows(name):
-    """What pairs of contacts do not read is refused in walk; pillars read it."""
-    observations = []
+    """What pairs of contacts do not read is refused in walk; pillars read it. Limits of torques are those of servos."""
+    observations, body = [], imports.hexapod() if name == "jnt_actfrcrange" else "tick"
     for change in (False, True):
-        environment = Env("tick", "navigate" if name == "geom_friction" else "walk", {"base_noise": 0.0})
+        environment = Env(body, "navigate" if name == "geom_friction" else "walk", {"base_noise": 0.0})
         environment.reset(seed=0)
         value = field(environment.unwrapped._env.physics.model.ptr, name)
         if change and name == "geom_friction":
