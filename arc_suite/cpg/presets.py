@@ -51,12 +51,13 @@ DEFAULTS_OF_SERVOS = {
     "medium": 0.24,
     "fast": 0.3,
     "steered": _STEERED,
-    "surefooted": _BALANCED,
-    "balanced": _BALANCED,
+    "surefooted": _STEERED._replace(lift=0.3),
     "reactive": _STEERED._replace(integral=0.0),
     "sighted": _SIGHTED,
     "planned": PlanningParameters(_STEERED),
 }
+# Of imported bodies that step for their balance; on six legs such steps tip them.
+BALANCING = {"surefooted": _BALANCED, "balanced": _BALANCED}
 
 
 def _published(common: dict, *rows: tuple) -> dict:

@@ -8,7 +8,7 @@ from arc_suite import robots
 from arc_suite.cpg.balancing import Balanced, BalancingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
 from arc_suite.cpg.prescribed import PrescribedLaw, Preset
-from arc_suite.cpg.presets import DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
+from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
 from arc_suite.cpg.stride import StrideLaw
@@ -25,6 +25,7 @@ LAWS = {
     PlanningParameters: Planned,
 }
 
+_TIPPY = 5  # legs up to which a body needs to step for its balance
 _AHEAD = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
 
 
@@ -52,8 +53,13 @@ def presets_of(body: Body) -> Mapping[str, Any]:
         ValueError: a body of a robot's name that has other joints.
     """
     own = robots.parameters(PRESETS, body, "presets") or {}
-    defaults = DEFAULTS_OF_SERVOS if body.source else DEFAULTS
-    return own | {name: preset for name, preset in defaults.items() if name not in own}
+    return own | {name: preset for name, preset in _defaults(body).items() if name not in own}
+
+
+def _defaults(body: Body) -> Mapping[str, Any]:
+    if not body.source:
+        return DEFAULTS
+    return DEFAULTS_OF_SERVOS if len(body.legs) > _TIPPY else DEFAULTS_OF_SERVOS | BALANCING
 
 
 def preset_names() -> tuple[str, ...]:

@@ -64,7 +64,7 @@ def test_steered_follows_a_command(body):
     (ahead, _), fell = walked(body, "steered", "steer", (0.0, 0.0, 0.0), 2.0)
     assert not fell
     assert abs(ahead) < 0.1
-    for preset in ("steered", "reactive", "balanced"):
+    for preset in ("steered", "reactive", "surefooted"):
         opened = arc_suite.load(body, "steer", {"random": 0, "time_limit": 6.0})
         demonstrator, step = Demonstrator(opened, preset), opened.reset()
         opened.command("command", (0.0, 0.0, 1.0))

@@ -1,6 +1,7 @@
 """Import the robots of `zoo.py`, compare their dynamics with their files, and walk them: `make check-robots`, minutes.
 
 python tests/robots_of_others/check.py FOLDER [NAME ...]
+python tests/robots_of_others/check.py FOLDER --page docs/imported.md
 
 Prints a table and writes it to FOLDER/robots.csv. Of each file: whether it comes in, in how many of 200 states the
 accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Fails where
@@ -24,6 +25,7 @@ import reference  # noqa: E402
 import zoo  # noqa: E402
 
 from arc_suite import rotations  # noqa: E402
+from arc_suite.cli import program  # noqa: E402
 from arc_suite.cpg import Demonstrator  # noqa: E402
 from arc_suite.envs.setup import Setup  # noqa: E402
 from arc_suite.evaluation import protocol, walking  # noqa: E402
@@ -162,9 +164,25 @@ def cells(row: Row) -> list[str]:
     return [row.robot.name, row.robot.group, *came, *figures, "yes" if row.walked else "no", row.line]
 
 
+def page(rows: list[Row]) -> str:
+    """Return the robots that came in as a table of Markdown."""
+    found = []
+    for one in (one for one in rows if one.walks):
+        medium, steered = ("did not run" if each is None else _said(each) for each in one.walks.values())
+        found.append(f"| {one.robot.name} | {one.robot.group} | {one.legs} | {medium} | {steered} |")
+    return "\n".join(["| robot | | legs | `medium` | `steered` |", "|---|---|---|---|---|", *found])
+
+
+def _said(each: Walk) -> str:
+    falls = f", falls in {each.falls} of {SEEDS}" if each.falls else ""
+    return f"{each.slowest:.2f} to {each.fastest:.2f}{falls}, limit {100.0 * each.limited:.1f}"
+
+
 def main(folder: str, *names: str) -> int:
     """Try all files, or those that are named; print, write and judge the table."""
-    place = pathlib.Path(folder)
+    place, write = pathlib.Path(folder), None
+    if "--page" in names:
+        write, names = program.marked_page("page", names[-1]), ()
     chosen = [robot for robot in zoo.ROBOTS if not names or robot.name in names]
     rows = []
     with multiprocessing.get_context("spawn").Pool() as pool:
@@ -173,6 +191,8 @@ def main(folder: str, *names: str) -> int:
             print(" | ".join(cells(rows[-1])), flush=True)
     with (place / "robots.csv").open("w", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows([HEADER, *map(cells, rows)])
+    if write is not None:
+        write(page(rows))
     came = [one for one in rows if one.came]
     same = sum(one.same == reference.STATES for one in came)
     print(f"{len(came)} of {len(rows)} files come in, {same} with the same bits")

@@ -16,7 +16,7 @@ from arc_suite.robots.spec import Servo
 _ERROR = 0.1  # rad
 _TIMES = 10.0
 _LEAST_SHARE = 0.5  # of the leg's strongest load, by which a joint with a smaller one counts
-_LEAST_FREQUENCY = 25.0  # rad/s, of a joint with what it moves
+_LEAST_FREQUENCY = 17.0  # rad/s, of a joint with what it moves
 _DAMPING_RATIO = 0.7
 _CARRYING = 40.0  # rad/s, of a joint at most: a leg on the floor moves the torso, and not its links alone
 
