@@ -57,7 +57,11 @@ DEFAULTS_OF_SERVOS = {
     "planned": PlanningParameters(_STEERED),
 }
 # Of imported bodies that step for their balance; on six legs such steps tip them.
-BALANCING = {"surefooted": _BALANCED, "balanced": _BALANCED}
+BALANCING = {
+    "surefooted": _BALANCED,
+    "balanced": _BALANCED,
+    "reactive": _BALANCED._replace(integral=0.0),
+}
 
 
 def _published(common: dict, *rows: tuple) -> dict:
