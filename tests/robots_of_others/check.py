@@ -7,7 +7,8 @@ Prints a table and writes it to FOLDER/robots.csv. Of each file: whether it come
 accelerations have the same bits as the file's own, and the walks of two presets, three seeds of 20 s. Fails where
   - a file that should come in does not, or one that should not does;
   - accelerations differ;
-  - a robot of MUST_WALK does not walk, or fewer than seven tenths of the NEW robots do.
+  - a robot of MUST_WALK does not walk, or is at its torque limits in 3 % of the samples;
+  - fewer than seven tenths of the NEW robots walk.
 """
 
 import csv
@@ -56,7 +57,7 @@ class Walk(NamedTuple):
 
     @property
     def good(self) -> bool:
-        return self.slowest >= LEAST and self.fastest <= MOST and not self.falls and self.limited < MOST_LIMITED
+        return self.slowest >= LEAST and self.fastest <= MOST and not self.falls
 
 
 class Row(NamedTuple):
@@ -76,6 +77,10 @@ class Row(NamedTuple):
     def walked(self) -> bool:
         return bool(self.walks) and all(one is not None and one.good for one in self.walks.values())
 
+    @property
+    def strained(self) -> bool:
+        return any(one is not None and one.limited >= MOST_LIMITED for one in self.walks.values())
+
     def faults(self) -> list[str]:
         found = []
         if self.came == (self.robot.refused is not None):
@@ -84,8 +89,8 @@ class Row(NamedTuple):
             found.append(f"expected a line with {self.robot.refused!r}, got {self.line!r}")
         if self.came and self.same != reference.STATES:
             found.append(f"same bits in {self.same} of {reference.STATES} states")
-        if self.robot.name in MUST_WALK and not self.walked:
-            found.append("does not walk")
+        if self.robot.name in MUST_WALK and (not self.walked or self.strained):
+            found.append("does not walk within the limits of its motors")
         return [f"{self.robot.name}: {fault}" for fault in found]
 
 
