@@ -24,6 +24,8 @@ EXTENSIONS = (".xml", ".urdf")
 
 _CONTROL_STEP = 0.02  # s
 _LARGEST_TIMESTEP = 0.004  # s
+_GRAVITIES = (0.1, 1000.0)  # m/s^2, downwards
+_MASSES = (1e-6, 1e9)  # kg
 _UNNAMED = "MuJoCo Model"  # of MJCF without a name
 
 
@@ -77,6 +79,7 @@ def _body(path: str, _content: bytes) -> Body:
 
 def _imported(path: Path, home: str | None, feet: Sequence[str]) -> Imported:
     file, robot, stance = _standing(path, home, feet)
+    _check_world(robot)
     _check_hinges(robot, stance)
     names = names_of(robot, stance.legs)
     driven = motors.motors_of(robot, stance)
@@ -115,6 +118,16 @@ def _standing(path: Path, home: str | None, feet: Sequence[str]) -> tuple[Opened
                     note = "turned: the file's y axis points up, the torso's frame has z there"
                     return file._replace(notes=(*file.notes, note)), robot, stance
         raise SpecError(str(error)) from None
+
+
+def _check_world(robot: Robot) -> None:
+    """Refuse gravity that does not pull down, and a robot of an impossible weight."""
+    gravity, mass = robot.model.opt.gravity, float(robot.model.body_subtreemass[robot.root])
+    if not (_GRAVITIES[0] <= -gravity[2] <= _GRAVITIES[1] and abs(gravity[:2]).max() < 1e-6):
+        given = " ".join(f"{each:g}" for each in gravity)
+        raise SpecError(f"option: gravity: expected 0 0 -9.81 or the like, got {given}")
+    if not _MASSES[0] <= mass <= _MASSES[1]:
+        raise SpecError(f"expected a robot of {_MASSES[0]:g} to {_MASSES[1]:g} kg, got {mass:g}")
 
 
 def _check_hinges(robot: Robot, stance: Stance) -> None:

@@ -98,6 +98,13 @@ REFUSED = {
     "no legs": (GO2, None, '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>', "legs"),
     "nothing": (GO2, None, "<mujoco/>", "legs"),
     "a place that is no number": (GO2, 'pos="0.1934 0.0465 0"', 'pos="0.1934 left 0"', "Element 'body'"),
+    "gravity that pulls up": (
+        GO2,
+        "<option ",
+        '<option gravity="0 0 9.81" ',
+        "gravity: expected 0 0 -9.81 or the like",
+    ),
+    "an impossible mass": (GO2, 'mass="0.2414"', 'mass="1e300"', "expected a robot of 1e-06 to 1e+09 kg, got"),
     "a timestep of zero": (GO2, "<option ", '<option timestep="0" ', "timestep"),
     "no text": (GO2, None, "", "expected XML"),
     "binary": (GO2, None, "\0\1\2", "expected XML"),
