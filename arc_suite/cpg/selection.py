@@ -25,7 +25,7 @@ LAWS = {
     PlanningParameters: Planned,
 }
 
-_TIPPY = 5  # legs up to which a body needs to step for its balance
+_MOST_UNSTEADY = 5  # legs with which a body steps for its balance
 _AHEAD = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
 
 
@@ -59,7 +59,7 @@ def presets_of(body: Body) -> Mapping[str, Any]:
 def _defaults(body: Body) -> Mapping[str, Any]:
     if not body.source:
         return DEFAULTS
-    return DEFAULTS_OF_SERVOS if len(body.legs) > _TIPPY else DEFAULTS_OF_SERVOS | BALANCING
+    return DEFAULTS_OF_SERVOS if len(body.legs) > _MOST_UNSTEADY else DEFAULTS_OF_SERVOS | BALANCING
 
 
 def preset_names() -> tuple[str, ...]:

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import imports
 import programs
 import pytest
 
@@ -148,3 +149,24 @@ def test_a_weak_body_is_told_and_walked_all_the_same(path):
         rf"{path}: weak: reaches about 0\.\d of the target speed, as the motor of \w+ lacks .*: gear .* fits", weak
     )
     assert walked.startswith(f"{path}: spider is slow: walks 100 control steps at ")
+
+
+def test_imported_robots_walk_for_20_seconds_and_get_no_advice(path):
+    robot = imports.FILES / "go2_like.xml"
+    done = check("--walk", robot)
+    walks = r"walks 1000 control steps at 0\.\d\d m/s \((0\.[89]|1\.[01])\d of the target 0\.34\)"
+    assert done.returncode == 0 and re.fullmatch(f"{robot}: {walks}", done.stdout.splitlines()[1])
+    body = imports.quadruped()
+    servo = body.legs[0].joints[0].servo
+    soft = servo.replace(stiffness=0.1 * servo.stiffness, limit=0.3 * servo.limit)
+    legs = tuple(
+        leg.replace(links=tuple(link.replace(joint=link.joint.replace(servo=soft)) for link in leg.links))
+        for leg in body.legs
+    )
+    spec_files.save_body(body.replace(legs=legs), path)
+    done = check("--walk", path)
+    assert done.returncode == 1
+    assert "leav" not in done.stdout
+    assert re.search(
+        rf"{path}: quadruped_15_kg (falls after \d+ control steps|is slow: walks .*\))$", done.stdout.strip()
+    )

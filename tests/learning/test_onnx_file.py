@@ -2,6 +2,7 @@
 
 import json
 
+import imports
 import numpy as np
 import programs
 import pytest
@@ -53,6 +54,26 @@ def test_any_number_of_environments(tmp_path):
         observations = np.random.default_rng(num_envs).normal(size=(num_envs, policy.size)).astype(np.float32)
         (actions,) = run.run(None, {"observations": observations})
         np.testing.assert_allclose(actions, policy.actions(observations), atol=1e-5)
+
+
+def test_metadata_tell_what_a_robot_of_others_needs(tmp_path):
+    body = imports.quadruped()
+    texts = exported(made(body), tmp_path).get_modelmeta().custom_metadata_map
+    servos, model = json.loads(texts["servos"]), arc_suite.load(body, "walk").physics.model.ptr
+    assert list(servos) == list(body.joint_names)
+    assert json.loads(texts["file_joints"]) == list(body.file_joints)
+    assert "gears" not in texts
+    for leg in body.legs:
+        for joint in leg.joints:
+            told = servos[leg.full_name(joint)]
+            assert told["alias"] == joint.alias
+            assert (told["stiffness"], told["damping"], told["limit"]) == (
+                joint.servo.stiffness,
+                joint.servo.damping,
+                joint.servo.limit,
+            )
+            assert told["home"] == model.key("home").qpos[model.joint(leg.full_name(joint)).qposadr[0]]
+            assert told["reach"] == max(map(abs, np.radians(joint.range_deg)))
 
 
 def test_metadata_tell_what_a_game_needs(tmp_path):
