@@ -149,7 +149,7 @@ def _sketched(model: mujoco.MjModel, body: Body) -> list[Part]:
     shapes: list[list[Shape]] = [[] for _ in body.part_names]
     bones = _bones(body, *(data.body("torso").xpos, data.body("torso").xquat))
     places, turns = frames(bones)
-    for geom in np.flatnonzero(model.geom_bodyid):  # those of the world are the ground's
+    for geom in np.flatnonzero(model.geom_bodyid).tolist():  # those of the world are the ground's
         part, turn = owners[int(model.geom_bodyid[geom])], np.empty(4)
         mujoco.mju_mat2Quat(turn, (turns[part].T @ data.geom_xmat[geom].reshape(3, 3)).ravel())
         place = turns[part].T @ (data.geom_xpos[geom] - places[part])

@@ -7,7 +7,7 @@ therefore those of a list; `arc_suite.models.importing` writes no others.
 import collections
 import re
 import xml.etree.ElementTree as ElementTree
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from arc_suite import checks
 from arc_suite.robots.spec import Body, SpecError
@@ -23,7 +23,7 @@ _SOFT = {"solref": _NUMBERS, "solimp": _NUMBERS}
 _PLACE = {"name": _NAME, "pos": _NUMBERS, "quat": _NUMBERS}
 
 # By tag: where it stands, how many there may be, and its attributes with what they hold.
-_TAGS = {
+_TAGS: dict[str, tuple[tuple[str | None, ...], int, dict[str, Any]]] = {
     "mujoco": ((None,), 1, {"model": _NAME}),
     "compiler": (
         ("mujoco",),
@@ -132,7 +132,7 @@ def _parsed(text: str) -> ElementTree.Element:
 def _check_elements(root: ElementTree.Element) -> None:
     """Refuse tags, places, attributes and values that no source has."""
     counts = collections.Counter()
-    waiting = [(root, None, 0)]
+    waiting: list[tuple[ElementTree.Element, str | None, int]] = [(root, None, 0)]
     while waiting:
         element, parent, depth = waiting.pop()
         tag = element.tag
@@ -182,7 +182,7 @@ def _check_parts(root: ElementTree.Element, body: Body) -> None:
     hinges = [joint.get("name") for joint in root.iter("joint") if joint.get("name") != "root"]
     held = [joint.name for joint in body.held]
     for kind, found, wanted, alone in (
-        ("joint", hinges, [*body.joint_names, *held], True),
+        ("joint", hinges, (*body.joint_names, *held), True),
         ("body", [part.get("name") for part in root.iter("body")], body.part_names, False),
         ("site", [site.get("name") for site in root.iter("site")], ("torso", *body.foot_names), False),
     ):

@@ -250,7 +250,9 @@ class Joint(_Spec):
     @property
     def torque(self) -> float | None:
         """Return the largest torque of its motor or servo, N m; None for one that is to be sized."""
-        return self.servo.limit if self.servo else self.motor and self.motor.gear
+        if self.servo:
+            return self.servo.limit
+        return self.motor.gear if self.motor else None
 
     def mirrored(self) -> Joint:
         """Return the joint of the leg across the x-z plane, so that equal angles give mirrored poses.

@@ -85,7 +85,7 @@ def _mechanics(robot: Robot, stance: Stance) -> tuple[dict[int, float], dict[int
     mass = float(model.body_subtreemass[robot.root])
     centre = data.subtree_com[robot.root]
     soles = np.array([leg.sole for leg in stance.legs])
-    weight = mass * np.linalg.norm(model.opt.gravity)
+    weight = mass * float(np.linalg.norm(model.opt.gravity))
     bias = data.qfrc_bias.copy()
     for leg, force in zip(stance.legs, foot_loads(weight, soles[:, :2] - centre[:2]), strict=True):
         bias -= force * _lever(model, data, leg)

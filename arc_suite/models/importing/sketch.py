@@ -31,13 +31,14 @@ def _leg(robot: Robot, stance: Stance, data: mujoco.MjData, leg: Leg, label: str
     links = []
     for place, joint in enumerate(leg.joints):
         given = _joint(robot, stance, data, joint, f"joint{place + 1}", servos[joint])
-        end = tuple(map(float, points[place + 1] - points[place]))
+        end = _floats(points[place + 1] - points[place])
         links.append(Link(name=f"link{place + 1}", end=end, radius=_radius(robot, leg, joint), joint=given))
     return spec.Leg(name=label, mount=_floats(points[0]), links=tuple(links), foot=Foot(radius=leg.radius))
 
 
-def _floats(numbers) -> tuple[float, ...]:
-    return tuple(map(float, numbers))
+def _floats(numbers) -> spec.Vector:
+    x, y, z = map(float, numbers)
+    return x, y, z
 
 
 def _points(data: mujoco.MjData, leg: Leg, apart: float) -> list[np.ndarray]:

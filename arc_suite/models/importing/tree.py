@@ -40,8 +40,8 @@ class Robot(NamedTuple):
 
     def range(self, joint: int) -> tuple[float, float]:
         """Return the limits of a joint, rad or m; infinite ones where it has none."""
-        limited = self.model.jnt_limited[joint]
-        return tuple(map(float, self.model.jnt_range[joint])) if limited else (-np.inf, np.inf)
+        low, high = self.model.jnt_range[joint] if self.model.jnt_limited[joint] else (-np.inf, np.inf)
+        return float(low), float(high)
 
     def place(self, joint: int) -> int:
         """Return where a joint's angle stands in qpos."""
@@ -76,7 +76,7 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
     Raises:
         SpecError: it has ball joints, or nothing that collides.
     """
-    chains = {root: ()}
+    chains: dict[int, tuple[int, ...]] = {root: ()}
     for body in range(root + 1, model.nbody):
         parent = int(model.body_parentid[body])
         if parent in chains:

@@ -5,7 +5,7 @@ of the file, written so that it is read back as itself: compiling the text gives
 """
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -28,13 +28,13 @@ _GEOMS = {
 
 # What MuJoCo takes for attributes that are left out.
 _SOFTNESS = {"solref": (0.02, 1.0), "solimp": (0.9, 0.95, 0.001, 0.5, 2.0)}
-_BODY = {"pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0), "gravcomp": 0.0}
-_JOINT = {
+_BODY: dict[str, Any] = {"pos": (0.0, 0.0, 0.0), "quat": (1.0, 0.0, 0.0, 0.0), "gravcomp": 0.0}
+_JOINT: dict[str, Any] = {
     "pos": (0.0, 0.0, 0.0), "margin": 0.0, "ref": 0.0, "springref": 0.0, "armature": 0.0, "frictionloss": 0.0,
     "stiffness": (0.0, 0.0, 0.0), "damping": (0.0, 0.0, 0.0),
     **{f"{name}{what}": value for name, value in _SOFTNESS.items() for what in ("limit", "friction")},
 }  # fmt: skip
-_GEOM = {
+_GEOM: dict[str, Any] = {
     "condim": 3, "priority": 0, "solmix": 1.0, "margin": 0.0,
     "gap": 0.0, "friction": (1.0, 0.005, 0.0001), "adhesion": 0.0, "surfacevel": (0.0,) * 6, **_SOFTNESS,
 }  # fmt: skip
@@ -91,7 +91,7 @@ def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTre
     return ElementTree.SubElement(parent, tag, attributes)
 
 
-def _differing(plain: dict[str, Iterable], given: dict[str, Iterable]) -> dict[str, str]:
+def _differing(plain: dict[str, Any], given: dict[str, Any]) -> dict[str, str]:
     """Return the attributes whose numbers are not those that MuJoCo takes where they are left out."""
     return {name: exact(value) for name, value in given.items() if not np.array_equal(value, plain[name])}
 
@@ -146,7 +146,7 @@ def _add_body(
     return element
 
 
-def _resistance(model: mujoco.MjModel, joint: int) -> dict[str, Iterable]:
+def _resistance(model: mujoco.MjModel, joint: int) -> dict[str, Any]:
     """Return what resists the movement of any joint."""
     dof = model.jnt_dofadr[joint]
     return {
