@@ -11,6 +11,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from arc_suite.models.importing.tree import colliding, vertices
 from arc_suite.robots.spec import MAX_SOURCE
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
@@ -50,7 +51,7 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
         spec: of the file; nothing of it is changed.
         model: compiled from it.
     """
-    geoms = [geom for geom in range(model.ngeom) if model.geom_type[geom] == _MESH and _collides(model, geom)]
+    geoms = [geom for geom in colliding(model) if model.geom_type[geom] == _MESH]
     if not geoms:
         return {}
     names = {geom: model.mesh(int(model.geom_dataid[geom])).name for geom in geoms}
@@ -69,10 +70,6 @@ def meshes_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[int, Mesh]:
 def file_of(spec: mujoco.MjSpec, mesh) -> Path:
     """Return the file of a mesh."""
     return Path(spec.modelfiledir) / spec.meshdir / mesh.file
-
-
-def _collides(model: mujoco.MjModel, geom: int) -> bool:
-    return bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
 
 
 def _text(numbers: Iterable) -> str:
@@ -111,13 +108,12 @@ def _that_fit(wholes: dict[str, dict[str, str]], hulls: dict[str, dict[str, str]
 def _hull(model: mujoco.MjModel, geom: int) -> dict[str, str]:
     """Return a mesh of the corners of a compiled mesh's convex hull."""
     mesh = int(model.geom_dataid[geom])
-    start, graph = int(model.mesh_vertadr[mesh]), int(model.mesh_graphadr[mesh])
+    graph = int(model.mesh_graphadr[mesh])
     corners = slice(None)
     if graph >= 0:  # number of corners, of triangles, then of each corner its edges, then its vertex
         count = int(model.mesh_graph[graph])
         corners = np.sort(model.mesh_graph[graph + 2 + count : graph + 2 + 2 * count])
-    points = model.mesh_vert[start : start + model.mesh_vertnum[mesh]][corners]
-    return {"inertia": "convex", "vertex": _text(points.ravel())}
+    return {"inertia": "convex", "vertex": _text(vertices(model, mesh)[corners].ravel())}
 
 
 def _places(spec: mujoco.MjSpec) -> mujoco.MjModel:

@@ -83,19 +83,21 @@ def robot_of(model: mujoco.MjModel, root: int, notes: Sequence[str] = ()) -> Rob
             first = int(model.body_jntadr[body])
             chains[body] = (*chains[parent], *range(first, first + int(model.body_jntnum[body])))
     joints = tuple(sorted({joint for chain in chains.values() for joint in chain}))
-    paired = {*model.pair_geom1.tolist(), *model.pair_geom2.tolist()}
-    collides = [
-        int(model.geom_bodyid[geom]) in chains
-        and bool(model.geom_contype[geom] or model.geom_conaffinity[geom] or geom in paired)
-        for geom in range(model.ngeom)
-    ]
-    robot = Robot(model, root, tuple(chains), joints, tuple(np.flatnonzero(collides).tolist()), chains)
+    colliders = tuple(geom for geom in colliding(model) if int(model.geom_bodyid[geom]) in chains)
+    robot = Robot(model, root, tuple(chains), joints, colliders, chains)
     balls = [robot.name(joint) for joint in joints if model.jnt_type[joint] == BALL]
     if balls:
         raise SpecError(f"joint {balls[0]!r} is a ball joint; expected hinges")
     if not robot.colliders:
         raise SpecError("; ".join(("no shape collides with anything: a leg needs one at its end", *notes)))
     return robot
+
+
+def colliding(model: mujoco.MjModel) -> list[int]:
+    """Return the geoms that can touch others: by their masks, or as one of a contact pair."""
+    touches = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    touches[[*model.pair_geom1, *model.pair_geom2]] = True
+    return np.flatnonzero(touches).tolist()
 
 
 def support(model: mujoco.MjModel, data: mujoco.MjData, geom: int, direction: np.ndarray) -> np.ndarray:

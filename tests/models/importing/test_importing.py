@@ -236,3 +236,19 @@ def test_paths_are_bodies_everywhere_and_follow_the_file(tmp_path):
     assert registry.body_of(path).name == "other"
     with pytest.raises(OSError, match=r"^cannot read .*none\.urdf: no such file or directory$"):
         registry.body_of(str(tmp_path / "none.urdf"))
+
+
+def test_a_mesh_that_touches_by_a_contact_pair_alone_is_a_collider(tmp_path):
+    text = GO2.read_text()
+    text = text.replace("<asset>", '<asset><mesh name="tip" vertex="0 0 0 0.03 0 0 0 0.03 0 0 0 0.03"/>', 1)
+    shape = '<geom name="tip" type="mesh" mesh="tip" contype="0" conaffinity="0" mass="0"/>'
+    calf = '<body name="FL_calf" pos="0 0 -0.213">'
+    text = text.replace("<worldbody>", '<worldbody><geom name="plate" type="plane" size="0 0 1"/>', 1)
+    text = text.replace(calf, calf + shape, 1)
+    text = text.replace("</worldbody>", '</worldbody><contact><pair geom1="tip" geom2="plate"/></contact>', 1)
+    path = tmp_path / "tipped.xml"
+    path.write_text(text)
+    model = mujoco.MjModel.from_xml_string(imported(path).body.source)
+    meshes = [geom for geom in range(model.ngeom) if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH]
+    assert [model.body(model.geom_bodyid[geom]).name for geom in meshes] == ["l1_link3"]
+    assert (model.geom_contype[meshes], model.geom_conaffinity[meshes]) == (1, 0)
