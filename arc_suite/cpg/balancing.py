@@ -40,16 +40,16 @@ class BalancingParameters(NamedTuple):
             feet follow.
     """
 
-    feet: tuple[tuple[float, float, float], ...] | None
-    lift: float
-    gain: tuple[float, float, float]
-    integral: float
-    most: float
-    shorter: float
-    lead: float
-    attitude: float
-    lean: float
-    capture: float
+    feet: tuple[tuple[float, float, float], ...] | None = None
+    lift: float = 0.2
+    gain: tuple[float, float, float] = (0.3, 0.3, 0.3)
+    integral: float = 0.1
+    most: float = 1.4
+    shorter: float = 0.0
+    lead: float = 0.0
+    attitude: float = 0.0
+    lean: float = 0.0
+    capture: float = 0.45
 
 
 _STEEP = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops

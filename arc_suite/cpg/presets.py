@@ -34,18 +34,7 @@ DEFAULTS = {"slow": 0.18, "medium": 0.25, "fast": 0.32, **_commanded(_SIGHTED, s
 
 # Of imported bodies. Feedback on the motion, which comes late, tips robots with quick motors; their servos need little.
 _STEERED = SteeringParameters(lift=0.12, gain=(0.3, 0.3, 0.3), integral=0.3, share=0.05, level=1.0)
-_BALANCED = BalancingParameters(
-    feet=None,
-    lift=0.2,
-    gain=(0.3, 0.3, 0.3),
-    integral=0.1,
-    most=1.4,
-    shorter=0.0,
-    lead=0.0,
-    attitude=0.0,
-    lean=0.0,
-    capture=0.45,
-)
+_BALANCED = BalancingParameters()
 DEFAULTS_OF_SERVOS = {
     "slow": 0.18,
     "medium": 0.24,

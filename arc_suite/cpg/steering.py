@@ -172,7 +172,7 @@ def _damping(leg: _Leg) -> np.ndarray:
 
 def _ranges(body: Body) -> np.ndarray:
     """Bounds (2, joints) of the joints, rad."""
-    return np.radians([joint.range_deg for leg in body.legs for joint in leg.joints]).T
+    return np.radians([joint.range_deg for joint in body.joints]).T
 
 
 @functools.lru_cache(maxsize=64)

@@ -78,7 +78,6 @@ class Stride(NamedTuple):
         speed = gait.pace * froude * math.sqrt(GRAVITY * pose.height)
         # A foot on the ground covers from +reach to -reach while its stance lasts.
         reach = 0.5 * speed * gait.duty_factor / gait.frequency or 1e-6 * pose.height
-        joints = [joint for leg in body.legs for joint in leg.joints]
         counts = [len(leg.joints) for leg in body.legs]
         moves, raised = strokes(task.scene.body, reach), []
         for jacobian, (sweep, lift) in zip(pose.jacobians, moves, strict=True):
@@ -93,13 +92,13 @@ class Stride(NamedTuple):
                 offset=np.repeat(gait.offsets, counts),
                 sweep=sweeps,
                 centre=np.concatenate(raised),
-                stance=np.zeros(len(joints)),
+                stance=np.zeros(len(body.joints)),
                 swing=lifts,
             ),
             speed=speed,
             control_timestep=task.scene.control_timestep,
             drive=drive(body, pose.inertias),
-            held=pose.loads / (gait.duty_factor * np.array([joint.torque for joint in joints])),
+            held=pose.loads / (gait.duty_factor * np.array([joint.torque for joint in body.joints])),
             steering=math.copysign(STEERING, speed) * np.repeat(lateral, counts),
         )
 

@@ -44,7 +44,7 @@ def prepared(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None 
     scene = Scene(
         body=body,
         arena=arena,
-        layout=layout(model, body.joint_names, body.part_names, body.foot_names),
+        layout=layout(model, body),
         standing=stood(model),
         control_timestep=step,
         substeps=substeps,

@@ -57,7 +57,7 @@ def walk(body: Body) -> FirstWalk:
 
 def given_fields(body: Body) -> list[str]:
     """Return the fields of joints that a spec has and could leave out: none of an imported body."""
-    joints = [joint for leg in body.legs for joint in leg.joints if not body.source]
+    joints = () if body.source else body.joints
     return [name for name in FIELDS if any(getattr(joint, name) is not None for joint in joints)]
 
 

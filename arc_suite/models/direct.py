@@ -7,8 +7,7 @@ import math
 
 import mujoco
 
-from arc_suite.arenas import FLAT
-from arc_suite.models import builder, source
+from arc_suite.models import builder
 from arc_suite.models.standing import GEOMS
 from arc_suite.robots.spec import Ballast, Body, Joint, Leg, Simulation
 
@@ -19,10 +18,8 @@ def on_flat_ground(body: Body) -> mujoco.MjSpec:
     """Return the spec whose compiled model has the bytes of the compiled MJCF of `assemble(body)`.
 
     Args:
-        body: with nothing left to be sized.
+        body: without a source, and with nothing left to be sized.
     """
-    if body.source:
-        return source.parsed(body, FLAT)
     contact = builder.contact(body.simulation)
     contact["friction"] = list(contact["friction"])
     touches_floor = {"contype": 1, "conaffinity": 0, "density": body.density, **contact}

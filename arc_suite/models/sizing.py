@@ -69,7 +69,7 @@ def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.nda
         body: sized.
         inertias: (joints,) that the joints move, without armature, kg m^2.
     """
-    joints = [joint for leg in body.legs for joint in leg.joints]
+    joints = body.joints
     inertia = inertias + [joint.armature for joint in joints]
     if body.source:
         servos = [joint.servo for joint in joints]
@@ -82,7 +82,7 @@ def position_gains(body: Body, inertias: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def reaches(body: Body) -> np.ndarray:
     """Return the angles (joints,) that actions of 1 ask for: to the farther limit from the standing pose, rad."""
-    return abs(np.radians([joint.range_deg for leg in body.legs for joint in leg.joints])).max(axis=-1)
+    return abs(np.radians([joint.range_deg for joint in body.joints])).max(axis=-1)
 
 
 @functools.lru_cache(maxsize=256)
@@ -96,7 +96,7 @@ def sized(body: Body) -> Body:
         A body without None among armatures, dampings, motors, simulation and camera; the same one if
         it leaves nothing open.
     """
-    complete = all(None not in (j.armature, j.damping, j.torque) for leg in body.legs for j in leg.joints)
+    complete = all(None not in (j.armature, j.damping, j.torque) for j in body.joints)
     if complete and body.simulation and body.camera:
         return body
     pose, frequency = standing(body), natural_frequency(body)

@@ -124,7 +124,7 @@ def _displacement(x: float, y: float) -> str:
 
 def _motors(body: Body, pose: Standing) -> Iterator[Flaw]:
     """Find motors too weak to hold the standing pose where no joint limit holds it, or too weak for a stride."""
-    joints = [joint for leg in body.legs for joint in leg.joints]
+    joints = body.joints
     given = np.array([joint.torque or np.inf for joint in joints])
     if np.isinf(given).all():
         return
@@ -155,7 +155,7 @@ def _short(body: Body, given: np.ndarray, needed: np.ndarray, purpose: str, effe
     if body.source:
         return Flaw(f"{effect}the servo of {body.joint_names[worst]} lacks {lacks}{others}", False)
     cure = _unpowered(body, given < needed)
-    fits = [joint.motor.gear for leg in sizing.sized(cure).legs for joint in leg.joints][worst]
+    fits = sizing.sized(cure).joints[worst].motor.gear
     return Flaw(
         f"{effect}the motor of {body.joint_names[worst]} lacks {lacks}{others}: gear {fits:.3g} fits", False, cure
     )

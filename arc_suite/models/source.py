@@ -6,6 +6,7 @@ the record of the physics. Servos, cameras and a sensor are added, and the groun
 
 import functools
 import xml.etree.ElementTree as ElementTree
+from xml.etree.ElementTree import SubElement
 
 import mujoco
 import numpy as np
@@ -43,8 +44,8 @@ def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: boo
     _add_servos(root, body, releases)
     for name, camera in _cameras(body).items():
         attributes = {key: exact(value) for key, value in camera.items()}
-        _add(bodies["torso"], "camera", name=name, mode="trackcom", **attributes)
-    _add(_add(root, "sensor"), "accelerometer", name="torso_acceleration", site="torso")
+        SubElement(bodies["torso"], "camera", name=name, mode="trackcom", **attributes)
+    SubElement(SubElement(root, "sensor"), "accelerometer", name="torso_acceleration", site="torso")
     if decorated:
         _show_colliders(bodies, body)
     if arena is None:
@@ -93,10 +94,6 @@ def angles_at_home(body: Body) -> dict[str, float]:
     return {model.joint(joint).name: float(model.key(HOME).qpos[model.jnt_qposadr[joint]]) for joint in hinges}
 
 
-def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, tag, attributes)
-
-
 def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
     """Add the servos of all joints, those of held joints last.
 
@@ -110,10 +107,12 @@ def _add_servos(root: ElementTree.Element, body: Body, releases: bool) -> None:
         for leg in body.legs
         for joint in leg.joints
     ]
-    actuator = _add(root, "actuator")
+    actuator = SubElement(root, "actuator")
 
     def add(name: str, joint: str, low: float, **attributes: str) -> None:
-        _add(actuator, "general", name=name, joint=joint, ctrllimited="true", ctrlrange=exact((low, 1.0)), **attributes)
+        SubElement(
+            actuator, "general", name=name, joint=joint, ctrllimited="true", ctrlrange=exact((low, 1.0)), **attributes
+        )
 
     def hold(name: str, servo: Servo, reach: float) -> None:
         bias = exact((servo.stiffness * home[name], -servo.stiffness, -servo.damping))
@@ -157,15 +156,15 @@ def _show_colliders(bodies: dict[str, ElementTree.Element], body: Body) -> None:
             geom.set("material", "shell" if name == "torso" else "limb")
     for leg, name in zip(body.legs, body.foot_names, strict=True):
         size = exact(1.04 * leg.foot.radius)
-        _add(bodies[name], "geom", name=f"visual-{name}", type="sphere", size=size, material="glow", **_INERT)
+        SubElement(bodies[name], "geom", name=f"visual-{name}", type="sphere", size=size, material="glow", **_INERT)
 
 
 def _set_options(root: ElementTree.Element, body: Body) -> None:
     option = root.find("option")
-    option = _add(root, "option") if option is None else option
+    option = SubElement(root, "option") if option is None else option
     option.attrib |= {"timestep": exact(body.simulation.timestep), "integrator": "implicitfast"}
     flag = option.find("flag")
-    (_add(option, "flag") if flag is None else flag).set("island", "disable")
+    (SubElement(option, "flag") if flag is None else flag).set("island", "disable")
 
 
 def _ground(body: Body, arena: Arena | None, decorated: bool) -> ElementTree.Element:

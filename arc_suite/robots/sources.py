@@ -22,6 +22,21 @@ _BOOL = ("true", "false")
 _SOFT = {"solref": _NUMBERS, "solimp": _NUMBERS}
 _PLACE = {"name": _NAME, "pos": _NUMBERS, "quat": _NUMBERS}
 
+OPTIONS = {
+    **dict.fromkeys(("timestep", "impratio", "tolerance", "ls_tolerance", "noslip_tolerance"), _NUMBERS),
+    **dict.fromkeys(("ccd_tolerance", "gravity", "wind", "magnetic", "density", "viscosity"), _NUMBERS),
+    **dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"), _STEPS),
+    "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
+    "cone": ("pyramidal", "elliptic"),
+    "jacobian": ("dense", "sparse", "auto"),
+    "solver": ("PGS", "CG", "Newton"),
+}
+# Flags of the physics; others would keep motors, contacts or sensors from working.
+FLAGS = (
+    *("frictionloss", "limit", "spring", "damper", "gravity", "warmstart", "filterparent", "refsafe", "midphase"),
+    *("eulerdamp", "nativeccd", "island", "multiccd"),
+)
+
 # By tag: where it stands, how many there may be, and its attributes with what they hold.
 _TAGS: dict[str, tuple[tuple[str | None, ...], int, dict[str, Any]]] = {
     "mujoco": ((None,), 1, {"model": _NAME}),
@@ -30,28 +45,8 @@ _TAGS: dict[str, tuple[tuple[str | None, ...], int, dict[str, Any]]] = {
         1,
         {"angle": ("radian",), "autolimits": ("false",), "inertiafromgeom": ("false",)},
     ),
-    "option": (
-        ("mujoco",),
-        1,
-        {
-            **dict.fromkeys(("timestep", "impratio", "tolerance", "ls_tolerance", "noslip_tolerance"), _NUMBERS),
-            **dict.fromkeys(("ccd_tolerance", "gravity", "wind", "magnetic", "density", "viscosity"), _NUMBERS),
-            **dict.fromkeys(("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"), _STEPS),
-            "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
-            "cone": ("pyramidal", "elliptic"),
-            "jacobian": ("dense", "sparse", "auto"),
-            "solver": ("PGS", "CG", "Newton"),
-        },
-    ),
-    "flag": (
-        ("option",),
-        1,
-        {
-            **dict.fromkeys(("frictionloss", "limit", "spring", "damper", "gravity", "warmstart"), _ON),
-            **dict.fromkeys(("filterparent", "refsafe", "midphase", "eulerdamp", "nativeccd"), _ON),
-            **dict.fromkeys(("island", "multiccd"), _ON),
-        },
-    ),
+    "option": (("mujoco",), 1, OPTIONS),
+    "flag": (("option",), 1, dict.fromkeys(FLAGS, _ON)),
     "asset": (("mujoco",), 1, {}),
     "mesh": (
         ("asset",),
@@ -99,7 +94,7 @@ _TAGS: dict[str, tuple[tuple[str | None, ...], int, dict[str, Any]]] = {
     "key": (("keyframe",), 1, {"name": ("home",), "qpos": _NUMBERS}),
 }
 
-_ENTITY = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
+ENTITY = re.compile(r"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
 _NAMED = re.compile(r"[a-z0-9_]{1,64}")
 
 
@@ -121,7 +116,7 @@ def _fail(reason: str) -> NoReturn:
 
 
 def _parsed(text: str) -> ElementTree.Element:
-    if _ENTITY.search(text):
+    if ENTITY.search(text):
         _fail("expected XML without a document type and entities")
     try:
         return ElementTree.fromstring(text)

@@ -532,7 +532,7 @@ class Body(_Spec):
 
     def _check_source(self) -> None:
         """Refuse servos without a source, and motors with one."""
-        servos = [joint.servo is not None for leg in self.legs for joint in leg.joints]
+        servos = [joint.servo is not None for joint in self.joints]
         if self.source is None:
             for field, given in (("legs", any(servos)), ("held", self.held), ("file_joints", self.file_joints)):
                 if given:
@@ -561,6 +561,11 @@ class Body(_Spec):
             self._fail(
                 field, f"{name}: expected {what} from {least:.2g} at density {self.density:g}, got {size:g}{fits}"
             )
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Return the joints in the order of the action."""
+        return tuple(joint for leg in self.legs for joint in leg.joints)
 
     @property
     def joint_names(self) -> tuple[str, ...]:

@@ -59,7 +59,8 @@ def compiled(body: Body, arena: Arena = FLAT) -> mujoco.MjModel:
 
 @functools.lru_cache(maxsize=32)
 def _compiled(body: Body, arena: Arena) -> mujoco.MjModel:
-    spec = direct.on_flat_ground(sized(body)) if arena == FLAT else models.parsed(body, arena)
+    quick = arena == FLAT and not body.source
+    spec = direct.on_flat_ground(sized(body)) if quick else models.parsed(body, arena)
     model = spec.compile()
     list_contacts(spec, model, all_geoms=arena.lists_contacts)
     model = spec.compile()

@@ -66,5 +66,5 @@ def cost_of_transport(memory: Energy, path, target_path):
 
 def torques(body: Body) -> np.ndarray:
     """Return the greatest torques (joints,) of a body's motors by its weight, m."""
-    gears = np.array([joint.torque for leg in sized(body).legs for joint in leg.joints])
+    gears = np.array([joint.torque for joint in sized(body).joints])
     return gears / (standing(body).mass * GRAVITY)

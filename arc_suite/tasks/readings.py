@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.arenas import Arena
+from arc_suite.robots.spec import Body
 
 FIELDS = ("qpos", "qvel", "cfrc_ext", "xpos")  # of the simulation, that `read` takes
 FIELDS_OF_SERVOS = (*FIELDS, "qfrc_actuator")
@@ -70,14 +71,12 @@ class Readings(NamedTuple):
         return action if self.efforts is None else self.efforts
 
 
-def layout(model, joints, parts, feet) -> Layout:
+def layout(model, body: Body) -> Layout:
     """Find a body in a compiled model.
 
     Args:
         model: `mujoco.MjModel` whose first joint is the torso's free joint.
-        joints: names of the actuated joints, in the order of the model.
-        parts: names of the body's rigid parts, in the order of the model, the torso first.
-        feet: names of the feet's bodies.
+        body: whose joints and parts it has, in the order of the model.
 
     Returns:
         The layout.
@@ -87,25 +86,25 @@ def layout(model, joints, parts, feet) -> Layout:
         ValueError: joints or parts of a body without a source do not lie side by side in the given order, the joints
             next to the torso's.
     """
-    ids = [model.body(name).id for name in feet]
+    ids = [model.body(name).id for name in body.foot_names]
     if model.nkey:
-        return _layout_of_source(model, joints, parts, ids)
-    angles = _span([model.joint(name).qposadr[0] for name in joints])
-    velocities = _span([model.joint(name).dofadr[0] for name in joints])
+        return _layout_of_source(model, body, ids)
+    angles = _span([model.joint(name).qposadr[0] for name in body.joint_names])
+    velocities = _span([model.joint(name).dofadr[0] for name in body.joint_names])
     if (angles.start, velocities.start) != (7, 6):
         raise ValueError(f"expected the joints next to the torso's, at 7 in qpos, got {angles.start}")
-    parts = _span([model.body(name).id for name in parts])
+    parts = _span([model.body(name).id for name in body.part_names])
     return Layout(angles, velocities, slice(0, velocities.stop), parts.start, parts, _evenly_spaced(ids))
 
 
-def _layout_of_source(model, joints, parts, feet) -> Layout:
+def _layout_of_source(model, body: Body, feet: list[int]) -> Layout:
     """Find an imported body, between whose joints and parts others may lie.
 
     What pushes on a foot pushes on the part that has its collider, as the foot itself has none.
     """
-    found = [model.joint(name) for name in joints]
+    found = [model.joint(name) for name in body.joint_names]
     angles, velocities = [int(each.qposadr[0]) for each in found], [int(each.dofadr[0]) for each in found]
-    ids = (model.body(name).id for name in parts)
+    ids = (model.body(name).id for name in body.part_names)
     owners = [int(model.body_parentid[index]) if index in feet else index for index in ids]
     return Layout(
         joint_angles=_evenly_spaced(angles),

@@ -145,7 +145,7 @@ def described(task: Task) -> Description:
     height, first = pose.height, body.torso.solids[0]
     count, rate = len(body.legs), math.sqrt(GRAVITY / pose.height)
     stiffness, damping = position_gains(sized(body), pose.inertias)
-    ranges = np.radians([joint.range_deg for leg in body.legs for joint in leg.joints])
+    ranges = np.radians([joint.range_deg for joint in body.joints])
     feet, mounts = np.array([leg.foot_position for leg in body.legs]), np.array([leg.mount for leg in body.legs])
     away = feet[:, :2] / np.maximum(np.hypot(feet[:, 0], feet[:, 1]), 1e-9)[:, None]
     counts = np.eye(JOINTS)[[len(leg.joints) - 1 for leg in body.legs]]

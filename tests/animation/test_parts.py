@@ -32,7 +32,7 @@ def test_shapes_are_where_the_simulation_has_them(name):
     assert [part.name for part in found] == list(body.part_names)
     assert set(materials) == {"shell", "limb", "glow"}
     model = models.parsed(body, decorated=True).compile()
-    data, layout = mujoco.MjData(model), readings.layout(model, body.joint_names, body.part_names, body.foot_names)
+    data, layout = mujoco.MjData(model), readings.layout(model, body)
     random = np.random.default_rng(0)
     pose = np.concatenate([(1.0, 2.0, 3.0, 0.5, -0.5, 0.5, 0.5), random.uniform(-0.5, 0.5, len(body.joint_names))])
     data.qpos[:] = readings.positions(pose, layout, stood(model))

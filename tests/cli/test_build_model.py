@@ -1,10 +1,10 @@
 """`arc-suite build_model` and the bodies it makes to order."""
 
 import mujoco
-import numpy as np
 import programs
 import pytest
 from dm_control import mjcf
+from saved_models import saved, without_keyframe
 
 from arc_suite import models, registry
 from arc_suite.models.families import sound_body
@@ -16,20 +16,6 @@ SOURCES = "expected one of --robot, --spec, --legs and --seed (or the last two)"
 
 def build_model(*arguments):
     return programs.arc_suite("build_model", *arguments)
-
-
-def saved(model):
-    """Everything there is in a compiled model, names included, as bytes."""
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
-
-
-def reloaded(text):
-    """The model of a text, without its keyframe."""
-    spec = mujoco.MjSpec.from_string(text)
-    spec.delete(spec.key("home"))
-    return spec.compile()
 
 
 def compiled(body, decorated=False):
@@ -44,12 +30,12 @@ def test_three_links_are_the_default():
 def test_a_robot_dumps_and_reloads_bit_for_bit(robot, tmp_path):
     path = tmp_path / "robot.xml"
     assert programs.passed(build_model("--robot", robot, "--output", path)) == ""
-    assert saved(reloaded(path.read_text())) == saved(compiled(ROBOTS[robot]))
+    assert saved(without_keyframe(path.read_text())) == saved(compiled(ROBOTS[robot]))
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.xml"]
 
 
 def test_visuals_dump_and_reload_bit_for_bit():
-    model = reloaded(programs.passed(build_model("--robot", "queen", "--visuals")))
+    model = without_keyframe(programs.passed(build_model("--robot", "queen", "--visuals")))
     assert saved(model) == saved(compiled(ROBOTS["queen"], decorated=True))
     assert saved(model) != saved(compiled(ROBOTS["queen"]))
 
@@ -66,7 +52,7 @@ def test_visuals_dump_and_reload_bit_for_bit():
     ],
 )
 def test_a_body_made_to_order_dumps_and_reloads_bit_for_bit(arguments, body):
-    assert saved(reloaded(programs.passed(build_model(*arguments)))) == saved(compiled(body))
+    assert saved(without_keyframe(programs.passed(build_model(*arguments)))) == saved(compiled(body))
 
 
 def test_without_arena_a_scene_of_dm_control_takes_it(tmp_path):

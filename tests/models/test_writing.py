@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dm_control import mjcf
 from refusals import refused
+from saved_models import saved, without_keyframe
 
 from arc_suite import models, registry
 from arc_suite.arenas import ARENAS, FLAT
@@ -13,19 +14,6 @@ from arc_suite.models.sizing import sized
 from arc_suite.robots import ROBOTS
 
 BODIES = [*ROBOTS, "spider", "random:3"]
-
-
-def saved(model):
-    """Everything there is in a compiled model, names included, as bytes."""
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
-
-
-def without_keyframe(text):
-    spec = mujoco.MjSpec.from_string(text)
-    spec.delete(spec.key("home"))
-    return spec.compile()
 
 
 def by_pymjcf(text):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from obstacles import Obstacle
+from saved_models import saved
 from tiers import tiers, turn
 
 import arc_suite
@@ -31,13 +32,6 @@ CONTACT = ("geom", "pos", "frame", "dist", "includemargin", "dim", "friction", "
 
 def written(body, arena=FLAT):
     return mujoco.MjModel.from_xml_string(models.assemble(body, arena).to_xml_string())
-
-
-def saved(model):
-    """The bytes of a model."""
-    buffer = np.zeros(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
 
 
 @pytest.mark.parametrize("body", [*ROBOTS, *EXAMPLES, "random:0", "random:1", *(f"varied:{seed}" for seed in range(8))])

@@ -121,7 +121,7 @@ def _holding(body: Body, rest: Pose) -> np.ndarray:
     """Return the target angles (joints,), rad, at which position control holds a pose under the body's weight."""
     sized = sizing.sized(body)
     pose = posed(sized, rest.joints)
-    limits = np.array([joint.torque for leg in sized.legs for joint in leg.joints])
+    limits = np.array([joint.torque for joint in sized.joints])
     return rest.joints + pose.loads / (limits * drive(sized, pose.inertias).stiffness)
 
 
@@ -142,7 +142,7 @@ def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damp
     driven = drive(sized, posed(sized, rest.joints).inertias)
     model = copy.copy(compiled(body))
     model.dof_damping[6:] *= damping
-    layout = readings.layout(model, body.joint_names, body.part_names, body.foot_names)
+    layout = readings.layout(model, body)
     data, step = mujoco.MjData(model), sizing.control_timestep(body)
     data.qpos[:] = readings.positions(np.concatenate(rest), layout, stood(model))
     data.qvel[0] = push

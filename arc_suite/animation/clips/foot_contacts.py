@@ -45,7 +45,7 @@ def sole_heights(model: mujoco.MjModel, body: Body, poses: np.ndarray) -> np.nda
     """
     data = mujoco.MjData(model)
     feet = [model.body(name).id for name in body.foot_names]
-    layout = readings.layout(model, body.joint_names, body.part_names, body.foot_names)
+    layout = readings.layout(model, body)
     positions = readings.positions(poses, layout, stood(model))
     heights = np.empty((len(poses), len(feet)))
     for qpos, row in zip(positions, heights, strict=True):

@@ -131,10 +131,9 @@ def _check_world(robot: Robot) -> None:
 
 
 def _check_hinges(robot: Robot, stance: Stance) -> None:
-    for leg in stance.legs:
-        for joint in leg.joints:
-            if robot.model.jnt_type[joint] != tree.HINGE:
-                raise SpecError(f"joint {robot.name(joint)!r} of a leg is a slide joint; expected hinges")
+    for joint in stance.joints:
+        if robot.model.jnt_type[joint] != tree.HINGE:
+            raise SpecError(f"joint {robot.name(joint)!r} of a leg is a slide joint; expected hinges")
 
 
 def _name(robot: Robot, path: Path) -> str:
@@ -155,7 +154,7 @@ def _simulation(timestep: float) -> Simulation:
 
 def _order(robot: Robot, stance: Stance, given: tuple[str, ...]) -> list[int]:
     """Return the joints of the legs in the order of the file: of its actuators, or of its joints."""
-    legs = [joint for leg in stance.legs for joint in leg.joints]
+    legs = stance.joints
     named = {robot.name(joint): joint for joint in robot.joints}
     orders = (motors.actuated(robot), [named[name] for name in given if name in named], robot.joints)
     return next([joint for joint in order if joint in legs] for order in orders if set(legs) <= set(order))

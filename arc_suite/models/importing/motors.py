@@ -58,8 +58,7 @@ def motors_of(robot: Robot, stance: Stance) -> Motors:
             damping = float(robot.model.dof_damping[robot.model.jnt_dofadr[joint]])
             stiffness, resistance = given.get(joint) or _rule(load, inertia, limit, damping)
             servos[joint] = Servo(stiffness=stiffness, damping=resistance, limit=limit)
-    legs = [joint for leg in stance.legs for joint in leg.joints]
-    return Motors(servos, tuple(_notes(legs, servos, origins, given)))
+    return Motors(servos, tuple(_notes(stance.joints, servos, origins, given)))
 
 
 def _sized(load: float, inertia: float) -> float:

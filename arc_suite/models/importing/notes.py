@@ -25,8 +25,7 @@ def notes(robot: Robot, stance: Stance, names: Names, order: Sequence[int]) -> I
     yield f"legs: {len(stance.legs)} ({', '.join(names.legs)}), {' or '.join(map(str, kinds))} joints each"
     pairs = ", ".join(f"{robot.name(joint)} {names.joints[joint]}" for joint in order)
     yield f"joints in the file's order, each with its name in the suite: {pairs}"
-    action = [joint for leg in stance.legs for joint in leg.joints]
-    places = [action.index(joint) for joint in order]
+    places = [stance.joints.index(joint) for joint in order]
     same = places == sorted(places)
     yield f"joint map: {'the file has the order of actions' if same else f'places of the file in an action: {places}'}"
     yield f"standing pose: {stance.origin}, torso {stance.height:.3g} m above the floor"

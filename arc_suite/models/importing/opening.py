@@ -11,12 +11,12 @@ import mujoco
 from arc_suite import checks, files
 from arc_suite.models.importing import urdf
 from arc_suite.models.importing.meshes import Mesh, file_of, meshes_of
+from arc_suite.robots import sources
 from arc_suite.robots.spec import SpecError
 
 MAX_BYTES = 1 << 24  # of a file; the largest of 45 has 200 kB
 
 _MESH = mujoco.mjtGeom.mjGEOM_MESH
-_ENTITY = re.compile(rb"<!\s*(DOCTYPE|ENTITY)", re.IGNORECASE)
 _LINE = re.compile(r",? line \d+")
 _DECLARATION = re.compile(r"^\s*<\?xml[^>]*\?>")
 
@@ -71,13 +71,15 @@ def _parsed(data: bytes) -> ElementTree.Element:
     """Return the top element of XML that names no entities."""
     if len(data) > MAX_BYTES:
         raise SpecError(f"expected at most {MAX_BYTES} bytes")
-    if _ENTITY.search(data):
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        raise SpecError("expected text in UTF-8") from None
+    if sources.ENTITY.search(text):
         raise SpecError("expected XML without a document type and entities")
     try:
         # Some exporters write an empty line before the declaration, which XML forbids.
-        element = ElementTree.fromstring(_DECLARATION.sub("", data.decode("utf-8")))
-    except UnicodeDecodeError:
-        raise SpecError("expected text in UTF-8") from None
+        element = ElementTree.fromstring(_DECLARATION.sub("", text))
     except ElementTree.ParseError as error:
         raise SpecError(f"expected XML: {error}") from None
     if element.tag not in ("mujoco", "robot"):

@@ -75,6 +75,11 @@ class Stance(NamedTuple):
     height: float
     origin: str
 
+    @property
+    def joints(self) -> list[int]:
+        """Return the legs' joints, in the order of the action."""
+        return [joint for leg in self.legs for joint in leg.joints]
+
 
 class NoStance(SpecError):
     """No pose in which a robot stands."""

@@ -6,6 +6,7 @@ of the file, written so that it is read back as itself: compiling the text gives
 
 import xml.etree.ElementTree as ElementTree
 from typing import Any
+from xml.etree.ElementTree import SubElement
 
 import mujoco
 import numpy as np
@@ -15,6 +16,7 @@ from arc_suite.models.importing.naming import Names
 from arc_suite.models.importing.poses import Leg, Stance
 from arc_suite.models.importing.tree import HINGE, Robot
 from arc_suite.models.writing import exact
+from arc_suite.robots import sources
 
 SITE = {"group": "4"}
 
@@ -39,56 +41,24 @@ _GEOM: dict[str, Any] = {
     "gap": 0.0, "friction": (1.0, 0.005, 0.0001), "adhesion": 0.0, "surfacevel": (0.0,) * 6, **_SOFTNESS,
 }  # fmt: skip
 
-# Fields of mjOption by their attributes, with the words of those that are one of several.
-_OPTIONS = {
-    "timestep": None, "impratio": None, "tolerance": None, "ls_tolerance": None, "noslip_tolerance": None,
-    "ccd_tolerance": None, "gravity": None, "wind": None, "magnetic": None, "density": None, "viscosity": None,
-    "iterations": None, "ls_iterations": None, "noslip_iterations": None, "ccd_iterations": None,
-    "integrator": ("Euler", "RK4", "implicit", "implicitfast"),
-    "cone": ("pyramidal", "elliptic"),
-    "jacobian": ("dense", "sparse", "auto"),
-    "solver": ("PGS", "CG", "Newton"),
-}  # fmt: skip
-
-# Flags of the physics; others would keep motors, contacts or sensors from working.
-_FLAGS = {
-    "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
-    "limit": mujoco.mjtDisableBit.mjDSBL_LIMIT,
-    "spring": mujoco.mjtDisableBit.mjDSBL_SPRING,
-    "damper": mujoco.mjtDisableBit.mjDSBL_DAMPER,
-    "gravity": mujoco.mjtDisableBit.mjDSBL_GRAVITY,
-    "warmstart": mujoco.mjtDisableBit.mjDSBL_WARMSTART,
-    "filterparent": mujoco.mjtDisableBit.mjDSBL_FILTERPARENT,
-    "refsafe": mujoco.mjtDisableBit.mjDSBL_REFSAFE,
-    "midphase": mujoco.mjtDisableBit.mjDSBL_MIDPHASE,
-    "eulerdamp": mujoco.mjtDisableBit.mjDSBL_EULERDAMP,
-    "nativeccd": mujoco.mjtDisableBit.mjDSBL_NATIVECCD,
-    "island": mujoco.mjtDisableBit.mjDSBL_ISLAND,
-    "multiccd": mujoco.mjtDisableBit.mjDSBL_MULTICCD,
-}
-
 
 def source(robot: Robot, stance: Stance, names: Names, meshes: dict[int, Mesh]) -> str:
     """Return the MJCF of a robot: one free body, its joints and colliders, a site in each foot, the keyframe `home`."""
     root = ElementTree.Element("mujoco")
-    _add(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
+    SubElement(root, "compiler", angle="radian", autolimits="false", inertiafromgeom="false")
     _add_option(root, robot.model)
     placed = _add_meshes(root, robot, meshes)
-    world = _add(root, "worldbody")
+    world = SubElement(root, "worldbody")
     elements = {}
     for body in robot.bodies:
         parent = world if body == robot.root else elements[int(robot.model.body_parentid[body])]
         elements[body] = _add_body(parent, robot, body, names, placed)
-    _add(elements[robot.root], "site", name="torso", size=exact(0.01), **SITE)
+    SubElement(elements[robot.root], "site", name="torso", size=exact(0.01), **SITE)
     for label, leg in zip(names.legs, stance.legs, strict=True):
         _add_leg_bodies(elements, robot, stance, names, label, leg)
-    _add(_add(root, "keyframe"), "key", name="home", qpos=exact(_home(robot, stance)))
+    SubElement(SubElement(root, "keyframe"), "key", name="home", qpos=exact(_home(robot, stance)))
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def _add(parent: ElementTree.Element, tag: str, **attributes: str) -> ElementTree.Element:
-    return ElementTree.SubElement(parent, tag, attributes)
 
 
 def _differing(plain: dict[str, Any], given: dict[str, Any]) -> dict[str, str]:
@@ -99,26 +69,27 @@ def _differing(plain: dict[str, Any], given: dict[str, Any]) -> dict[str, str]:
 def _add_option(root: ElementTree.Element, model: mujoco.MjModel) -> None:
     plain, option = mujoco.MjSpec().option, model.opt
     attributes = {}
-    for name, words in _OPTIONS.items():
+    for name, kind in sources.OPTIONS.items():
         value = getattr(option, name)
         if not np.array_equal(value, getattr(plain, name)):
-            attributes[name] = exact(value) if words is None else words[int(value)]
-    element = _add(root, "option", **attributes)
-    flags = {name: "disable" for name, bit in _FLAGS.items() if option.disableflags & int(bit)}
+            attributes[name] = kind[int(value)] if isinstance(kind, tuple) else exact(value)  # one of words
+    element = SubElement(root, "option", **attributes)
+    bits = {name: int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name.upper()}")) for name in sources.FLAGS}
+    flags = {name: "disable" for name, bit in bits.items() if option.disableflags & bit}
     if flags:
-        _add(element, "flag", **flags)
+        SubElement(element, "flag", **flags)
 
 
 def _add_meshes(root: ElementTree.Element, robot: Robot, meshes: dict[int, Mesh]) -> dict[int, dict[str, str]]:
     """Add the meshes of colliders, and return the attributes of their geoms."""
     own = {geom: meshes[geom] for geom in robot.colliders if geom in meshes}
-    asset = _add(root, "asset") if own else root
+    asset = SubElement(root, "asset") if own else root
     names = {}
     for mesh in own.values():
         key = tuple(mesh.attributes.items())
         if key not in names:
             names[key] = f"mesh{len(names)}"
-            _add(asset, "mesh", name=names[key], **mesh.attributes)
+            SubElement(asset, "mesh", name=names[key], **mesh.attributes)
     return {
         geom: {"type": "mesh", "mesh": names[tuple(mesh.attributes.items())]}
         | _differing(_BODY, {"pos": mesh.position, "quat": mesh.orientation})
@@ -132,17 +103,17 @@ def _add_body(
     """Add a body with its inertia, joints and colliders."""
     model = robot.model
     given = {"pos": model.body_pos[body], "quat": model.body_quat[body], "gravcomp": model.body_gravcomp[body]}
-    element = _add(parent, "body", name=names.bodies[body], **_differing(_BODY, given))
+    element = SubElement(parent, "body", name=names.bodies[body], **_differing(_BODY, given))
     if model.body_mass[body] > 0.0:
         given = {"quat": model.body_iquat[body], "diaginertia": model.body_inertia[body]}
         mass = {"pos": exact(model.body_ipos[body]), "mass": exact(model.body_mass[body])}
-        _add(element, "inertial", **mass, **{name: exact(value) for name, value in given.items()})
+        SubElement(element, "inertial", **mass, **{name: exact(value) for name, value in given.items()})
     for joint in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
         own = _free(model, joint) if body == robot.root else _joint(model, joint)
-        _add(element, "joint", name=names.joints.get(joint, "root"), **own)
+        SubElement(element, "joint", name=names.joints.get(joint, "root"), **own)
     own = [geom for geom in robot.colliders if model.geom_bodyid[geom] == body]
     for place, geom in enumerate(own):
-        _add(element, "geom", name=f"{names.bodies[body]}_geom{place}", **_geom(model, geom, meshes.get(geom)))
+        SubElement(element, "geom", name=f"{names.bodies[body]}_geom{place}", **_geom(model, geom, meshes.get(geom)))
     return element
 
 
@@ -209,12 +180,12 @@ def _add_leg_bodies(
     for place, joint in enumerate(leg.joints, start=1):
         body = int(robot.model.jnt_bodyid[joint])
         if names.bodies[body] != f"{label}_link{place}":
-            _add(elements[body], "body", name=f"{label}_link{place}")
+            SubElement(elements[body], "body", name=f"{label}_link{place}")
     last = int(robot.model.jnt_bodyid[leg.joints[-1]])
     data = robot.placed(stance.qpos)
     place = data.xmat[last].reshape(3, 3).T @ (leg.centre - data.xpos[last])
-    foot = _add(elements[last], "body", name=f"{label}_foot", pos=exact(place))
-    _add(foot, "site", name=f"{label}_foot", size=exact(leg.radius), **SITE)
+    foot = SubElement(elements[last], "body", name=f"{label}_foot", pos=exact(place))
+    SubElement(foot, "site", name=f"{label}_foot", size=exact(leg.radius), **SITE)
 
 
 def _home(robot: Robot, stance: Stance) -> list[float]:
