@@ -17,7 +17,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.gait import gait_of
-from arc_suite.cpg.kinematics import Legs, flows, rises, weights
+from arc_suite.models.kinematics import Legs, flows, rises, weights
 from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 

@@ -13,7 +13,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.command_law import CommandLaw, Request
-from arc_suite.cpg.kinematics import Legs, flows, rises, weights
+from arc_suite.models.kinematics import Legs, flows, rises, weights
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
 from arc_suite.tasks.sensors import SCAN

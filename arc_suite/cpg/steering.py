@@ -14,7 +14,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.command_law import CommandLaw, Request
-from arc_suite.cpg.kinematics import flows, rises, weights
+from arc_suite.models.kinematics import flows, rises, weights
 from arc_suite.models.sizing import sized
 from arc_suite.models.standing import posed
 from arc_suite.models.stride import lifted, swung

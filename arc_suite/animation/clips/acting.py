@@ -10,8 +10,8 @@ from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import Motion, Pose, standing
 from arc_suite.cpg.drives import drive
-from arc_suite.cpg.kinematics import Legs
 from arc_suite.models import sizing
+from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import solid_corners
 from arc_suite.models.standing import posed, stood
 from arc_suite.robots.spec import Body

@@ -4,7 +4,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.root_motion import Motion, along, fading
-from arc_suite.cpg.kinematics import Legs
+from arc_suite.models.kinematics import Legs
 from arc_suite.robots.spec import Body
 
 _STANDS = 0.01  # of the standing height: a lower sole is in stance

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from arc_suite.cpg.kinematics import Legs
+from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import posed
 from arc_suite.robots import ROBOTS, generator
 
