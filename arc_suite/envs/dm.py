@@ -348,6 +348,8 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         data.ctrl[: inputs.ctrl.shape[-1]] = inputs.ctrl
         if inputs.kick is not None:
             data.qvel[:] += inputs.kick
+        if inputs.force is not None:
+            data.xfrc_applied[self.definition.scene.layout.torso, :3] = inputs.force
 
     def after_step(self, physics):
         """Take the readings, and what is to be remembered of the step.

@@ -240,6 +240,8 @@ class VectorEnv(KnownAttributes, Together):
         np.copyto(data.ctrl[:, : inputs.ctrl.shape[-1]], inputs.ctrl, where=stepping[:, None])
         if inputs.kick is not None:
             data.qvel[stepping] += inputs.kick[stepping]
+        if inputs.force is not None:
+            self.batch.xfrc_applied[stepping, task.scene.layout.torso, :3] = inputs.force[stepping]
         diverged = self.batch.step(task.scene.substeps, stepping)
         readings = task.read(data)
         self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)

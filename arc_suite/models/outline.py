@@ -37,6 +37,12 @@ def leg_points(leg: Leg) -> Iterator[tuple[np.ndarray, float]]:
     yield points[-1], leg.foot.radius
 
 
+def torso_box(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest coordinates (3,) of the torso's solids, in its frame, m."""
+    corners = np.concatenate([solid_corners(solid) for solid in body.torso.solids])
+    return corners.min(axis=0), corners.max(axis=0)
+
+
 def outline(body: Body) -> np.ndarray:
     """Return points in the torso's frame whose convex hull holds the standing body: (n, 3)."""
     solids = [solid_corners(solid) for solid in (*body.torso.solids, *body.ballast)]

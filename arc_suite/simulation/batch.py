@@ -62,6 +62,11 @@ class Batch:
         return self._simulations.bind("mocap_pos")
 
     @property
+    def xfrc_applied(self) -> np.ndarray:
+        """Forces and torques (count, nbody, 6) on the bodies' centres of mass, N and N m, world, live."""
+        return self._simulations.bind("xfrc_applied")
+
+    @property
     def models(self) -> list[ReadOnly]:
         """The model of each simulation, to read; `change_model` changes them."""
         return [ReadOnly(model) for model in self._own or [self._simulations.model] * self._simulations.nsim]

@@ -15,6 +15,7 @@ from arc_suite.models.sizing import sized
 from arc_suite.robots.spec import Body
 
 _MOST = 1e6  # of a value of a model's field
+_ROUNDING = 1e-6  # of the length of a quaternion
 _POSITIVE = ("body_mass", "body_inertia")  # which accelerations divide by
 
 # Fields that `checked_fields` takes, with the bounds of their values.
@@ -22,11 +23,14 @@ FIELDS = {
     "gravity": (-_MOST, _MOST),  # of `opt`
     **dict.fromkeys(_POSITIVE, (0.0, _MOST)),
     "body_ipos": (-_MOST, _MOST),
+    "body_iquat": (-1.0, 1.0),
     "dof_armature": (0.0, _MOST),
     "dof_damping": (0.0, _MOST),
     "dof_frictionloss": (0.0, _MOST),
     "jnt_stiffness": (0.0, _MOST),
     "actuator_gear": (-_MOST, _MOST),
+    "actuator_gainprm": (-_MOST, _MOST),
+    "actuator_biasprm": (-_MOST, _MOST),
     "jnt_actfrcrange": (-_MOST, _MOST),
     "pair_friction": (0.0, _MOST),
     "pair_solref": (-_MOST, _MOST),
@@ -101,7 +105,11 @@ def checked_fields(
     Raises:
         ValueError: no such field, one without effect on this model, or values that do not fit.
     """
-    without = {"geom_friction": not model.geom_contype.any(), "jnt_actfrcrange": not model.jnt_actfrclimited.any()}
+    without = {
+        "geom_friction": not model.geom_contype.any(),
+        "jnt_actfrcrange": not model.jnt_actfrclimited.any(),
+        "actuator_biasprm": not model.actuator_biastype.any(),
+    }
     valid = [name for name in FIELDS if every or not without.get(name)]
     if "geom_friction" in checks.mapping("model", fields) and "geom_friction" not in valid:
         raise ValueError("model field 'geom_friction': contacts of this model read pair_friction; change that")
@@ -126,6 +134,8 @@ def _values(name: str, values: Any, like: np.ndarray) -> np.ndarray:
         raise ValueError(
             f"model field {name!r}: expected numbers from {low:g} to {high:g}{above}, got {checks.shown(values)}"
         )
+    if name == "body_iquat" and (abs(np.linalg.norm(found, axis=-1) - 1.0) > _ROUNDING).any():
+        raise ValueError(f"model field {name!r}: expected quaternions of length 1, got {checks.shown(values)}")
     return found
 
 

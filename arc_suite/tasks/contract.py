@@ -50,8 +50,11 @@ from arc_suite.tasks.readings import Layout, Readings
 
 STEPS = 1000  # control steps of an episode
 
-# Fields of `MjModel` that an episode can have its own values of: masses and frictions.
-CHANGEABLE = ("body_mass", "body_inertia", "pair_friction", "geom_friction", "jnt_actfrcrange")
+# Fields of `MjModel` that an episode can have its own values of: masses, frictions, armatures and servos.
+CHANGEABLE = (
+    *("body_mass", "body_inertia", "body_ipos", "body_iquat", "pair_friction", "geom_friction"),
+    *("dof_armature", "jnt_actfrcrange", "actuator_gainprm", "actuator_biasprm"),
+)
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
 CURRICULUM = ("curriculum", "level")
@@ -106,10 +109,12 @@ class Inputs(NamedTuple):
     Attributes:
         ctrl: (..., motors) in [-1, 1].
         kick: (..., nv) added to qvel before the first substep; None for no kick.
+        force: (..., 3) on the torso's centre of mass throughout the step, N, world; None for no force.
     """
 
     ctrl: np.ndarray
     kick: np.ndarray | None = None
+    force: np.ndarray | None = None
 
 
 class Observed(ABC):

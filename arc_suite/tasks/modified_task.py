@@ -16,23 +16,18 @@ from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
-from arc_suite.tasks import noise
+from arc_suite.tasks import noise, randomization
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.modifiers import FAILS_FROM, Modifiers, checked
+from arc_suite.tasks.randomization import LONGEST, SCHEDULE, SHORTEST, Hidden, Pushes
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.wrapper import Wrapper
 
-KICKS, SHORTEST, LONGEST = 25, 40, 121  # of a schedule, and control steps from one to the next
-
-# How pictures show a kick: for how many control steps, in which colour; length by sqrt(g h), radius of the shaft, and
-# distance from the torso's solids, which shells exceed, h.
+# How pictures show a kick or a push: for how many control steps a kick, in which colour; length by sqrt(g h) or by the
+# weight, radius of the shaft, and distance from the torso's solids, which shells exceed, h.
 SHOWN, _KICKED, _LENGTH, _SHAFT, _APART = 10, (0.95, 0.1, 0.08, 1.0), 1.0, 0.07, 0.3
-
-# What friction and mass multiply.
-_FRICTIONS, _MASSES = ("pair_friction", "geom_friction"), ("body_mass", "body_inertia")
-_LIMITS = ("jnt_actfrcrange",)  # of the torques of servos
 
 
 class Changes(NamedTuple):
@@ -41,8 +36,8 @@ class Changes(NamedTuple):
     Attributes:
         elapsed: (..., 1) uint32, control steps since the start.
         terminated: (...) whether the latest step has ended the episode in failure.
-        kick_steps: (..., KICKS) control steps, counted from 1, before which kicks come.
-        kicks: (..., KICKS, 2) changes of the torso's velocity in the world, m/s.
+        kick_steps: (..., SCHEDULE) control steps, counted from 1, before which kicks come.
+        kicks: (..., SCHEDULE, 2) changes of the torso's velocity in the world, m/s.
         strength: (..., joints) of the motors, a share.
         failing: (..., joints) whether they are those of the leg whose motors fail.
         noise_key: (..., 1) uint32, from which the noise of the episode follows.
@@ -50,6 +45,8 @@ class Changes(NamedTuple):
         waiting: (..., longest delay, joints) the latest actions, the newest first.
         angles: (..., joints) of the joints at the latest reading, rad.
         speeds: (..., joints) of the joints at the latest reading, rad/s.
+        hidden: what the episode has drawn of the body.
+        pushes: forces on the torso.
     """
 
     elapsed: np.ndarray
@@ -63,6 +60,8 @@ class Changes(NamedTuple):
     waiting: np.ndarray
     angles: np.ndarray
     speeds: np.ndarray
+    hidden: Hidden
+    pushes: Pushes
 
 
 class ModifiedMemory(NamedTuple):
@@ -81,9 +80,9 @@ class Draws(NamedTuple):
     """What is random in the modifiers of one episode, in the order in which it is drawn; all is, always.
 
     Attributes:
-        kick_steps: (KICKS,) control steps before which kicks come, each 40 to 120 after the one before.
-        kick_sizes: (KICKS,) uniform in [0, 1).
-        kick_directions: (KICKS,) rad, uniform in [0, 2 pi).
+        kick_steps: (SCHEDULE,) control steps before which kicks come, each 40 to 120 after the one before.
+        kick_sizes: (SCHEDULE,) uniform in [0, 1).
+        kick_directions: (SCHEDULE,) rad, uniform in [0, 2 pi).
         leg: index of one.
         strength: position of the motors' strength in its range, uniform in [0, 1).
         friction: position of the friction in its range, uniform in [0, 1).
@@ -106,9 +105,9 @@ class Draws(NamedTuple):
 def draw(random: np.random.RandomState, legs: int) -> Draws:
     """Draw the modifiers of an episode of a body with a number of legs."""
     return Draws(
-        random.randint(SHORTEST, LONGEST, KICKS).cumsum(),
-        random.uniform(size=KICKS),
-        random.uniform(0.0, 2.0 * math.pi, KICKS),
+        random.randint(SHORTEST, LONGEST, SCHEDULE).cumsum(),
+        random.uniform(size=SCHEDULE),
+        random.uniform(0.0, 2.0 * math.pi, SCHEDULE),
         random.randint(legs),
         *random.uniform(size=4),
         random.randint(2**32, dtype=np.uint32),
@@ -146,7 +145,7 @@ class Modified(Wrapper):
         """Which modifiers there are, and the shape of their memory."""
         own = self.changes
         switches = own.kicks > 0.0, own.delay[1], own.actuator_failure is False, own.actions, own.exclude_blocks
-        return (*switches, *self.noises)
+        return (*switches, own.force > 0.0, own.joint_offset > 0.0, *self.noises)
 
     @property
     def actions(self) -> str:
@@ -199,36 +198,38 @@ class Modified(Wrapper):
         return noises
 
     def start(self, random: np.random.RandomState, stream: Any) -> Start:
-        """Draw the other task's start, then what is random in the modifiers; see `Draws`."""
+        """Draw the other task's start, then what is random in the modifiers; see `Draws` and `randomization.Draws`."""
         start, body, changes = self.task.start(random, stream), self.scene.body, self.changes
         drawn = draw(random, len(body.legs))
         joints = len(body.joint_names)
+        later = randomization.draw(drawn.noise_key, joints)
         directions = np.stack([np.cos(drawn.kick_directions), np.sin(drawn.kick_directions)], axis=-1)
         unit = changes.kicks * math.sqrt(GRAVITY * body.torso.standing_height)
         low, high = changes.delay
         leg = drawn.leg if changes.actuator_failure is True else changes.actuator_failure
+        hidden = randomization.hidden(changes, body, drawn.strength, drawn.friction, drawn.mass, later)
         own = Changes(
             elapsed=np.zeros(1, np.uint32),
             terminated=np.False_,
             kick_steps=drawn.kick_steps,
             kicks=unit * drawn.kick_sizes[:, None] * directions,
-            strength=np.full(joints, _within(changes.motor_strength, drawn.strength)),
+            strength=hidden.motor_strength * hidden.joint_strength,
             failing=np.zeros(joints, bool) if changes.actuator_failure is False else self.members[leg],
             noise_key=np.array([drawn.noise_key], np.uint32),
             delay=low + int(drawn.delay * (high - low + 1)),
             waiting=np.zeros((high, joints)),
             angles=np.zeros(joints),
             speeds=np.zeros(joints),
+            hidden=hidden,
+            pushes=randomization.pushes(changes.force * self.weight, later),
         )
-        model = dict(start.model)
-        for names, span, share in (
-            (_FRICTIONS, changes.friction, drawn.friction),
-            (_MASSES, changes.mass, drawn.mass),
-            (_LIMITS, changes.motor_strength if body.source else (1.0, 1.0), drawn.strength),
-        ):
-            if span != (1.0, 1.0):
-                model |= {name: _within(span, share) * model.get(name, self.scene.model[name]) for name in names}
+        model = randomization.changed_model(self.scene, changes, hidden, start.model)
         return start._replace(memory=ModifiedMemory(start.memory, own), model=model)
+
+    @functools.cached_property
+    def weight(self) -> float:
+        """The weight of the body without a load, N."""
+        return float(GRAVITY * self.scene.model["body_mass"].sum())
 
     def begin(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
         """Return the other task's memory, and the state of the joints."""
@@ -246,7 +247,10 @@ class Modified(Wrapper):
         if self._controls:
             action = self.torques(own, action)
         inner, inputs = self.task.before(memory.task, action)
-        ctrl, strength = own.strength * inputs.ctrl, own.strength
+        wanted, strength = inputs.ctrl, own.strength
+        if self.scene.body.source and changes.joint_offset:
+            wanted = wanted - own.hidden.joint_offset / self.reach  # of servos, whose sensors have the offset
+        ctrl = strength * wanted
         if changes.actuator_failure is not False:
             works = ~(own.failing & (own.elapsed >= FAILS_FROM))
             ctrl, strength = ctrl * works, strength * works
@@ -254,7 +258,8 @@ class Modified(Wrapper):
             numpy = ctrl.__array_namespace__()
             ctrl = numpy.concatenate([ctrl, 1.0 - strength], axis=-1)  # of servos and of their releases
         kick = self._kick(own, inputs.kick) if changes.kicks else inputs.kick
-        return ModifiedMemory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick)
+        force = self._force(own, inputs.force) if changes.force else inputs.force
+        return ModifiedMemory(inner, own._replace(elapsed=own.elapsed + np.uint32(1))), Inputs(ctrl, kick, force)
 
     @property
     def _controls(self) -> bool:
@@ -264,7 +269,9 @@ class Modified(Wrapper):
     def torques(self, changes: Changes, action):
         """Return the actions (..., joints) in [-1, 1] of motors that hold joints at the positions of an action."""
         stiffness, damping = self.gains
-        return (stiffness * (self.reach * action - changes.angles) - damping * changes.speeds).clip(-1.0, 1.0)
+        stiff, damped = changes.hidden.gains[..., :1], changes.hidden.gains[..., 1:]
+        pull = stiff * (stiffness * (self.reach * action - changes.angles))
+        return (pull - damped * (damping * changes.speeds)).clip(-1.0, 1.0)
 
     def positions(self, torques, angles, speeds):
         """Return the action (..., joints) for which motors that hold positions give torques, as far as joints reach.
@@ -285,8 +292,9 @@ class Modified(Wrapper):
         return ModifiedMemory(inner, own._replace(terminated=(own.terminated & False) | terminated))
 
     def observe(self, memory: ModifiedMemory, readings: Readings) -> dict:
-        """Return the other task's blocks with noise, without those that are left out."""
-        observed, own = self.task.observe(memory.task, readings), memory.changes
+        """Return the other task's blocks with offsets of sensors and noise, without those that are left out."""
+        own = memory.changes
+        observed = self.task.observe(memory.task, self._displaced(own, readings))
         blocks = {name: observed[name] for name in observed if name not in self.changes.exclude_blocks}
         if self.noises:
             count = max(part.stop for part, _ in self.noises.values())
@@ -300,21 +308,20 @@ class Modified(Wrapper):
         return metrics if "fell" in metrics else metrics | {"fell": memory.changes.terminated * 1.0}
 
     def markers(self, memory: ModifiedMemory, readings: Readings) -> list[Marker]:
-        """Return the other task's, and for `SHOWN` steps a red arrow against the torso for a kick."""
-        return [*self.task.markers(memory.task, readings), *self._kicked(memory.changes, readings)]
+        """Return the other task's, and a red arrow against the torso: for `SHOWN` steps for a kick, and for a push."""
+        return [*self.task.markers(memory.task, readings), *self._shown(memory.changes, readings)]
 
-    def _kicked(self, changes: Changes, readings: Readings) -> Iterator[Marker]:
-        if not self.changes.kicks:
-            return
-        height, since = self.scene.body.torso.standing_height, int(changes.elapsed[0]) - changes.kick_steps
+    def _shown(self, changes: Changes, readings: Readings) -> Iterator[Marker]:
+        height, elapsed = self.scene.body.torso.standing_height, int(changes.elapsed[0])
+        since = elapsed - changes.kick_steps
         shown = (since >= 0) & (since % changes.kick_steps[-1] < SHOWN)
-        for kick in changes.kicks[shown]:
-            speed = math.hypot(*kick)
-            if speed > 0.0:
-                way = np.array((*kick / speed, 0.0))
+        pushes = [changes.pushes.acting(elapsed) / self.weight] if elapsed else []
+        for push in (*changes.kicks[shown] / math.sqrt(GRAVITY * height), *pushes):
+            size = math.hypot(*push)
+            if size > 0.0:
+                way = np.array((*push / size, 0.0))
                 tip = readings.torso_position - self._rim * way
-                length = _LENGTH * height * speed / math.sqrt(GRAVITY * height)
-                yield Marker("arrow", tip - length * way, tip, _SHAFT * height, _KICKED)
+                yield Marker("arrow", tip - _LENGTH * height * size * way, tip, _SHAFT * height, _KICKED)
 
     @functools.cached_property
     def _rim(self) -> float:
@@ -333,7 +340,22 @@ class Modified(Wrapper):
     def _sensed(self, changes: Changes, readings: Readings) -> Changes:
         if not self._controls:
             return changes
-        return changes._replace(angles=readings.joint_angles + 0.0, speeds=readings.velocities[..., 6:] + 0.0)
+        angles = self._displaced(changes, readings).joint_angles + 0.0
+        return changes._replace(angles=angles, speeds=readings.velocities[..., 6:] + 0.0)
+
+    def _displaced(self, changes: Changes, readings: Readings) -> Readings:
+        """The readings as sensors of joints show them, whose zeros are displaced."""
+        if not self.changes.joint_offset:
+            return readings
+        numpy, angles = readings.posture.__array_namespace__(), readings.joint_angles + changes.hidden.joint_offset
+        posture = numpy.concatenate([readings.posture[..., :5], angles], axis=-1)
+        return readings._replace(posture=posture, joint_angles=angles)
+
+    def _force(self, changes: Changes, force):
+        """The force (..., 3) on the torso in a step, N."""
+        numpy, push = changes.kicks.__array_namespace__(), changes.pushes.acting(changes.elapsed + np.uint32(1))
+        push = numpy.concatenate([push, 0.0 * push[..., :1]], axis=-1)
+        return push if force is None else force + push
 
     def _kick(self, changes: Changes, kick):
         """The kick (..., nv) of a step; a schedule that has run out begins again."""
@@ -343,11 +365,6 @@ class Modified(Wrapper):
         rest = numpy.zeros((*push.shape[:-1], self.scene.standing.shape[-1] - 3))
         push = numpy.concatenate([push, rest], axis=-1)
         return push if kick is None else kick + push
-
-
-def _within(span: tuple[float, float], share: float) -> float:
-    low, high = span
-    return low + share * (high - low)
 
 
 def _delayed(changes: Changes, action):

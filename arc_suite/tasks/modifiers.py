@@ -35,6 +35,17 @@ class Modifiers(NamedTuple):
             pose and as far as the farther limit of a joint's range for 1 and -1, held by the body's own gains. None:
             torques of motors and positions of servos, which take nothing else.
         exclude_blocks: names of blocks that the observation leaves out: the vector gets shorter.
+        payload: mass of a load as a share of the body's, or two of them; its place, uniform in the box around
+            the torso, is drawn.
+        centre_of_mass: the greatest displacement of the torso's centre of mass along each axis, h.
+        joint_offset: the greatest error of the zero of each joint's sensor, rad: of the angles that are observed, and
+            of those that position control and servos hold.
+        joint_strength: share of the torque of each motor, or two of them, in addition to `motor_strength`: every
+            joint draws its own.
+        gains: multiple of the stiffness, and another of the damping, of position control and servos, or two of them.
+        armature: multiple of the armatures of all joints, or two of them.
+        force: the greatest force on the torso, of the body's weight: each of a schedule is uniform from 0 up to it, in
+            any horizontal direction, lasts 1 to 4 control steps, and begins 40 to 120 after the one before.
     """
 
     kicks: float = 0.0
@@ -46,6 +57,13 @@ class Modifiers(NamedTuple):
     delay: tuple[int, int] = (0, 0)
     actions: str | None = None
     exclude_blocks: tuple[str, ...] = ()
+    payload: tuple[float, float] = (0.0, 0.0)
+    centre_of_mass: float = 0.0
+    joint_offset: float = 0.0
+    joint_strength: tuple[float, float] = (1.0, 1.0)
+    gains: tuple[float, float] = (1.0, 1.0)
+    armature: tuple[float, float] = (1.0, 1.0)
+    force: float = 0.0
 
 
 NAMES = Modifiers._fields
@@ -58,7 +76,16 @@ BOUNDS = {
     "mass": (0.01, 100.0),
     "observation_noise": (0.0, 100.0),
     "delay": _DELAYS,
+    "payload": (0.0, 10.0),
+    "centre_of_mass": (0.0, 1.0),
+    "joint_offset": (0.0, 1.0),
+    "joint_strength": (0.0, 1.0),
+    "gains": (0.01, 10.0),
+    "armature": (0.01, 100.0),
+    "force": (0.0, 100.0),
 }
+_NUMBERS = ("kicks", "centre_of_mass", "joint_offset", "force")
+_SPANS = ("motor_strength", "friction", "mass", "payload", "joint_strength", "gains", "armature")
 
 
 def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]) -> Modifiers:
@@ -75,19 +102,20 @@ def checked(settings: Mapping[str, Any], body: Body, blocks: Mapping[str, Block]
     for name in settings:
         checks.name(name, NAMES, "modifier")
     values = Modifiers()._asdict() | dict(settings)
-    return Modifiers(
-        kicks=checks.number("kicks", values["kicks"], *BOUNDS["kicks"]),
-        motor_strength=checks.span("motor_strength", values["motor_strength"], *BOUNDS["motor_strength"]),
+    found = Modifiers(
         actuator_failure=_actuator_failure(values["actuator_failure"], body),
-        friction=checks.span("friction", values["friction"], *BOUNDS["friction"]),
-        mass=checks.span("mass", values["mass"], *BOUNDS["mass"]),
         observation_noise=_noise(
             values["observation_noise"], [name for name in blocks if blocks[name].noise is not None]
         ),
         delay=_delay(values["delay"]),
         actions=_actions(values["actions"], body),
         exclude_blocks=_exclude_blocks(values["exclude_blocks"], blocks),
+        **{name: checks.number(name, values[name], *BOUNDS[name]) for name in _NUMBERS},
+        **{name: checks.span(name, values[name], *BOUNDS[name]) for name in _SPANS},
     )
+    if found.actions == "torque" and found.gains != (1.0, 1.0):
+        raise ValueError(f"gains: torques have none, expected actions='position', got {checks.shown(values['gains'])}")
+    return found
 
 
 def _actions(value, body: Body) -> str:

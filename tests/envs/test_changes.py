@@ -83,7 +83,7 @@ def test_different_bodies_change_too():
 @pytest.mark.parametrize("name", FIELDS)
 def test_every_field_moves_what_follows(name):
     """What pairs of contacts do not read is refused in walk; pillars read it. Limits of torques are those of servos."""
-    observations, body = [], imports.hexapod() if name == "jnt_actfrcrange" else "tick"
+    observations, body = [], imports.hexapod() if name in ("jnt_actfrcrange", "actuator_biasprm") else "tick"
     for change in (False, True):
         environment = Env(body, "navigate" if name == "geom_friction" else "walk", {"base_noise": 0.0})
         environment.reset(seed=0)
@@ -91,7 +91,8 @@ def test_every_field_moves_what_follows(name):
         if change and name == "geom_friction":
             environment.change_model({name: value})
             return
-        environment.change_model({name: 0.5 * value + 0.01} if change else {})
+        other = (0.6, 0.0, 0.0, 0.8) if name == "body_iquat" else 0.5 * value + 0.01
+        environment.change_model({name: other} if change else {})
         observations.append([environment.step(np.full(18, 0.1, np.float32))[0] for _ in range(10)])
     assert not np.array_equal(*observations)
 
@@ -104,6 +105,7 @@ def test_every_field_moves_what_follows(name):
         ({"gravity": (1.0, 2.0)}, "model field 'gravity': expected numbers of shape (3,), got (1.0, 2.0)"),
         ({"body_mass": 0.0}, "model field 'body_mass': expected numbers from 0 to 1e+06, above 0 where the model's"),
         ({"gravity": np.nan}, "model field 'gravity': expected numbers from -1e+06 to 1e+06, got nan"),
+        ({"body_iquat": 1.0}, "model field 'body_iquat': expected quaternions of length 1, got 1.0"),
         ([1], "model: expected a mapping of names to values, got [1]"),
     ],
 )

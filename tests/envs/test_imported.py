@@ -110,7 +110,12 @@ def test_an_action_of_0_stands_and_of_1_is_the_farther_limit(body):
     assert data.actuator_force[index] == pytest.approx(joint.servo.stiffness * 0.1 * reach, rel=1e-6)
 
 
-@pytest.mark.parametrize("settings", [{}, {"kicks": 1.0, "motor_strength": (0.5, 1.0), "actuator_failure": True}])
+DISTURBED = {"kicks": 1.0, "motor_strength": (0.5, 1.0), "actuator_failure": True, "payload": (0.1, 0.4)}
+DISTURBED |= {"centre_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0), "gains": (0.8, 1.2)}
+DISTURBED |= {"armature": (0.8, 1.5), "force": 0.3}
+
+
+@pytest.mark.parametrize("settings", [{}, DISTURBED])
 def test_a_vector_is_as_many_environments(body, settings):
     vector = VectorEnv(body, "walk", 3, 2, task_kwargs=settings)
     singles = [Env(body, "walk", settings) for _ in range(3)]

@@ -61,12 +61,12 @@ def test_a_key_draws_from_the_table():
 
 
 def test_models_of_episodes_are_those_of_the_suite():
-    settings = {"friction": (0.5, 1.0), "mass": (0.8, 1.2)}
+    settings = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.4), "armature": (0.8, 1.5)}
     env = mjx.load(ROBOT, "walk", settings, num_starts=3)
     own = jax.vmap(env.start)(jnp.arange(3)).info["model"]
     envs = VectorEnv(ROBOT, "walk", 3, 1, task_kwargs=settings)
     envs.reset(seed=0)
-    assert {"pair_friction", "body_mass", "body_inertia", "body_subtreemass", "body_invweight0"} <= own.keys()
+    assert {"pair_friction", "body_mass", "body_inertia", "body_iquat", "body_invweight0", "dof_armature"} <= own.keys()
     for name, values in own.items():
         np.testing.assert_allclose(values, [getattr(model, name) for model in envs.batch.models], rtol=1e-6)
 

@@ -10,6 +10,7 @@ import types
 
 import gaitless
 import gymnasium
+import imports
 import numpy as np
 import pytest
 import twins
@@ -19,12 +20,14 @@ from refusals import refused
 from tiers import never, tiers, turn
 
 import arc_suite
+from arc_suite import rotations
 from arc_suite.envs.prepare import prepared
 from arc_suite.envs.vector import VectorEnv
+from arc_suite.models.outline import torso_box
 from arc_suite.models.sizing import GRAVITY
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.spec_files import load_body
-from arc_suite.tasks import TASKS, modified_task, noise
+from arc_suite.tasks import TASKS, modified_task, noise, randomization
 from arc_suite.tasks.modifiers import NAMES
 
 SPIDER = load_body("spider")
@@ -39,6 +42,13 @@ EACH = {
     "delay": {"delay": (0, 3)},
     "actions": {"actions": "position"},
     "exclude_blocks": {"exclude_blocks": ("contact_forces",)},
+    "payload": {"payload": (0.1, 0.4)},
+    "centre_of_mass": {"centre_of_mass": 0.1},
+    "joint_offset": {"joint_offset": 0.05},
+    "joint_strength": {"joint_strength": (0.5, 1.0)},
+    "gains": {"gains": (0.7, 1.3), "actions": "position"},
+    "armature": {"armature": (0.8, 1.5)},
+    "force": {"force": 0.3},
 }
 ALL = {name: value for setting in EACH.values() for name, value in setting.items()}
 CASES = EACH | {"all": ALL}
@@ -84,6 +94,8 @@ def test_modifiers_that_change_nothing_change_no_bit(task_name, body):
     """And what they draw, they draw after all that the task draws."""
     own = {"kicks": 0.0, "actuator_failure": False}
     neutral = {"motor_strength": 1, "friction": 1.0, "mass": [1, 1], "observation_noise": 0, "delay": 0}
+    neutral |= {"payload": 0, "centre_of_mass": 0, "joint_offset": 0, "joint_strength": 1, "gains": 1, "armature": 1}
+    neutral["force"] = 0
     plain = load(BODIES[body], task_name, **(own if TASKS[task_name].modifiers else {}))
     one = load(BODIES[body], task_name, **neutral, **own, exclude_blocks=(), actions="torque")
     assert_array_equal(flat(one.reset()), flat(plain.reset()))
@@ -140,6 +152,135 @@ def test_the_draws_are_these_in_this_order():
     last = [drawn.leg, drawn.strength, drawn.friction, drawn.mass, drawn.delay, drawn.noise_key]
     assert len(first + last) == 20
     assert_allclose(first + last, GOLDEN, rtol=1e-15)
+
+
+def test_later_draws_are_uniform_and_take_nothing_from_the_stream():
+    drawn = np.array([np.hstack(randomization.draw(key, 12)) for key in np.arange(4000) * 1_000_003 % 2**32])
+    assert drawn.shape == (4000, 10 + 4 * 25 + 2 * 12)
+    assert drawn.min() >= 0.0 and drawn.max() < 1.0
+    assert_allclose(drawn.mean(axis=0), 0.5, atol=0.02)  # four standard deviations
+    assert abs(np.corrcoef(drawn.T) - np.eye(134)).max() < 0.08
+    assert randomization.draw(7, 12).place.tolist() == randomization.draw(7, 18).place.tolist()
+
+
+def drawn_over(episodes, **settings):
+    """Yields the environment at the start of many episodes."""
+    environment = load("leaper", **settings)
+    for _ in range(episodes):
+        environment.reset()
+        yield environment
+
+
+def tensor(model, part):
+    """The inertia of a part about its centre of mass, in its frame."""
+    axes = rotations.matrix(model.body_iquat[part])
+    return axes * model.body_inertia[part] @ axes.T
+
+
+def test_a_payload_is_as_if_a_small_ball_had_been_welded_on():
+    plain = load("leaper").physics.model.ptr
+    torso, total, height = plain.body("torso").id, plain.body_mass.sum(), 0.5
+    shares, places = [], []
+    for environment in drawn_over(40, payload=(0.1, 0.5)):
+        model, (share, *place) = environment.physics.model.ptr, environment.task.memory.changes.hidden.payload
+        place, old = height * np.array(place), plain.body_ipos[torso]
+        load_mass = model.body_mass[torso] - plain.body_mass[torso]
+        assert load_mass == pytest.approx(share * total)
+        middle = (plain.body_mass[torso] * old + load_mass * place) / model.body_mass[torso]
+        assert_allclose(model.body_ipos[torso], middle, atol=1e-12)
+        expected = tensor(plain, torso)
+        for mass, apart in ((plain.body_mass[torso], old - middle), (load_mass, place - middle)):
+            expected = expected + mass * (apart @ apart * np.eye(3) - np.outer(apart, apart))
+        assert_allclose(tensor(model, torso), expected, atol=1e-12)
+        assert_array_equal(np.delete(model.body_mass, torso), np.delete(plain.body_mass, torso))
+        data = environment.physics.data.ptr
+        offset = data.xmat[torso].reshape(3, 3) @ model.body_ipos[torso]
+        assert_allclose(data.xipos[torso] - data.xpos[torso], offset, atol=1e-12)
+        shares.append(share), places.append(place)
+    assert 0.1 <= min(shares) < 0.2 and 0.4 < max(shares) <= 0.5
+    low, high = torso_box(ROBOTS["leaper"])
+    assert (np.min(places, axis=0) >= low).all() and (np.max(places, axis=0) <= high).all()
+    assert (np.ptp(places, axis=0) > 0.7 * (high - low)).all()
+
+
+def test_each_episode_has_a_centre_of_mass_an_armature_and_strengths_of_its_own():
+    plain = load("leaper").physics.model.ptr
+    torso, found = plain.body("torso").id, []
+    settings = {"centre_of_mass": 0.1, "armature": (0.5, 2.0), "joint_strength": (0.4, 0.8), "motor_strength": 0.5}
+    for environment in drawn_over(40, **settings):
+        model, own = environment.physics.model.ptr, environment.task.memory.changes
+        moved = model.body_ipos - plain.body_ipos
+        assert not np.delete(moved, torso, axis=0).any()
+        armature = model.dof_armature[6:] / plain.dof_armature[6:]
+        assert_allclose(armature, armature[0], rtol=1e-12)
+        assert_array_equal(model.body_inertia, plain.body_inertia)
+        assert_array_equal(own.strength, 0.5 * own.hidden.joint_strength)
+        found.append((*moved[torso] / 0.05, armature[0], *own.strength))
+    low, high = np.min(found, axis=0), np.max(found, axis=0)
+    bounds = np.array([(-1.0, 1.0)] * 3 + [(0.5, 2.0)] + [(0.2, 0.4)] * 12).T
+    width = bounds[1] - bounds[0]
+    assert (low >= bounds[0] - 1e-9).all() and (high <= bounds[1] + 1e-9).all()
+    assert (high - low > 0.8 * width).all()
+
+
+@pytest.mark.parametrize("body", ["tick", imports.quadruped()], ids=["torques", "servos"])
+def test_joints_hold_where_their_displaced_sensors_say_so(body):
+    environment = begun(body, "walk", joint_offset=0.1, actions="position", joint_angle_noise=0.0)
+    offsets = environment.task.memory.changes.hidden.joint_offset
+    action = np.zeros(len(offsets))
+    assert 0.05 < abs(offsets).max() <= 0.1
+    for _ in range(60):
+        timestep = environment.step(action)
+        true = environment.task.definition.read(environment.physics.data.ptr).joint_angles
+        assert_allclose(timestep.observation["posture"][5:], true + offsets, atol=1e-12)
+    seen = timestep.observation["posture"][5:]  # but for joints at their limits
+    assert np.quantile(abs(seen), 0.8) < 0.02, "it thinks that it stands"
+
+
+def test_a_stiffer_control_pulls_harder():
+    for body, strength in (("leaper", 1.0), (imports.quadruped(), 1.0)):
+        plain, other = (begun(body, "walk", actions="position", gains=gains) for gains in (1.0, 2.0))
+        torques = []
+        for environment in (plain, other):
+            environment.step(np.full(12, 0.02))
+            environment.physics.data.qvel[:] = 0.0
+            environment.physics.data.qpos[:] = environment.task.definition.scene.standing
+            task = environment.task.definition
+            ready = task.begin(environment.task.memory, task.read(environment.physics.data.ptr))
+            _, inputs = task.before(ready, np.full(12, strength * 0.01))
+            environment.physics.data.ctrl[:] = inputs.ctrl
+            environment.physics.forward()
+            torques.append(environment.physics.data.qfrc_actuator[6:].copy())
+        assert_allclose(torques[1], 2.0 * torques[0], rtol=1e-9)
+
+
+def test_a_force_pushes_the_torso_for_its_time_and_begins_again():
+    environment = begun("tick", "walk", force=0.5, time_limit=math.inf)
+    task, memory, seen = environment.task.definition, environment.task.memory, {}
+    pushes = memory.changes.pushes
+    period = pushes.first[-1] + randomization.MOST_STEPS
+    for step in range(1, 2 * int(period) + 1):
+        memory, inputs = task.before(memory, np.zeros(18))
+        assert inputs.kick is None and inputs.force.shape == (3,) and not inputs.force[2]
+        if inputs.force.any():
+            seen[step] = inputs.force[:2]
+    due = [step for start, end in zip(pushes.first, pushes.last, strict=True) for step in range(start, end + 1)]
+    assert list(seen) == [*due, *(step + period for step in due)]
+    assert {int(length) for length in pushes.last - pushes.first} == {0, 1, 2, 3}
+    pauses = np.diff(pushes.first, prepend=0)
+    assert 40 <= pauses.min() < 50 and 100 < pauses.max() <= 120
+    sizes = np.hypot(*pushes.forces.T) / task.weight
+    assert sizes.min() > 0.0 and 0.4 < sizes.max() < 0.5
+    for _ in range(due[0]):
+        environment.step(np.zeros(18))
+    applied = environment.physics.data.xfrc_applied
+    assert_array_equal(applied[1], [*pushes.forces[0], 0.0, 0.0, 0.0, 0.0])
+    assert not np.delete(applied, 1, axis=0).any()
+    (arrow,) = kick_arrows(environment)
+    way, push = (arrow.end - arrow.start)[:2], seen[due[0]]
+    assert_allclose(way / np.hypot(*way), push / np.hypot(*push))
+    environment.reset()
+    assert not applied.any()
 
 
 def test_kicks_change_the_velocity_of_the_torso_when_they_are_due_and_begin_again():
@@ -277,7 +418,9 @@ def test_positions_are_held():
 def test_torques_have_positions_that_give_them():
     task, random = load("leaper", "walk", actions="position").task.definition, np.random.RandomState(0)
     angles, speeds, torques = (scale * random.uniform(-1, 1, (50, 12)) for scale in (0.5, 1.0, 1.0))
-    memory, action = types.SimpleNamespace(angles=angles, speeds=speeds), task.positions(torques, angles, speeds)
+    hidden = types.SimpleNamespace(gains=np.ones(2))
+    memory = types.SimpleNamespace(angles=angles, speeds=speeds, hidden=hidden)
+    action = task.positions(torques, angles, speeds)
     reached = abs(action) < 1.0
     assert reached.mean() > 0.5
     assert_allclose(task.torques(memory, action)[reached], torques[reached], atol=1e-9)
@@ -316,6 +459,14 @@ def test_noise_is_on_what_is_measured_and_on_nothing_else():
         assert error.std() == pytest.approx(3**-0.5, rel=0.05) and abs(error.mean()) < 0.05
 
 
+def test_noise_of_the_scan_is_set_by_its_name():
+    """To legged_gym's 0.1 m for a body of half a metre, 0.2 h."""
+    noisy, plain = load("leaper", "rough", observation_noise={"scan": 2.0}).reset(), load("leaper", "rough").reset()
+    errors = {name: noisy.observation[name] - block for name, block in plain.observation.items()}
+    assert 0.18 < abs(errors.pop("scan")).max() <= 0.2
+    assert not np.concatenate(list(errors.values())).any()
+
+
 def test_noise_of_one_block_is_the_same_whatever_else_is_observed():
     alone = load("queen", "walk", observation_noise={"velocities": 2.0}, exclude_blocks="posture")
     both = load("queen", "walk", observation_noise={"velocities": 2.0, "contact_forces": 1.0})
@@ -343,7 +494,8 @@ def test_named_environments_are_steer_with_modifiers_that_callers_can_change():
         named, spelt = load("tick", name), load("tick", "steer", **settings)
         assert_array_equal(flat(named.reset()), flat(spelt.reset()))
         assert named.task.definition.changes == spelt.task.definition.changes
-    assert load("tick", "shoved", kicks=0.5, delay=1).task.definition.changes[::6] == (0.5, (1, 1))
+    changes = load("tick", "shoved", kicks=0.5, delay=1).task.definition.changes
+    assert (changes.kicks, changes.delay) == (0.5, (1, 1))
 
 
 NUMBER, OR_TWO = "expected a number from 0 to 100", "or two of them, the lower first"
@@ -367,6 +519,10 @@ LISTED = ", ".join(BLOCKS)
         ({"mass": math.nan}, f"mass: expected a number from 0.01 to 100, {OR_TWO}, got nan"),
         ({"observation_noise": -1}, "observation_noise: expected a number from 0 to 100, got -1"),
         ({"observation_noise": {"postur": 1}}, "unknown block with noise 'postur'; did you mean 'posture'?"),
+        ({"observation_noise": {"scann": 1}}, "unknown block with noise 'scann' (there are: posture, velocities, "),
+        ({"payload": -1}, f"payload: expected a number from 0 to 10, {OR_TWO}, got -1"),
+        ({"centre_of_mass": (0, 1)}, "centre_of_mass: expected a number from 0 to 1, got (0, 1)"),
+        ({"gains": 2.0}, "gains: torques have none, expected actions='position', got 2.0"),
         ({"delay": 1.5}, "delay: expected an integer from 0 to 100, got 1.5"),
         ({"delay": (3, 1)}, "delay: expected an integer from 3 to 100, got 1"),
         ({"actions": "velocity"}, "unknown actions 'velocity' (there are: torque, position)"),

@@ -216,6 +216,9 @@ class Env:
         data = before.replace(ctrl=before.ctrl.at[: inputs.ctrl.shape[-1]].set(inputs.ctrl))
         if inputs.kick is not None:
             data = data.replace(qvel=data.qvel + inputs.kick)
+        if inputs.force is not None:
+            torso = task.scene.layout.torso
+            data = data.replace(xfrc_applied=data.xfrc_applied.at[torso, :3].set(inputs.force))
         data = device.advanced(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
         diverged, overflow = device.diverged(data), device.overflow(data)
 
