@@ -5,7 +5,7 @@ import math
 import numpy as np
 from dm_control import mjcf
 
-from arc_suite.models.outline import outline
+from arc_suite.models.outline import outline, torso_box
 from arc_suite.robots.spec import Body, Joint, Leg, Simulation, Solid
 
 SOLVER_ITERATIONS = 200
@@ -14,7 +14,9 @@ _TOUCHES_NOTHING = {"contype": 0, "conaffinity": 0}
 
 # Cameras that ride along: azimuth from straight ahead and elevation, rad.
 _VIEWS = (("portrait", math.radians(-35.0), math.radians(13.0)), ("profile", math.radians(-65.0), math.radians(12.0)))
-CAMERAS = ("tracking", *(name for name, *_ in _VIEWS))
+EYE = "eye"  # the camera that looks ahead from the torso's front, for policies that see
+CAMERAS = ("tracking", *(name for name, *_ in _VIEWS), EYE)
+_FIELD, _DOWN = 70.0, math.radians(15.0)  # of the eye: field of view, degrees, and how far it looks down
 _FOVY = 30.0  # degrees, as MJCF wants it whatever the compiler's angle
 _ASPECT, _MARGIN = 4.0 / 3.0, 1.3  # of the picture; room for legs that swing
 
@@ -53,6 +55,7 @@ def build(body: Body) -> mjcf.RootElement:
         _add_leg(root, torso, leg, touches_floor, body.simulation)
     for name, camera in cameras(body).items():
         torso.add("camera", name=name, mode="trackcom", **camera)
+    torso.add("camera", name=EYE, mode="fixed", **eye(body))
 
     # The accelerometer is what makes every mj_step fill cfrc_ext, which the task observes: MuJoCo
     # computes contact forces on bodies only where a sensor needs them.
@@ -122,7 +125,7 @@ def _add_joint(root, link, leg: Leg, joint: Joint, simulation: Simulation) -> No
 
 
 def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
-    """Return the cameras by name: `tracking`, of the spec, and `portrait` and `profile`, which frame the body.
+    """Return cameras that ride along by name: `tracking`, of the spec, `portrait` and `profile`, which frame the body.
 
     Args:
         body: the spec.
@@ -132,6 +135,14 @@ def cameras(body: Body, points: np.ndarray | None = None) -> dict[str, dict]:
     tracking = {"pos": body.camera.position, "xyaxes": body.camera.xyaxes}
     views = {name: {"fovy": _FOVY, **_framing(points, azimuth, elevation)} for name, azimuth, elevation in _VIEWS}
     return {"tracking": tracking, **views}
+
+
+def eye(body: Body) -> dict:
+    """Return the camera in the middle of the front of the box around the torso, in whose frame it is fixed."""
+    low, high = torso_box(body)
+    place = (float(high[0]), *(0.5 * (low + high)[1:]).tolist())
+    axes = (0.0, -1.0, 0.0, math.sin(_DOWN), 0.0, math.cos(_DOWN))
+    return {"pos": place, "xyaxes": axes, "fovy": _FIELD}
 
 
 def _framing(points: np.ndarray, azimuth: float, elevation: float) -> dict:

@@ -42,6 +42,7 @@ def on_flat_ground(body: Body) -> mujoco.MjSpec:
         _add_leg(spec, torso, leg, touches_floor, body.simulation)
     for name, camera in builder.cameras(body).items():
         torso.add_camera(name=name, mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, **camera)
+    torso.add_camera(name=builder.EYE, mode=mujoco.mjtCamLight.mjCAMLIGHT_FIXED, **builder.eye(body))
     torso.add_site(name="torso", group=4).size[0] = 0.01
     acceleration = {"type": mujoco.mjtSensor.mjSENS_ACCELEROMETER, "objtype": mujoco.mjtObj.mjOBJ_SITE}
     spec.add_sensor(name="torso_acceleration", objname="torso", **acceleration)

@@ -42,9 +42,10 @@ def tree(body: Body, arena: Arena | None, decorated: bool = False, releases: boo
     root.set("model", body.name)
     bodies = {part.get("name"): part for part in root.iter("body")}
     _add_servos(root, body, releases)
-    for name, camera in _cameras(body).items():
+    views = {name: ("trackcom", camera) for name, camera in _cameras(body).items()}
+    for name, (mode, camera) in (views | {builder.EYE: ("fixed", builder.eye(body))}).items():
         attributes = {key: exact(value) for key, value in camera.items()}
-        SubElement(bodies["torso"], "camera", name=name, mode="trackcom", **attributes)
+        SubElement(bodies["torso"], "camera", name=name, mode=mode, **attributes)
     SubElement(SubElement(root, "sensor"), "accelerometer", name="torso_acceleration", site="torso")
     if decorated:
         _show_colliders(bodies, body)

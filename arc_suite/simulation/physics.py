@@ -135,7 +135,8 @@ class Physics(dm_mujoco.Physics):
         """Draw the decorated body in its present pose; other arguments as in dm_control.
 
         With `quality="film"` edges of shadows are finer; with "still" the picture is also drawn at twice the size and
-        averaged; "close" has the finest shadows, of views of the body alone. The default is "fast".
+        averaged; "close" has the finest shadows, of views of the body alone. The default is "fast". Through the camera
+        `eye` it is "sense", without shadows, ornaments and markers.
 
         Returns:
             (height, width, 3) uint8; with `depth=True`, (height, width) float32, m.

@@ -13,6 +13,7 @@ from arc_suite import checks, models
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.markers import Marker
 from arc_suite.models import visuals
+from arc_suite.models.builder import EYE
 from arc_suite.models.visuals.scene import MAX_HEIGHT, MAX_WIDTH
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import opengl
@@ -27,15 +28,23 @@ class Quality(NamedTuple):
         shadows: pixels of the shadow map's sides.
         scale: a picture is drawn so many times as large and averaged.
         clip: half of the shadow map's width in extents of the scene; ground beyond it is speckled.
+        samples: of a pixel.
+        faces: of a round solid, around and along.
+        ornaments: whether visuals are drawn that have no mass and touch nothing.
     """
 
     shadows: int
     scale: int
     clip: float = 5.0
+    samples: int = 4
+    faces: tuple[int, int] = (28, 16)
+    ornaments: bool = True
 
 
-# For training; for films, whose shadows have finer edges; for pictures that are kept; and for those of the body alone.
+# For policies that see, without what would stand before the eye; for people; for films, whose shadows have finer edges;
+# for pictures that are kept; and for those of the body alone.
 QUALITIES = {
+    "sense": Quality(0, 1, samples=0, faces=(12, 8), ornaments=False),
     "fast": Quality(2048, 1),
     "film": Quality(4096, 1),
     "still": Quality(4096, 2),
@@ -58,8 +67,13 @@ class Decorated(dm_mujoco.Physics):
     def from_body(cls, body: Body, arena: Arena = FLAT, quality: Quality = QUALITIES["fast"]) -> "Decorated":
         """Compile the decorated body in an arena, for pictures of a quality."""
         decorated = cls.from_model(wrapper.MjModel(models.parsed(body, arena, decorated=True).compile()))
-        decorated.model.vis.quality.shadowsize = quality.shadows
+        drawing = decorated.model.vis.quality
+        drawing.shadowsize, drawing.offsamples = quality.shadows, quality.samples
+        drawing.numslices, drawing.numstacks = quality.faces
         decorated.model.vis.map.shadowclip = quality.clip
+        if not quality.ornaments:
+            groups = decorated.model.geom_group
+            groups[groups > 0] = mujoco.mjNGROUP - 1  # which pictures leave out
         decorated._legs = _legs(body, decorated.model.ptr)
         decorated._colours = decorated.model.geom_rgba.copy()
         decorated._glow = decorated.model.ptr.material("glow").rgba.copy()
@@ -154,7 +168,7 @@ def picture(
     mocap_pos: np.ndarray | None = None,
     markers: Iterable[Marker] = (),
     failed_legs: Iterable[str] = (),
-    quality: str = "fast",
+    quality: str | None = None,
     **kwargs,
 ) -> np.ndarray:
     """Draw the decorated body in a pose.
@@ -170,7 +184,9 @@ def picture(
         mocap_pos: (nmocap, 3) positions of the arena's movable bodies; None where it has none.
         markers: debug markers; pictures of depth or segments show none.
         failed_legs: names of legs to show dark.
-        quality: of `QUALITIES`; pictures of depth or segments, and the largest ones, are not averaged.
+        quality: of `QUALITIES`; pictures of depth or segments, and the largest ones, are not averaged. "sense" shows
+            what has mass or touches: no ornaments, markers, reward or failed legs. None for "sense" through the
+            camera `eye`, else "fast".
         **kwargs: of dm_control's `Physics.render`, such as `depth=True`.
 
     Returns:
@@ -181,6 +197,10 @@ def picture(
         RenderingUnavailable: no OpenGL here.
     """
     check_size(height, width)
+    if quality is None:
+        quality = "sense" if camera_id == EYE else "fast"
+    if quality == "sense":
+        share, markers, failed_legs = None, (), ()
     drawing = QUALITIES[checks.name(quality, QUALITIES, "quality")]
     large = drawing.scale * height > MAX_HEIGHT or drawing.scale * width > MAX_WIDTH
     scale = 1 if large or kwargs.get("depth") or kwargs.get("segmentation") else drawing.scale

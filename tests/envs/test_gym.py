@@ -321,7 +321,7 @@ def test_real_numbers_of_all_kinds_are_actions(kind):
     assert_same(env.unwrapped.step(np.ones(12, kind) if given is None else given), same.unwrapped.step(np.ones(12)))
 
 
-CAMERAS = ["tracking", "portrait", "profile"]
+CAMERAS = ["tracking", "portrait", "profile", "eye"]
 WRONG = {"weights": {"controll": 1.0}}
 
 
@@ -333,8 +333,8 @@ def there(names):
     ("kwargs", "message"),
     [
         ({"camera_id": "trackin"}, f"unknown camera 'trackin'; did you mean 'tracking'? ({there(CAMERAS)})"),
-        ({"camera_id": 3}, f"no camera 3: expected -1 (free) to 2, or one of {CAMERAS}"),
-        ({"camera_id": None}, f"no camera None: expected -1 (free) to 2, or one of {CAMERAS}"),
+        ({"camera_id": 4}, f"no camera 4: expected -1 (free) to 3, or one of {CAMERAS}"),
+        ({"camera_id": None}, f"no camera None: expected -1 (free) to 3, or one of {CAMERAS}"),
         ({"task_kwargs": WRONG}, f"unknown weight 'controll'; did you mean 'control'? ({there(Walk.weights)})"),
         ({"domain_name": "quen"}, f"unknown robot 'quen'; did you mean 'queen'? ({there(registry.words())})"),
         ({"task_name": "wlak"}, f"unknown task 'wlak'; did you mean 'walk'? ({there(TASKS)})"),

@@ -26,7 +26,7 @@ PICTURE = {"render_mode": "rgb_array", "width": 32, "height": 24}
 TASK_NAMES = f"(there are: {', '.join(TASKS)})"
 DOMAINS = f"(there are: {', '.join(registry.words())})"
 PRESETS = "(there are: slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, planned)"
-CAMERAS, NAMED = "['tracking', 'portrait', 'profile']", "(there are: tracking, portrait, profile)"
+CAMERAS, NAMED = "['tracking', 'portrait', 'profile', 'eye']", "(there are: tracking, portrait, profile, eye)"
 BLOCKS = "observation: expected blocks posture and velocities by name, as `split` of a task gives them"
 GAITS = "(there are: trot, pace, bound, walk, tripod, tetrapod, ripple, wave)"
 SEED = "seed: expected an integer from 0 to 4294967295, got"
@@ -151,10 +151,10 @@ CASES = [
     (make(domain_name="bastoin"), f"unknown robot 'bastoin'; did you mean 'bastion'? {DOMAINS}"),
     (envs(task_name="wlak"), f"unknown task 'wlak'; did you mean 'walk'? {TASK_NAMES}"),
     # Cameras and sizes.
-    (render(24, 32, -2), f"no camera -2: expected -1 (free) to 2, or one of {CAMERAS}"),
-    (render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (render(24, 32, -2), f"no camera -2: expected -1 (free) to 3, or one of {CAMERAS}"),
+    (render(24, 32, 1.5), f"no camera 1.5: expected -1 (free) to 3, or one of {CAMERAS}"),
     (make(camera_id="prtrait"), f"unknown camera 'prtrait'; did you mean 'portrait'? {NAMED}"),
-    (envs(camera_id=9), f"no camera 9: expected -1 (free) to 2, or one of {CAMERAS}"),
+    (envs(camera_id=9), f"no camera 9: expected -1 (free) to 3, or one of {CAMERAS}"),
     (render(0, 32), "height: expected an integer from 1 to 2160, got 0"),
     (render(24, 99999), "width: expected an integer from 1 to 3840, got 99999"),
     (render(24, "32"), "width: expected an integer from 1 to 3840, got '32'"),

@@ -1,5 +1,6 @@
 """Pictures of states: drawn without a simulation, and the same as of one."""
 
+import imports
 import numpy as np
 import pytest
 from fixtures.obstacles import Obstacle
@@ -8,7 +9,8 @@ from tiers import never, tiers
 
 from arc_suite.arenas import ARENAS, FLAT
 from arc_suite.markers import Marker
-from arc_suite.robots import ROBOTS
+from arc_suite.models.outline import torso_box
+from arc_suite.robots import ROBOTS, generator
 from arc_suite.simulation.model import compiled
 from arc_suite.simulation.physics import Physics
 from arc_suite.simulation.pictures import QUALITIES, Decorated, check_camera, picture
@@ -102,15 +104,42 @@ def test_cameras_are_checked_on_a_model():
     model = compiled(BODY)
     for camera in ("tracking", "portrait", "profile", 0, 2, -1):
         check_camera(model, camera)
-    with pytest.raises(ValueError, match=r"^no camera 3: "):
-        picture(BODY, FLAT, model.qpos0, 60, 80, 3)
+    with pytest.raises(ValueError, match=r"^no camera 4: "):
+        picture(BODY, FLAT, model.qpos0, 60, 80, 4)
+
+
+@pytest.mark.parametrize(
+    "body", [*ROBOTS.values(), imports.quadruped(), generator.random_body(3)], ids=lambda body: body.name
+)
+def test_the_eye_looks_ahead_from_the_torso_s_front_and_nothing_is_before_it(body):
+    physics, half = Physics.from_body(body), np.radians(35.0)
+    physics.forward()
+    height, front = body.torso.standing_height, torso_box(body)[1][0]
+    torso, eye = physics.named.data.xpos["torso"], physics.named.data.cam_xpos["eye"]
+    ahead = -physics.named.data.cam_xmat["eye"].reshape(3, 3)[:, 2]
+    np.testing.assert_allclose(ahead, (np.cos(np.radians(15.0)), 0.0, -np.sin(np.radians(15.0))), atol=1e-6)
+    assert (eye - torso)[0] == pytest.approx(front, abs=1e-6) and abs((eye - torso)[1]) < 0.1 * height
+    depth = physics.render(64, 64, "eye", depth=True)
+    ground = eye[2] * np.cos(half) / np.sin(half + np.radians(15.0))  # along the axis, at the lower edge
+    assert np.median(depth[-1]) == pytest.approx(ground, rel=0.03)
+    assert depth[0].max() > 20.0 * height  # the sky
+
+
+def test_the_eye_sees_neither_markers_nor_failed_legs():
+    qpos = compiled(BODY).qpos0
+    mark = Marker("arrow", qpos[:3] + (2.0, -1.0, 0.0), qpos[:3] + (2.0, 1.0, 0.0), 0.2, (1.0, 0.0, 0.0, 1.0))
+    shown = {"markers": [mark], "failed_legs": [BODY.legs[0].name], "share": 0.1}
+    plain = picture(BODY, FLAT, qpos, 64, 64, "eye")
+    assert_array_equal(picture(BODY, FLAT, qpos, 64, 64, "eye", **shown), plain)
+    assert not np.array_equal(picture(BODY, FLAT, qpos, 64, 64, "eye", quality="fast", **shown), plain)
 
 
 def test_qualities_show_the_same_in_finer_pixels():
     """A still is the mean of a picture of twice its size; pictures of depth are not averaged."""
     physics = Physics.from_body(ROBOTS["tick"])
     physics.forward()
-    fast, film, still, close = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
+    sense, fast, film, still, close = (physics.render(90, 120, "portrait", quality=name) for name in QUALITIES)
+    assert 0.0 < abs(sense.astype(int) - fast).mean() < 12.0  # no ornaments
     assert_array_equal(physics.render(90, 120, "portrait"), fast)
     assert (fast != film).any() and abs(fast.astype(int) - film).mean() < 2.0  # edges of shadows alone
     double = physics.render(180, 240, "portrait", quality="film").astype(float)

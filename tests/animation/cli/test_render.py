@@ -17,7 +17,7 @@ from arc_suite.robots import ROBOTS, generator
 from arc_suite.robots.spec_files import body_to_json
 from arc_suite.simulation import films
 
-CAMERAS = "(there are: tracking, portrait, profile)"
+CAMERAS = "(there are: tracking, portrait, profile, eye)"
 EXTENSIONS = "(there are: .png, .mp4, .gif, .webp, .html)"
 
 
