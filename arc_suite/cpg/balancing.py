@@ -14,10 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from arc_suite import rotations
-from arc_suite.cpg.command_law import CommandLaw, Request
 from arc_suite.cpg.gait import gait_of
-from arc_suite.models.kinematics import Legs, flows, rises, weights
+from arc_suite.cpg.stepping import Stepping
+from arc_suite.models import posture
+from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import GRAVITY
 from arc_suite.tasks.contract import Task
 
@@ -54,20 +54,10 @@ class BalancingParameters(NamedTuple):
 
 _STEEP = 0.3  # sine of the torso's tilt above which it walks slower; at twice as much it stops
 _KEPT = 0.6  # share of the shift for balance that is left when a foot takes off
-_ACROSS = 1.0  # weight of a foot's slip across its path against its motion along it
-_USED = 0.98  # share of a joint's range, about its middle, that targets may use
-_DAMPING = 0.02  # of inverse kinematics, in standing heights
-_STEPS = 3  # of it in a control step
 
 
-class Balanced(CommandLaw):
-    """Follows a command, and keeps its balance by where it steps.
-
-    Attributes:
-        legs: their kinematics.
-        places: (legs, 3) of the soles at ease, m.
-        angles: (legs, links) of the joints then, rad.
-    """
+class Balanced(Stepping):
+    """Follows a command, and keeps its balance by where it steps."""
 
     def __init__(self, task: Task, parameters: BalancingParameters):
         """Fit the law to a task; see `CommandLaw`.
@@ -79,53 +69,27 @@ class Balanced(CommandLaw):
         if feet is not None and len(feet) != (ranks := max(body.ranks) + 1):
             raise ValueError(f"preset: {body.name} has {ranks} ranks of legs, and feet is for {len(feet)}")
         super().__init__(task, parameters)
-        self.legs = Legs.of(self.body, _USED)
+        self.shorter, self.attitude = parameters.shorter, parameters.attitude
         self.duty_factor -= parameters.shorter
         self.stance = self.duty_factor / gait_of(task).frequency
-        self.places = self.pose.soles.copy()
-        if feet is not None:
-            self.places = np.array([feet[rank] for rank in body.ranks]) * self.pose.height
-            self.places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
         self._ride = -self.places[:, 2].mean()
         self._fall = math.sqrt(self._ride / GRAVITY)  # s, of an inverted pendulum as high
-        self._damping = _DAMPING * self.pose.height
-        self.angles = self.legs.at_ease(self.places, np.eye(3), self._damping)
 
-    def initial_paths(self, count: int) -> np.ndarray:
-        """Return the angles (environments, legs, links) at ease, rad."""
-        return np.tile(self.angles, (count, 1, 1))
+    def _eased(self, task: Task) -> tuple:
+        body, feet, places = task.scene.body, self.parameters.feet, self.pose.soles.copy()
+        if feet is not None:
+            places = np.array([feet[rank] for rank in body.ranks]) * self.pose.height
+            places[:, 1] *= [1.0 if leg.side == "left" else -1.0 for leg in body.legs]
+        legs = Legs.of(self.body, posture.USED)
+        return legs, places, legs.at_ease(places, np.eye(3), self._damping)
 
-    def planned(self, paths, request: Request, observation: Mapping) -> tuple:
-        """Return the next angles, target angles (environments, joints), rad, and their change; see `CommandLaw`."""
-        numpy, p = request.motion.__array_namespace__(), self.parameters
-        motion = request.motion.clip(-p.most, p.most) * self.units
-        vertical = rotations.matrix(observation["posture"][:, 1:5])[:, 2]  # the world's, in the torso's frame
+    def balanced(self, motion, vertical, observation: Mapping) -> tuple:
+        """Return the velocity that feet give, and shifts of footholds; see `Stepping`."""
+        numpy, p = motion.__array_namespace__(), self.parameters
+        motion = motion.clip(-p.most, p.most) * self.units
         motion = motion * (2.0 - numpy.hypot(vertical[:, :1], vertical[:, 1:2]) / _STEEP).clip(0.0, 1.0)
         surplus = observation["velocities"][:, :2] - observation["command"][:, :2] * self.units[:2]
-        shift = p.capture * self._fall * surplus - p.lean * self._ride * vertical[:, :2]
-        cycle = (request.phase[:, None] + self.offsets + request.advance[:, None]) % 1.0  # in the next control step
-        feet = self.next_feet(cycle, motion, shift, request.size, vertical)
-        aims = weights(flows(motion, self.places), _ACROSS)
-        angles = self.legs.reached(paths, feet, aims, self._damping, _STEPS)
-        targets = self.legs.by_joint(paths)
-        return angles, targets, self.legs.by_joint(angles) - targets
+        return motion, p.capture * self._fall * surplus - p.lean * self._ride * vertical[:, :2]
 
-    def next_feet(self, cycle, motion, shift, size, vertical):
-        """Return places (environments, legs, 3) of the soles in the next control step, m.
-
-        Args:
-            cycle: (environments, legs) phases of the legs then.
-            motion: (environments, 3) requested velocity, m/s and rad/s.
-            shift: (environments, 2) of footholds for balance, m.
-            size: (environments, 1) of the gait.
-            vertical: (environments, 3) the world's, in the torso's frame.
-        """
-        numpy, duty = cycle.__array_namespace__(), self.duty_factor
-        stands, swung = cycle < duty, ((cycle - duty) / (1.0 - duty)).clip(0.0)
-        along = numpy.where(stands, 1.0 - 2.0 * cycle / duty, 2.0 * swung - 1.0)[..., None]  # from 1 to -1 in stance
-        half = 0.5 * self.stance * flows(motion, self.places)
-        kept = _KEPT + (1.0 - _KEPT) * 0.5 * (1.0 + along)
-        ground = self.places[:, :2] + size[..., None] * (along * half + kept * shift[:, None])
-        lift = self.parameters.lift * self.pose.height * numpy.sin(np.pi * swung)
-        heights = self.places[:, 2] + size * (lift + self.parameters.attitude * rises(vertical, self.places))
-        return numpy.concatenate([ground, heights[..., None]], axis=-1)
+    def _kept(self, along):
+        return _KEPT + (1.0 - _KEPT) * 0.5 * (1.0 + along)

@@ -11,6 +11,7 @@ from arc_suite.cpg.prescribed import PrescribedLaw, Preset
 from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
+from arc_suite.cpg.stepping import Directed
 from arc_suite.cpg.stride import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -25,6 +26,9 @@ LAWS = {
     PlanningParameters: Planned,
 }
 
+# In place of these in a task whose pose and gait are by command.
+_DIRECTED = {Steered: Directed}
+
 _MOST_UNSTEADY = 5  # legs with which a body steps for its balance
 _AHEAD = ("refined", "tuned", "medium")  # presets that walk straight ahead, the best first
 
@@ -35,7 +39,8 @@ def law(task: Task, preset: Any):
     Raises:
         ValueError: the preset is of no kind of `LAWS`, or does not fit.
     """
-    return _kind(preset)(task, preset)
+    kind = _kind(preset)
+    return (_DIRECTED.get(kind, kind) if "pose" in task.blocks else kind)(task, preset)
 
 
 def _kind(preset: Any):

@@ -134,10 +134,19 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
     if not task.commands:
         raise ValueError(f"command {checks.shown(name)}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
+    if isinstance(value, str):
+        value = task.named_command(name, value)
     numbers = np.full(size, np.nan) if value is None else _real(value)
     if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
         raise ValueError(
             f"command {name!r}: expected {size} numbers from {-LARGEST:g} to {LARGEST:g}, got {checks.shown(value)}"
+        )
+    low, high = task.command_limits.get(name, (-LARGEST, LARGEST))
+    if len(outside := np.argwhere((numbers < low) | (numbers > high))):
+        *_, place = outside[0]
+        raise ValueError(
+            f"command {name!r}: expected number {place} between {low[place]:g} and {high[place]:g}, "
+            f"got {numbers[tuple(outside[0])]:g}"
         )
     return np.broadcast_to(numbers, (*leading, size)).copy()
 

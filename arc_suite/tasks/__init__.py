@@ -1,9 +1,12 @@
 """What bodies are to do: name -> task."""
 
 from arc_suite.tasks.contract import Task
-from arc_suite.tasks.suite import Course, Gaps, Limp, Navigate, Roam, Rough, Shoved, Slopes, Stairs, Steer
+from arc_suite.tasks.suite import Course, Directed, Gaps, Limp, Navigate, Roam, Rough, Shoved, Slopes, Stairs, Steer
 from arc_suite.tasks.walk import Walk
 
-TASKS = {task.name: task for task in (Walk, Steer, Rough, Slopes, Stairs, Gaps, Course, Shoved, Limp, Roam, Navigate)}
+TASKS = {
+    task.name: task
+    for task in (Walk, Steer, Directed, Rough, Slopes, Stairs, Gaps, Course, Shoved, Limp, Roam, Navigate)
+}
 
 __all__ = ["TASKS", "Task"]

@@ -8,13 +8,14 @@ torso's frame, m, and its yaw, rad.
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from arc_suite import rotations
+from arc_suite import checks, rotations
 from arc_suite.arenas.pillars import CELLS, PITCH
 from arc_suite.markers import Marker
+from arc_suite.robots.spec import Body
 from arc_suite.tasks import terms
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.context import Context
@@ -53,12 +54,44 @@ class Command(ABC):
     """What a body is to follow.
 
     Attributes:
-        live: sizes of what may be set from outside while an episode runs, by name.
-        blocks: that it adds to the observation, by name.
+        settings: names of the fields that a caller may set.
+        sees_feet: whether readings are to have the places of the feet.
     """
 
-    live: ClassVar[Mapping[str, int]] = {"command": 3}
-    blocks: ClassVar[Mapping[str, Block]] = {}
+    settings: ClassVar[tuple[str, ...]] = ()
+    sees_feet: ClassVar[bool] = False
+
+    def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> Self:
+        """Return the command with checked settings in place of its own.
+
+        Raises:
+            ValueError: a value that does not fit.
+        """
+        return self
+
+    def live(self, body: Body) -> dict[str, int]:
+        """Return the sizes of what may be set from outside while an episode runs, by name."""
+        return {"command": 3}
+
+    def limits(self, body: Body, step: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Return the lowest and highest numbers of those that are bounded, by name, given a control step, s."""
+        return {}
+
+    def named(self, body: Body, name: str, value: str) -> np.ndarray:
+        """Return the numbers of what is set by a name.
+
+        Raises:
+            ValueError: names stand for nothing here.
+        """
+        raise ValueError(f"command {name!r}: expected numbers, got {checks.shown(value)}")
+
+    def reference(self, scene, parameters) -> Any:
+        """Return what else it measures a body by, `Context.reference`."""
+        return None
+
+    def blocks(self, body: Body) -> dict[str, Block]:
+        """Return the blocks that it adds to the observation, by name."""
+        return {}
 
     @abstractmethod
     def start(self, context: Context, random: np.random.RandomState, schedule: "Scheduled") -> Any:
@@ -68,12 +101,36 @@ class Command(ABC):
         """Return the memory from which the first step starts."""
         return memory
 
+    def stepped(self, context: Context, memory, steps, going) -> Any:
+        """Return the memory whose gait the feet follow in step `steps` (...), as far as the body is `going` (...)."""
+        return memory
+
+    def phase(self, clock, tick, memory):
+        """Return the phase (...) of the gait, rad, given the task's clock and its tick."""
+        return clock.at(clock.phases, tick)
+
+    def circle(self, clock, tick, memory):
+        """Return sine and cosine (..., 2) of the phase."""
+        return clock.at(clock.circle, tick)
+
+    def stance(self, clock, tick, memory):
+        """Return which feet (..., feet) the gait has on the ground."""
+        return clock.at(clock.stance, tick)
+
+    def crouch(self, memory):
+        """Return the share (...) of its height that the torso is asked to keep, at most 1."""
+        return 1.0
+
+    def default_angles(self, context: Context, memory, default_angles):
+        """Return the angles (..., joints) from which the posture is measured, given those of the task, rad."""
+        return default_angles
+
     @abstractmethod
     def desired(self, context: Context, memory, steps, place):
         """Return the velocity (..., 3) that holds at a place after control steps (...)."""
 
     @abstractmethod
-    def follow(self, context: Context, memory, steps, before, place, motion) -> Followed:
+    def follow(self, context: Context, memory, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step.
 
         Args:
@@ -83,6 +140,7 @@ class Command(ABC):
             before: (..., 3) the place before the step.
             place: (..., 3) the place after it.
             motion: (..., 3) mean velocity of the torso.
+            readings: after the step.
         """
 
     def resampled(self, memory, steps) -> Any:
@@ -193,12 +251,10 @@ class Schedule(Command):
 
     def desired(self, context: Context, memory: Scheduled, steps, place):
         """Return the command that holds; a schedule that has run out begins again."""
-        step, numpy = _step(memory, steps), memory.ends.__array_namespace__()
-        current = (step[..., None] >= memory.ends).sum(axis=-1)[..., None, None]
-        scheduled = numpy.take_along_axis(memory.schedule, current, axis=-2)[..., 0, :]
-        return numpy.where(numpy.isnan(memory.live), scheduled, memory.live)
+        numpy = memory.ends.__array_namespace__()
+        return numpy.where(numpy.isnan(memory.live), held(memory.ends, memory.schedule, steps), memory.live)
 
-    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion) -> Followed:
+    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step, and how far the motion reaches in its direction."""
         desired = self.desired(context, memory, steps, place)
         memory = memory._replace(gained=along(desired, motion))
@@ -206,14 +262,26 @@ class Schedule(Command):
 
     def resampled(self, memory: Scheduled, steps) -> Any:
         """Return whether (...) the next command of the schedule holds since step `steps`, unless a live one does."""
-        step, numpy = _step(memory, steps), memory.ends.__array_namespace__()
-        changes = (step[..., None] == memory.ends).any(axis=-1) | ((step == 0) & (steps > 0))
-        return changes & numpy.isnan(memory.live).any(axis=-1)
+        return begins(memory.ends, steps) & memory.ends.__array_namespace__().isnan(memory.live).any(axis=-1)
 
 
-def _step(memory: Scheduled, steps):
-    """The step (...) of a schedule that begins again when it has run out."""
-    return steps % memory.ends[..., -1]
+def held(ends, values, steps):
+    """Return which of the values (..., n, size) of a schedule holds at step `steps` (...).
+
+    Args:
+        ends: (..., n) steps at which they end; a schedule that has run out begins again.
+        values: in their order.
+        steps: since the start.
+    """
+    step = steps % ends[..., -1]
+    current = (step[..., None] >= ends).sum(axis=-1)[..., None, None]
+    return ends.__array_namespace__().take_along_axis(values, current, axis=-2)[..., 0, :]
+
+
+def begins(ends, steps):
+    """Return whether (...) the next of the values of a schedule holds since step `steps` (...); see `held`."""
+    step = steps % ends[..., -1]
+    return (step[..., None] == ends).any(axis=-1) | ((step == 0) & (steps > 0))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -231,7 +299,7 @@ class AlongLane(Command):
         along = numpy.stack([numpy.cos(heading), -numpy.sin(heading), turn], axis=-1)
         return numpy.where(numpy.isnan(memory.live), along, memory.live)
 
-    def follow(self, context: Context, memory: Live, steps, before, place, motion) -> Followed:
+    def follow(self, context: Context, memory: Live, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step, and the distance."""
         desired = self.desired(context, memory, steps, place)
         displacement = component(place, 0) - component(before, 0)
@@ -300,8 +368,13 @@ class ToGoal(Command):
     Lengths are multiples of the arena's unit R.
     """
 
-    live: ClassVar[Mapping[str, int]] = {}
-    blocks: ClassVar[Mapping[str, Block]] = {"goal": Block(3, Mirror.signed(1, -1, 1))}
+    def live(self, body: Body) -> dict[str, int]:
+        """Return nothing: goals are not set from outside."""
+        return {}
+
+    def blocks(self, body: Body) -> dict[str, Block]:
+        """Return the block of the goal's direction and distance."""
+        return {"goal": Block(3, Mirror.signed(1, -1, 1))}
 
     def start(self, context: Context, random, schedule: Scheduled) -> Chain:
         """Draw the chain of goals."""
@@ -317,7 +390,7 @@ class ToGoal(Command):
         goal, numpy = memory.to_goal, memory.goals.__array_namespace__()
         return at_goal(numpy.arctan2(goal[..., 1], goal[..., 0]))
 
-    def follow(self, context: Context, memory: Chain, steps, before, place, motion) -> Followed:
+    def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings) -> Followed:
         """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
         numpy, unit = place.__array_namespace__(), context.arena.unit
         far = numpy.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])

@@ -61,6 +61,7 @@ class CommandTaskSettings(NamedTuple):
         cost_limit: bound of the costs of a step, whose weights are negative; see `terms.reward`.
         noise: of the start.
         ground: the ground with its own settings.
+        command: the command with its own settings.
     """
 
     parameters: Parameters
@@ -68,14 +69,18 @@ class CommandTaskSettings(NamedTuple):
     cost_limit: float
     noise: Noise
     ground: Ground
+    command: Command
 
 
-class Sensed(NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._fields, "heading", "touches")])):
+class Sensed(
+    NamedTuple("Sensed", [(field, np.ndarray) for field in (*Readings._fields, "heading", "touches", "feet")])
+):
     """Readings with contact forces in the body's weight and as the torso heads.
 
     Attributes:
         heading: (...) yaw of the torso, rad.
         touches: (...) whether the body touches an obstacle; None where there are none.
+        feet: (..., feet, 2) places from the torso's frame, forward and left, m; None where the command sees none.
     """
 
     torso_height, effort = Readings.torso_height, Readings.effort
@@ -149,12 +154,12 @@ class CommandTask(Task):
 
     def __init_subclass__(cls, **kwargs):
         super().__init_subclass__(**kwargs)
-        cls.own_arena, cls.commands = cls.ground.own_arena, cls.command.live
+        cls.own_arena = cls.ground.own_arena
 
     @classmethod
     def names(cls) -> tuple[str, ...]:
         """Return the names of the settings."""
-        return (*cls.ground.settings, *parameters.NAMES, "cost_limit")
+        return (*cls.ground.settings, *cls.command.settings, *parameters.NAMES, "cost_limit")
 
     @classmethod
     def settings_for(cls, body: Body, overrides: Mapping[str, Any]) -> CommandTaskSettings:
@@ -167,6 +172,7 @@ class CommandTask(Task):
             parameters.positive("cost_limit", overrides.get("cost_limit", COST_LIMIT)),
             parameters.noise(given),
             cls.ground.with_settings(overrides),
+            cls.command.with_settings(body, overrides),
         )
 
     @classmethod
@@ -179,7 +185,21 @@ class CommandTask(Task):
         """The paper's observation, the command with the motion that is to follow it, what command and ground add."""
         own = blocks.of_gait(self.scene.body, self.parameters.phase_offsets, self.parameters.default_angles)
         own["command"] = Block(6, mirrors.joined([PLANAR, PLANAR]))
-        return {**own, **self.command.blocks, **self.settings.ground.blocks}
+        return {**own, **self.settings.command.blocks(self.scene.body), **self.settings.ground.blocks}
+
+    @property
+    def commands(self) -> Mapping[str, int]:
+        """Sizes of what may be set from outside while an episode runs, by name."""
+        return self.settings.command.live(self.scene.body)
+
+    @property
+    def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
+        """The lowest and highest numbers of the commands that are bounded, by name."""
+        return self.settings.command.limits(self.scene.body, self.scene.control_timestep)
+
+    def named_command(self, name: str, value: str) -> np.ndarray:
+        """Return the numbers of a command that is given by a name."""
+        return self.settings.command.named(self.scene.body, name, value)
 
     @property
     def adapts(self) -> bool:
@@ -199,7 +219,8 @@ class CommandTask(Task):
     @functools.cached_property
     def context(self) -> Context:
         """Lengths and speeds of the body."""
-        return Context.of(self.scene, self.parameters, self.step_limit)
+        reference = self.settings.command.reference(self.scene, self.parameters)
+        return Context.of(self.scene, self.parameters, self.step_limit, reference)
 
     @functools.cached_property
     def clock(self) -> Clock:
@@ -211,7 +232,7 @@ class CommandTask(Task):
 
     def phase(self, memory: CommandTaskMemory):
         """Return the phase (...) of the gait, rad."""
-        return self.clock.at(self.clock.phases, memory.core.tick)
+        return self.settings.command.phase(self.clock, memory.core.tick, memory.command)
 
     def first(self) -> Any:
         """Return the ground's stream state."""
@@ -229,7 +250,7 @@ class CommandTask(Task):
         qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
         schedule = draw_schedule(random)
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
-        command_memory = self.command.start(context, random, schedule)
+        command_memory = self.settings.command.start(context, random, schedule)
         still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
         spent, none = energy.start(len(still)), np.zeros(3)
         core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
@@ -243,7 +264,14 @@ class CommandTask(Task):
         torque, force = (rotations.headed(forces[..., i : i + 2], across) for i in (0, 3))
         forces = numpy.concatenate([torque, forces[..., 2:3], force, forces[..., 5:6]], axis=-1)
         readings = reading.read(data, layout, self.scene.arena, forces)
-        return Sensed(*readings, heading, self.settings.ground.touches(data))
+        return Sensed(*readings, heading, self.settings.ground.touches(data), self._feet(data, heading))
+
+    def _feet(self, data, heading):
+        layout = self.scene.layout
+        if not self.settings.command.sees_feet:
+            return None
+        apart = data.xpos[..., layout.feet, :2] - data.xpos[..., layout.torso, None, :2]
+        return rotations.headed(apart, heading[..., None])
 
     def clear_spawn(self, memory: CommandTaskMemory, readings: Sensed) -> np.ndarray:
         """Return the qpos (..., nq) that brings every foot clear of the ground, level ground too."""
@@ -252,8 +280,8 @@ class CommandTask(Task):
     def begin(self, memory: CommandTaskMemory, readings: Sensed) -> CommandTaskMemory:
         """Remember where the torso is, and what the command asks for there."""
         place = _place(readings)
-        command = self.command.begin(self.context, memory.command, place)
-        desired = self.command.desired(self.context, command, memory.core.steps, place)
+        command = self.settings.command.begin(self.context, memory.command, place)
+        desired = self.settings.command.desired(self.context, command, memory.core.steps, place)
         spent = energy.begin(memory.core.energy, readings.joint_angles)
         core = memory.core._replace(energy=spent, place=place, desired=desired)
         return memory._replace(core=core, command=command)
@@ -268,12 +296,13 @@ class CommandTask(Task):
         core, context, place = memory.core, self.context, _place(readings)
         numpy, steps = place.__array_namespace__(), core.steps + 1
         going = core.desired.any(axis=-1)
-        tick = core.tick + going
-        stance = self.clock.at(self.clock.stance, tick) | ~going[..., None]  # all feet, while the command says stop
+        tick, asked = core.tick + going, self.settings.command
+        command = asked.stepped(context, memory.command, steps, going)
+        stance = asked.stance(self.clock, tick, command) | ~going[..., None]  # all feet, while the command says stop
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
-        health = self.health.after(context, readings)
+        health = self.health.after(context, readings, asked.crouch(command))
         motion = self._motion(core, place)
-        followed = self.command.follow(context, memory.command, steps, core.place, place, motion)
+        followed = asked.follow(context, command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
         core = Core(
             steps=steps,
@@ -305,8 +334,8 @@ class CommandTask(Task):
 
     def with_command(self, memory: CommandTaskMemory, name: str, value) -> CommandTaskMemory:
         """Return the memory with a live command."""
-        command = self.command.with_command(memory.command, name, value)
-        desired = self.command.desired(self.context, command, memory.core.steps, memory.core.place)
+        command = self.settings.command.with_command(memory.command, name, value)
+        desired = self.settings.command.desired(self.context, command, memory.core.steps, memory.core.place)
         return memory._replace(core=memory.core._replace(desired=desired), command=command)
 
     def terms(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
@@ -314,10 +343,9 @@ class CommandTask(Task):
 
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
-        core, height, feet = memory.core, self.context.height, self.parameters.feet
-        costs = terms.costs(
-            readings, core.action, core.previous_action, core.schedule_errors, self.parameters.default_angles
-        )
+        core, command, height, feet = memory.core, self.settings.command, self.context.height, self.parameters.feet
+        default = command.default_angles(self.context, memory.command, self.parameters.default_angles)
+        costs = terms.costs(readings, core.action, core.previous_action, core.schedule_errors, default)
         return {
             **costs,
             "angular_velocity": costs["angular_velocity"] * (height / GRAVITY),
@@ -325,7 +353,7 @@ class CommandTask(Task):
             "obedient_gait": core.followed * (1.0 - core.schedule_errors / feet),
             "transport": core.energy.step / self.context.pace,
             **self.health.terms(memory.health),
-            **self.command.terms(memory.command, core.followed, memory.health.upright),
+            **command.terms(memory.command, core.followed, memory.health.upright),
         }
 
     def observe(self, memory: CommandTaskMemory, readings: Sensed) -> dict:
@@ -334,14 +362,14 @@ class CommandTask(Task):
         numpy, posture, velocities = core.motion.__array_namespace__(), readings.posture, readings.velocities
         quaternion = rotations.turned(readings.torso_quaternion, -heading)
         velocity = rotations.headed(velocities[..., :2], heading)
-        circle = self.clock.at(self.clock.circle, core.tick)
+        circle = self.settings.command.circle(self.clock, core.tick, memory.command)
         observed = {
             "posture": numpy.concatenate([posture[..., :1], quaternion, posture[..., 5:]], axis=-1),
             "velocities": numpy.concatenate([velocity, velocities[..., 2:]], axis=-1),
             "contact_forces": readings.contact_forces,
             "gait_clock": circle * core.desired.any(axis=-1)[..., None],
             "command": numpy.concatenate([core.desired, core.motion], axis=-1),
-            **self.command.observe(context, memory.command),
+            **self.settings.command.observe(context, memory.command),
             **self.settings.ground.observe(context, memory.ground, core.place, readings),
         }
         return {name: block + 0.0 for name, block in observed.items()}
@@ -358,7 +386,7 @@ class CommandTask(Task):
         core = memory.core
         steps = core.steps + (core.steps == 0)
         return {
-            **self.command.progress(self.context, memory.command, self.judged(memory)),
+            **self.settings.command.progress(self.context, memory.command, self.judged(memory)),
             "tracking": core.tracking / steps,
             **self.health.progress(memory.health),
             "gait_compliance": clock.compliance(core.all_schedule_errors, steps, self.parameters.feet),
@@ -368,7 +396,7 @@ class CommandTask(Task):
 
     def resampled(self, memory: CommandTaskMemory) -> Any:
         """Return whether the latest step began another drawn command."""
-        return self.command.resampled(memory.command, memory.core.steps)
+        return self.settings.command.resampled(memory.command, memory.core.steps)
 
     def judged(self, memory: CommandTaskMemory):
         """Return the steps (...) over which an episode is judged: a full episode once it is over, else those so far."""
@@ -385,7 +413,7 @@ class CommandTask(Task):
         ended = terminated or truncated or steps >= self.step_limit
         if not (ended or steps * self.context.leak >= 1.0):
             return self.settings.ground.stream_state(memory.ground, np.nan, False)
-        outcome = self.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
+        outcome = self.settings.command.outcome(self.context, memory.command, memory.core.tracking, self.judged(memory))
         return self.settings.ground.stream_state(memory.ground, outcome, memory.health.fell)
 
     def markers(self, memory: CommandTaskMemory, readings: Sensed) -> list[Marker]:
@@ -403,7 +431,7 @@ class CommandTask(Task):
         arrows = [self._arrow(foot, end, colour) for foot, end, colour in ways if (foot != end).any()]
         base = np.array((*hub, self.scene.arena.height(*hub)))
         disc = Marker("cylinder", base, base + (0.0, 0.0, _SHAFT * unit), 2.0 * _SHAFT * unit, _GOING)
-        return [disc, *arrows, *self.command.markers(self.context, memory.command)]
+        return [disc, *arrows, *self.settings.command.markers(self.context, memory.command)]
 
     def _arrow(self, foot: np.ndarray, end: np.ndarray, colour) -> Marker:
         """An arrow on the ground between two points (2,); its axis clears what is higher than both ends."""

@@ -1,6 +1,6 @@
 """Lengths and speeds of a body, in whose multiples tasks with a command are defined."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ class Context(NamedTuple):
         leak: weight of the latest step in leaky means, which reach back over a cycle of the gait.
         leaks: (3,) the same, for means of vectors.
         steps: control steps over which an episode is judged.
+        reference: what else the command measures the body by.
     """
 
     arena: Arena
@@ -36,9 +37,10 @@ class Context(NamedTuple):
     leak: float
     leaks: np.ndarray
     steps: int
+    reference: Any = None
 
     @classmethod
-    def of(cls, scene, parameters, step_limit: float) -> "Context":
+    def of(cls, scene, parameters, step_limit: float, reference: Any = None) -> "Context":
         """Return the context of a task in a `contract.Scene` that prescribes `parameters.Parameters`."""
         body, pose = scene.body, standing(scene.body)
         units = velocity_units(body, parameters.target_velocity)
@@ -54,4 +56,5 @@ class Context(NamedTuple):
             leak=leak,
             leaks=np.full(3, leak),
             steps=int(min(step_limit, STEPS)),
+            reference=reference,
         )

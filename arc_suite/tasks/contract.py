@@ -37,6 +37,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from arc_suite import checks
 from arc_suite.arenas import FLAT, Arena
 from arc_suite.markers import Marker
 from arc_suite.robots import mirror
@@ -275,6 +276,19 @@ class Task(Observed):
     def actions(self) -> str:
         """What an action asks of a motor: "torque", or of a servo: "position"."""
         return "position" if self.scene.body.source else "torque"
+
+    @property
+    def command_limits(self) -> Mapping[str, tuple[np.ndarray, np.ndarray]]:
+        """The lowest and highest numbers (size,) of the `commands` that are bounded, by name."""
+        return {}
+
+    def named_command(self, name: str, value: str) -> np.ndarray:
+        """Return the numbers (size,) of a live command that is given by a name, as a gait may be.
+
+        Raises:
+            ValueError: names stand for nothing here, or there is no such name.
+        """
+        raise ValueError(f"command {name!r}: expected numbers, got {checks.shown(value)}")
 
     @property
     def adapts(self) -> bool:

@@ -40,9 +40,9 @@ class Upright:
         """Return the memory at the start."""
         return Condition(np.float64(1.0), np.False_)
 
-    def after(self, context: Context, readings: Readings) -> Condition:
-        """Return the memory after a control step."""
-        high = readings.torso_height >= self.lowest * context.height
+    def after(self, context: Context, readings: Readings, crouch=1.0) -> Condition:
+        """Return the memory after a control step, in which the torso was asked to keep a share (...) of its height."""
+        high = readings.torso_height >= self.lowest * context.height * crouch
         lies = component(readings.contact_forces, 5) >= self.lying  # upwards on the torso
         upright = rotations.upright(readings.torso_quaternion)
         return Condition(upright, ~(high & ~lies & (upright >= self.least_upright)))

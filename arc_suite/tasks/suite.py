@@ -1,4 +1,4 @@
-"""The ten tasks that follow a command: each is a command on a ground, with what differs in numbers."""
+"""The eleven tasks that follow a command: each is a command on a ground, with what differs in numbers."""
 
 from collections.abc import Mapping
 from typing import ClassVar
@@ -6,6 +6,7 @@ from typing import ClassVar
 from arc_suite.arenas import terrain
 from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
 from arc_suite.tasks.command_task import COSTS, CommandTask
+from arc_suite.tasks.direction import Direction
 from arc_suite.tasks.ground import Lanes, PillarField
 
 _STACKED = ("clock", "clearances", "context", "_torques")  # what follows from body and settings
@@ -27,6 +28,21 @@ class Limp(CommandTask):
     """Following a velocity command with a leg, drawn for each episode, whose motors fail."""
 
     name, command, modifiers, from_body = "limp", Schedule(), {"actuator_failure": True}, _STACKED
+
+
+class Directed(CommandTask):
+    """Following a velocity in a pose and a gait by command."""
+
+    name, command, from_body = "directed", Direction(), _STACKED
+    demonstrators = ("balanced", "steered")
+    weights: ClassVar[Mapping[str, float]] = {
+        "progress": 0.5,
+        "tracking": 1.0,
+        "healthy": 1.0,
+        "obedient_gait": 1.0,
+        "obedient_pose": 1.0,
+        **COSTS,
+    }
 
 
 class Rough(CommandTask):

@@ -31,7 +31,7 @@ def test_leaper_lifts_its_rear_feet():
     body, law = ROBOTS["leaper"], fitted(ROBOTS["leaper"])
     cycle = np.tile(np.linspace(0.0, 1.0, 21)[:, None], (1, len(body.legs)))
     rest = np.zeros((len(cycle), 3))
-    feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), rest)
+    feet = law.next_feet(cycle, rest, rest[:, :2], np.ones((len(cycle), 1)), rest, law.duty_factor, law.stance)
     weights = np.tile(np.eye(3), (len(body.legs), 1, 1))
     angles = np.tile(law.angles, (len(cycle), 1, 1))
     soles, _ = law.legs.soles(law.legs.reached(angles, feet, weights, 0.01, 20))
