@@ -21,6 +21,7 @@ from arc_suite.tasks.contract import Task
 
 _STEPS = 3  # of inverse kinematics in a control step
 _MOST_OFF = 0.2  # standing heights or rad, by which feedback changes a pose
+_LARGEST = 0.05  # standing heights or rad, of the error that feedback adds up
 _FEEDBACK = np.array((0, 3, 4))  # numbers of a pose that the torso shows: height, roll and pitch
 
 
@@ -117,7 +118,8 @@ class Stepping(CommandLaw):
         shown = numpy.concatenate(
             [(height / self.pose.height - self._rest.ride)[:, None], posture.tilt(vertical)], axis=-1
         )
-        off = (off + p.integral * self.cycles * (pose[:, _FEEDBACK] - shown)).clip(-_MOST_OFF, _MOST_OFF)
+        error = (pose[:, _FEEDBACK] - shown).clip(-_LARGEST, _LARGEST)
+        off = (off + p.integral * self.cycles * error).clip(-_MOST_OFF, _MOST_OFF)
         zero = numpy.zeros_like(off[:, :1])
         return off, pose + numpy.concatenate([off[:, :1], zero, zero, off[:, 1:], zero], axis=-1)
 

@@ -5,12 +5,14 @@ feet stay where they are, and joint angles follow by inverse kinematics.
 """
 
 import functools
+import itertools
 from typing import NamedTuple
 
 import numpy as np
 
 from arc_suite import robots
 from arc_suite.models.kinematics import Legs
+from arc_suite.models.outline import torso_box
 from arc_suite.models.sizing import sized
 from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
@@ -26,6 +28,7 @@ _SLIDES = np.diag((0.1, 0.1, 1.0))  # weights of the error of a foot that may sl
 _SETTLING, _STEPS = 50, 6  # of inverse kinematics, to the rest, and from pose to pose
 _STEP = 0.03  # from pose to pose, standing heights or rad
 _MISSES = 0.01  # standing heights, by which a foot may miss its place
+_STARTS, _ASIDE = (0.1, 0.5, 0.9), 0.03  # of searches, shares of joints' ranges; weight of the error of a foot aside
 _FARTHEST = 0.6  # that is tried, standing heights or rad
 
 
@@ -86,6 +89,20 @@ def room(body: Body, planted: bool = True) -> np.ndarray:
         inside &= misses <= _MISSES * height
         found[inside] = size
     return found.reshape(2, 6).T * (-1.0, 1.0)
+
+
+@functools.lru_cache(maxsize=64)
+def belly(body: Body) -> tuple[float, np.ndarray]:
+    """Return the height, m, and joint angles (joints,), rad, of a torso that lies on the ground between its feet."""
+    _, legs, _, places = rest(body)
+    height = -float(torso_box(body)[0][2])
+    goals = places * (1.0, 1.0, 0.0) - (0.0, 0.0, height)
+    # Legs fold in many ways: of searches from all over their range, each leg keeps the one that gets nearest.
+    shares = np.array(list(itertools.product(_STARTS, repeat=legs.low.shape[1])))
+    starts = legs.low + shares[:, None] * (legs.high - legs.low)
+    found = _reached(legs, starts, goals, np.diag((_ASIDE, _ASIDE, 1.0)), body.torso.standing_height, _SETTLING)
+    missed = np.linalg.norm((legs.soles(found)[0] - goals) * (_ASIDE, _ASIDE, 1.0), axis=-1)
+    return height, legs.by_joint(found[missed.argmin(axis=0), np.arange(len(goals))])
 
 
 def turns(body: Body) -> np.ndarray:

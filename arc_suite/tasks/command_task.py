@@ -245,7 +245,7 @@ class CommandTask(Task):
         """
         context, ground = self.context, self.settings.ground
         ground_memory, displacement = ground.place(context, random, stream)
-        qpos, qvel = self.settings.noise.drawn(self.scene.standing, random)
+        qpos, qvel = self.settings.noise.drawn(ground.pose(self.scene), random)
         qpos[:2] += displacement
         qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
         schedule = draw_schedule(random)
@@ -254,7 +254,8 @@ class CommandTask(Task):
         still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
         spent, none = energy.start(len(still)), np.zeros(3)
         core = Core(0, 0, still, still, zero, zero, spent, zero, none, none, none, zero, zero)
-        return Start(qpos, qvel, CommandTaskMemory(core, command_memory, ground_memory, self.health.start()), obstacles)
+        health = self.health.start(lies=ground.lies)
+        return Start(qpos, qvel, CommandTaskMemory(core, command_memory, ground_memory, health), obstacles)
 
     def read(self, data) -> Sensed:
         """Take the readings."""
@@ -300,7 +301,7 @@ class CommandTask(Task):
         command = asked.stepped(context, memory.command, steps, going)
         stance = asked.stance(self.clock, tick, command) | ~going[..., None]  # all feet, while the command says stop
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
-        health = self.health.after(context, readings, asked.crouch(command))
+        health = self.health.after(context, memory.health, readings, steps, asked.crouch(command))
         motion = self._motion(core, place)
         followed = asked.follow(context, command, steps, core.place, place, motion, readings)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)

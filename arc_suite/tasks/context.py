@@ -24,6 +24,7 @@ class Context(NamedTuple):
         leak: weight of the latest step in leaky means, which reach back over a cycle of the gait.
         leaks: (3,) the same, for means of vectors.
         steps: control steps over which an episode is judged.
+        tempo: sqrt(h / g), control steps.
         reference: what else the command measures the body by.
     """
 
@@ -37,6 +38,7 @@ class Context(NamedTuple):
     leak: float
     leaks: np.ndarray
     steps: int
+    tempo: float
     reference: Any = None
 
     @classmethod
@@ -56,5 +58,6 @@ class Context(NamedTuple):
             leak=leak,
             leaks=np.full(3, leak),
             steps=int(min(step_limit, STEPS)),
+            tempo=float(np.sqrt(body.torso.standing_height / GRAVITY) / scene.control_timestep),
             reference=reference,
         )

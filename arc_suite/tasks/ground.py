@@ -13,6 +13,7 @@ import numpy as np
 from arc_suite import checks, rotations
 from arc_suite.arenas import FLAT, Arena, terrain
 from arc_suite.arenas.pillars import COUNT, RADIUS, Pillars
+from arc_suite.models import posture
 from arc_suite.models.sizing import control_timestep
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.blocks import Block
@@ -24,6 +25,7 @@ from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Readings
 from arc_suite.tasks.sensors import FORWARD, LEFT, RAYS, SCAN, SIGHT
 
+STARTS = ("standing", "belly")  # poses in which an episode starts
 LEVELS = 10  # of a curriculum, with difficulties from 0 to 1
 STAYS = 0.75  # probability of the highest level after itself; else any
 SPREAD = 6.0  # half-width of the start across the lane, h, as are the next four
@@ -60,6 +62,11 @@ class Ground:
         return False
 
     @property
+    def lies(self) -> bool:
+        """Whether a body starts with its torso on the ground."""
+        return False
+
+    @property
     def settings(self) -> tuple[str, ...]:
         """The names of the fields that a caller may set."""
         return ()
@@ -75,6 +82,10 @@ class Ground:
     def arena(self, body: Body, parameters: Parameters) -> Arena:
         """Return the arena that suits a body."""
         return FLAT
+
+    def pose(self, scene) -> np.ndarray:
+        """Return the pose (nq,) in which a body starts in a `contract.Scene`, before noise and displacement."""
+        return scene.standing
 
     def first(self) -> Any:
         """Return the stream state with which a new stream of episodes begins."""
@@ -115,7 +126,36 @@ class Ground:
 
 @dataclasses.dataclass(frozen=True)
 class Level(Ground):
-    """Any arena that a caller chooses, flat ground by default."""
+    """Any arena that a caller chooses, flat ground by default.
+
+    Attributes:
+        start: "standing", or "belly": the body begins with its torso on the ground.
+    """
+
+    start: str = STARTS[0]
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The name of the field that a caller may set."""
+        return ("start",)
+
+    def with_settings(self, overrides: Mapping[str, Any]) -> "Level":
+        """Return the ground with a checked start."""
+        return Level(checks.name(overrides.get("start", self.start), STARTS, "start"))
+
+    @property
+    def lies(self) -> bool:
+        """Whether a body starts with its torso on the ground."""
+        return self.start == "belly"
+
+    def pose(self, scene) -> np.ndarray:
+        """Return the pose of the start, lying or standing."""
+        if not self.lies:
+            return scene.standing
+        (height, angles), qpos = posture.belly(scene.body), scene.standing.copy()
+        qpos[2] = height
+        qpos[scene.layout.joint_angles] += angles
+        return qpos
 
 
 class Stream(NamedTuple):

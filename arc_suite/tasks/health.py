@@ -15,11 +15,13 @@ class Condition(NamedTuple):
 
     Attributes:
         upright: (...) cosine of the torso's tilt.
-        fell: (...) whether the torso lies on the ground or is tilted too far.
+        fell: (...) whether the torso lies on the ground or is tilted too far, once it was up.
+        counts: (...) whether it was.
     """
 
     upright: np.ndarray
     fell: np.ndarray
+    counts: np.ndarray
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,22 +32,37 @@ class Upright:
         lowest: height of the torso over the ground, h.
         lying: share of the weight; a torso that the ground carries with more lies on it.
         least_upright: cosine of the torso's tilt.
+        up: height of the torso at which a body that starts lying has risen, h.
+        patience: time after which it must have, sqrt(h / g).
     """
 
     lowest: float = 0.3
     lying: float = 0.5
     least_upright: float = 0.4
+    up: float = 0.6
+    patience: float = 12.0
 
-    def start(self) -> Condition:
-        """Return the memory at the start."""
-        return Condition(np.float64(1.0), np.False_)
+    def start(self, lies: bool = False) -> Condition:
+        """Return the memory at the start of a body that stands or lies."""
+        return Condition(np.float64(1.0), np.False_, np.bool_(not lies))
 
-    def after(self, context: Context, readings: Readings, crouch=1.0) -> Condition:
-        """Return the memory after a control step, in which the torso was asked to keep a share (...) of its height."""
+    def after(self, context: Context, memory: Condition, readings: Readings, steps, crouch=1.0) -> Condition:
+        """Return the memory after a control step.
+
+        Args:
+            context: of the task.
+            memory: before the step.
+            readings: after it.
+            steps: (...) since the start, this one included.
+            crouch: share (...) of its height that the torso is asked to keep.
+        """
         high = readings.torso_height >= self.lowest * context.height * crouch
         lies = component(readings.contact_forces, 5) >= self.lying  # upwards on the torso
         upright = rotations.upright(readings.torso_quaternion)
-        return Condition(upright, ~(high & ~lies & (upright >= self.least_upright)))
+        well = high & ~lies & (upright >= self.least_upright)
+        up = well & (readings.torso_height >= self.up * context.height)
+        counts = memory.counts | up | (steps >= self.patience * context.tempo)
+        return Condition(upright, counts & ~well, counts)
 
     def terms(self, memory: Condition) -> dict:
         """Return the bonus for health."""
