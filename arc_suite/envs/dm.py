@@ -27,7 +27,7 @@ from arc_suite.envs.task_view import TaskView
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import checked_fields
 from arc_suite.simulation.physics import Physics
-from arc_suite.tasks import Task, terms
+from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM
 
 _FLAT = "observations"  # dm_control's name of a flat observation
@@ -97,6 +97,7 @@ class Environment(KnownAttributes, control.Environment):
         self.task_kwargs = task_kwargs
         self._lock = Lock()
         limit, scene = run.definition.step_limit, run.definition.scene
+        run.simulated_by(physics)
         super().__init__(
             physics,
             run,
@@ -292,9 +293,31 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
         Raises:
             RuntimeError: before the first reset.
         """
+        self._check_begun()
+        return self.definition.progress(self._now.memory)
+
+    def simulated_by(self, physics: Physics) -> None:
+        """Remember the simulation, in which privileged observations are looked up."""
+        self._physics = physics
+
+    @property
+    def privileged(self) -> dict[str, np.ndarray]:
+        """What no policy observes, by the names of `definition.privileged_blocks`, now.
+
+        Raises:
+            RuntimeError: before the first reset.
+        """
+        self._check_begun()
+        return self.definition.privileged(self.memory, self._physics.data.ptr)
+
+    def privileged_vector(self) -> np.ndarray:
+        """Return the same as one vector (size,) float32."""
+        self._check_begun()
+        return privileged.vector(self.definition, self.memory, self._physics.data.ptr)
+
+    def _check_begun(self) -> None:
         if self._now.memory is None:
             raise RuntimeError("no episode has begun; call reset first")
-        return self.definition.progress(self._now.memory)
 
     def set_command(self, name: str, value) -> None:
         """Set a live command; see `Environment.command`.

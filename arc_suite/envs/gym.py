@@ -29,7 +29,8 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
     Observations are the flat vector of the dm_env rounded to float32, actions are float32 in
     [-1, 1]. A step's info holds plain floats: the task's unweighted terms, `reward_forward` and so
     on, and figures of how well the episode has gone so far, such as `progress_speed`; a
-    reset's info is empty, since nothing has been rewarded yet.
+    reset's info is empty, since nothing has been rewarded yet. With `privileged=True` both also hold the
+    privileged observation, `privileged` (size,); see `arc_suite.tasks.privileged`.
 
     An episode is truncated at the task's own time limit, 1000 steps unless `task_kwargs` says
     otherwise, and terminated when the dm_env's discount is 0, which never happens at the time
@@ -56,6 +57,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         width: int = 640,
         height: int = 480,
         camera_id: int | str = "tracking",
+        privileged: bool = False,
     ):
         """Load the task.
 
@@ -68,6 +70,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             width: of a picture, pixels; a window has its own size.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
+            privileged: whether infos hold the privileged observation, `privileged` (size,) float32.
 
         Raises:
             ValueError: an unknown name, or a value that does not fit.
@@ -86,6 +89,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         super().__init__(environment, render_kwargs={"width": width, "height": height, "camera_id": camera_id})
         self.metadata["render_fps"] = round(1.0 / environment.control_timestep())
         self.render_mode = render_mode
+        self._tells = checks.boolean("privileged", privileged)
         size = environment.observation_spec()["observations"].shape
         self.observation_space = gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, environment.action_spec().shape, np.float32)
@@ -131,7 +135,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             options: there are none; an empty mapping or None.
 
         Returns:
-            The observation and an empty info.
+            The observation, and an info that is empty or has `privileged`.
 
         Raises:
             ValueError: not a seed, or an option.
@@ -147,7 +151,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         gymnasium.Env.reset(self, seed=None if seed is None else checks.seed(seed))
         self._stepping = True
         self._show()
-        return _flat(observation), {}
+        return _flat(observation), self._privileged()
 
     def step(self, action):
         """Advance by one control step.
@@ -173,7 +177,7 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
         self._stepping = not timestep.last()
         self._show()
         run = self._env.task
-        info = _floats("reward", run.terms) | _floats("progress", run.progress)
+        info = _floats("reward", run.terms) | _floats("progress", run.progress) | self._privileged()
         return _flat(observation), float(reward), terminated, truncated, info
 
     def command(self, name: str, value) -> None:
@@ -246,6 +250,9 @@ class Env(KnownAttributes, DmControlCompatibilityV0):
             self._window.close()
             self._window: Window | None = None
         super().close()
+
+    def _privileged(self) -> dict[str, np.ndarray]:
+        return {"privileged": self._env.task.privileged_vector()} if self._tells else {}
 
     def _check_open(self, call: str) -> None:
         if self._closed:

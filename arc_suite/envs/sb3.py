@@ -136,5 +136,6 @@ def _hand_out(info: Mapping[str, Any], infos: list[dict[str, Any]]) -> None:
     for name, values in info.items():
         if not name.startswith("_"):
             mask = info[f"_{name}"]
-            for index, value in zip(np.flatnonzero(mask).tolist(), values[mask].tolist(), strict=True):
+            chosen = values[mask] if values.ndim > 1 else values[mask].tolist()
+            for index, value in zip(np.flatnonzero(mask).tolist(), chosen, strict=True):
                 infos[index][name] = value

@@ -18,11 +18,14 @@ class TaskView:
         definition: the task, a value of the contract.
         terms: unweighted terms of the latest step by name, each (...); empty before the first step.
         progress: metrics of the episodes so far by name, each (...).
+        privileged: what no policy observes, by the names of `definition.privileged_blocks`, each (..., size); see
+            `tasks.privileged`.
     """
 
     definition: Task
     terms: Mapping[str, np.ndarray]
     progress: Mapping[str, Any]
+    privileged: Mapping[str, np.ndarray]
 
     @property
     def body(self) -> Body:

@@ -29,7 +29,7 @@ from arc_suite.simulation import pictures
 from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.cores import usable_cores
 from arc_suite.simulation.model import checked_fields
-from arc_suite.tasks import Task, terms
+from arc_suite.tasks import Task, privileged, terms
 from arc_suite.tasks.contract import CURRICULUM
 
 _MOST_THREADS = 1 << 10
@@ -60,9 +60,22 @@ class VectorTask(TaskView, KnownAttributes):
         Raises:
             ResetNeeded: before the first reset.
         """
+        return self.definition.progress(self._memory)
+
+    @property
+    def privileged(self) -> Mapping[str, np.ndarray]:
+        """What no policy observes, (num_envs, size) each, by the names of `definition.privileged_blocks`, now.
+
+        Raises:
+            ResetNeeded: before the first reset.
+        """
+        return self.definition.privileged(self._memory, self._environment.batch.data)
+
+    @property
+    def _memory(self) -> Any:
         if self._environment._memory is None:
             raise ResetNeeded("no episode has begun; call reset first")
-        return self.definition.progress(self._environment._memory)
+        return self._environment._memory
 
 
 class VectorEnv(KnownAttributes, Together):
@@ -102,6 +115,7 @@ class VectorEnv(KnownAttributes, Together):
         width: int = 640,
         height: int = 480,
         camera_id: int | str = "tracking",
+        privileged: bool = False,
     ):
         """Load the task and allocate the environments.
 
@@ -120,6 +134,7 @@ class VectorEnv(KnownAttributes, Together):
             width: of a picture, pixels.
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
+            privileged: whether infos hold the privileged observations, `privileged` (num_envs, size) float32.
 
         Raises:
             ValueError: an unknown name, or a value that does not fit.
@@ -134,6 +149,7 @@ class VectorEnv(KnownAttributes, Together):
         if render_mode is not None:
             checks.name(render_mode, _RENDER_MODES, "render_mode")
         self.num_envs = checks.integer("num_envs", num_envs, 1, MOST_ENVS)
+        self._tells = checks.boolean("privileged", privileged)
         pictures.check_size(height, width)
         threads = min(usable_cores(), _MOST_THREADS) if num_threads is None else num_threads
         threads = checks.integer("num_threads", threads, 1, _MOST_THREADS)
@@ -194,7 +210,7 @@ class VectorEnv(KnownAttributes, Together):
             options: `reset_mask`, (num_envs,) booleans, limits seeding and restart to some environments.
 
         Returns:
-            Observations (num_envs, size) float32 of all environments, and an empty info.
+            Observations (num_envs, size) float32 of all environments, and an info that is empty or has `privileged`.
 
         Raises:
             ValueError: a seed or mask that does not fit.
@@ -209,7 +225,7 @@ class VectorEnv(KnownAttributes, Together):
             self._seed(self._seeds(seed), mask)
         self._take_commands()
         self._begin(mask, self._observation)
-        return self._observation.copy(), {}
+        return self._observation.copy(), self._privileged(mask)
 
     @one_thread_at_a_time
     def step(self, actions):
@@ -263,11 +279,15 @@ class VectorEnv(KnownAttributes, Together):
         if self.autoreset_mode == AutoresetMode.SAME_STEP and self._ended.any():
             restarting, stepping = self._ended, stepping & ~self._ended
             last = _by_environment(observation, restarting)
-            final = {"final_obs": last, "final_info": self._info(restarting, diverged)}
+            final = {
+                "final_obs": last,
+                "final_info": self._info(restarting, diverged) | self._privileged(restarting),
+            }
             info |= _marked(final, restarting)
         info |= self._info(stepping, diverged)
         if restarting.any():
             self._begin(restarting, observation)
+        info |= self._privileged(stepping | restarting)
         self._observation = observation.copy()
         return observation, reward, terminated, truncated, info
 
@@ -535,6 +555,15 @@ class VectorEnv(KnownAttributes, Together):
         if diverged.any():
             info |= _marked({"diverged": diverged}, diverged)
         return info
+
+    def _privileged(self, mask: np.ndarray) -> dict[str, np.ndarray]:
+        """The privileged observations of some environments, as an info."""
+        if not (self._tells and mask.any()):
+            return {}
+        return _marked({"privileged": np.where(mask[:, None], self._privileged_vectors(), np.float32(0.0))}, mask)
+
+    def _privileged_vectors(self) -> np.ndarray:
+        return privileged.vector(self._task, self._memory, self.batch.data)
 
     def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments, except those whose seed is None."""

@@ -42,7 +42,7 @@ from arc_suite.arenas import FLAT, Arena
 from arc_suite.markers import Marker
 from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import mirrors
+from arc_suite.tasks import mirrors, privileged
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.mirrors import Symmetry
@@ -376,6 +376,15 @@ class Task(Observed):
     @abstractmethod
     def ended(self, memory, readings: Readings) -> tuple:
         """Return whether the episode is terminated and whether it is truncated, (...) booleans each."""
+
+    @property
+    def privileged_blocks(self) -> Mapping[str, Block]:
+        """The blocks of the privileged observation by name; see `tasks.privileged`."""
+        return privileged.blocks(self.scene.body)
+
+    def privileged(self, memory, data) -> dict:
+        """Return the privileged observation's blocks, each (..., size), of `MjData` or anything with its fields."""
+        return privileged.observed(self.scene, data)
 
     def progress(self, memory) -> dict:
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from arc_suite import rotations
 from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
-from arc_suite.tasks import noise, randomization
+from arc_suite.tasks import noise, privileged, randomization
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
@@ -136,7 +137,7 @@ class Modified(Wrapper):
         changes: what is changed of it.
     """
 
-    from_body = ("gains", "reach", "noises")
+    from_body = ("gains", "reach", "noises", "weight")
 
     changes: Modifiers
 
@@ -302,6 +303,27 @@ class Modified(Wrapper):
             blocks |= {name: blocks[name] + widths * drawn[..., part] for name, (part, widths) in self.noises.items()}
         return blocks
 
+    @property
+    def privileged_blocks(self) -> Mapping[str, Block]:
+        """The other task's, and those of what modifiers change."""
+        return {**self.task.privileged_blocks, **privileged.blocks_of_modifiers(self.scene.body)}
+
+    def privileged(self, memory: ModifiedMemory, data) -> dict:
+        """Return the other task's blocks, and those of what modifiers change; see `privileged.blocks_of_modifiers`."""
+        own, hidden, height = memory.changes, memory.changes.hidden, self.scene.standing[..., 2:3]
+        numpy, heading = own.kicks.__array_namespace__(), rotations.yaw(data.qpos[..., 3:7])
+        fails = own.failing & (own.elapsed > FAILS_FROM)
+        begun = own.elapsed > 0
+        kick = self._due(own, own.elapsed - begun) * begun / (GRAVITY * height) ** 0.5
+        force = own.pushes.acting(own.elapsed) * begun / numpy.asarray(self.weight)[..., None]
+        return {
+            **self.task.privileged(memory.task, data),
+            **{name: values for name, values in hidden._asdict().items() if not name.endswith("_strength")},
+            "strength": own.strength * ~fails,
+            "kick": rotations.headed(kick, heading),
+            "force": rotations.headed(force, heading),
+        }
+
     def progress(self, memory: ModifiedMemory) -> dict:
         """Return the other task's metrics, and whether the body `fell`, 0 or 1."""
         metrics = self.task.progress(memory.task)
@@ -351,6 +373,12 @@ class Modified(Wrapper):
         posture = numpy.concatenate([readings.posture[..., :5], angles], axis=-1)
         return readings._replace(posture=posture, joint_angles=angles)
 
+    @staticmethod
+    def _due(changes: Changes, elapsed):
+        """The change of velocity (..., 2) by a kick in the step after others (..., 1)."""
+        due = elapsed % changes.kick_steps[..., -1:] + 1 == changes.kick_steps
+        return (due[..., None] * changes.kicks).sum(axis=-2)
+
     def _force(self, changes: Changes, force):
         """The force (..., 3) on the torso in a step, N."""
         numpy, push = changes.kicks.__array_namespace__(), changes.pushes.acting(changes.elapsed + np.uint32(1))
@@ -359,9 +387,7 @@ class Modified(Wrapper):
 
     def _kick(self, changes: Changes, kick):
         """The kick (..., nv) of a step; a schedule that has run out begins again."""
-        numpy, last = changes.kicks.__array_namespace__(), changes.kick_steps[..., -1:]
-        due = changes.elapsed % last + 1 == changes.kick_steps
-        push = (due[..., None] * changes.kicks).sum(axis=-2)
+        numpy, push = changes.kicks.__array_namespace__(), self._due(changes, changes.elapsed)
         rest = numpy.zeros((*push.shape[:-1], self.scene.standing.shape[-1] - 3))
         push = numpy.concatenate([push, rest], axis=-1)
         return push if kick is None else kick + push

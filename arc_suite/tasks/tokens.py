@@ -15,6 +15,7 @@ import numpy as np
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots.spec import Body
+from arc_suite.tasks import privileged
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach, velocity_units
 
@@ -38,6 +39,9 @@ FLAT = {
 # What a network of legs sees of one leg: its token and description, and those of the torso, and the command.
 LEG_INPUTS = LEG + LEG_DESCRIPTION + TORSO + COMMAND + TORSO_DESCRIPTION
 _COUNTS = slice(8, 12)  # of a leg's description: the number of joints, as one of four
+
+# Sizes of privileged blocks that a leg or a joint has a number of.
+_PADDED = {"ground": LEGS, "joint_offset": LEGS * JOINTS, "strength": LEGS * JOINTS}
 
 _CARRIES = 0.05  # share of the weight from which on a foot counts as loaded
 _LARGEST_FORCE = 0.5  # that is asked for, as observed forces are clipped to 1
@@ -67,6 +71,21 @@ def padded(body: Body, values: np.ndarray) -> np.ndarray:
     array = np.zeros((LEGS * JOINTS, *np.shape(values)[1:]))
     array[slots(body)] = values
     return array.reshape(LEGS, JOINTS, *array.shape[1:])
+
+
+def privileged_sizes(task: Task) -> dict[str, int]:
+    """Return the sizes of the blocks of a task's privileged observation, padded to 12 legs of 4 joints."""
+    return {name: _PADDED.get(name, size) for name, size in privileged.sizes(task).items()}
+
+
+def padded_privileged(task: Task, vectors: np.ndarray) -> np.ndarray:
+    """Return privileged observations (environments, size) with 12 legs of 4 joints, 0 where there is none."""
+    found = np.zeros((len(vectors), sum(privileged_sizes(task).values())), vectors.dtype)
+    places = {LEGS: np.arange(len(task.scene.body.legs)), LEGS * JOINTS: slots(task.scene.body)}
+    parts = privileged.split(privileged_sizes(task), found)
+    for name, block in privileged.split(privileged.sizes(task), vectors).items():
+        parts[name][:, places.get(_PADDED.get(name), slice(None))] = block
+    return found
 
 
 @functools.lru_cache(maxsize=256)

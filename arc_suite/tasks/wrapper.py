@@ -32,7 +32,7 @@ class Wrapper(Observed):
 
     phase, clear_spawn, terms, observe, ended = map(_forwarded, ("phase", "clear_spawn", "terms", "observe", "ended"))
     progress, resampled, markers = map(_forwarded, ("progress", "resampled", "markers"))
-    failed_legs, stream_state = map(_forwarded, ("failed_legs", "stream_state"))
+    failed_legs, stream_state, privileged = map(_forwarded, ("failed_legs", "stream_state", "privileged"))
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "task":  # also before a copy or a pickle has its fields

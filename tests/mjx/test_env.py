@@ -71,6 +71,18 @@ def test_models_of_episodes_are_those_of_the_suite():
         np.testing.assert_allclose(values, [getattr(model, name) for model in envs.batch.models], rtol=1e-6)
 
 
+def test_privileged_observations_are_those_of_the_suite():
+    settings = {"payload": (0.1, 0.4), "force": 0.3, "joint_offset": 0.05}
+    env = mjx.load(ROBOT, "walk", settings, num_starts=3, privileged=True)
+    envs = VectorEnv(ROBOT, "walk", 3, 1, task_kwargs=settings, privileged=True)
+    state, (_, info) = jax.jit(jax.vmap(env.start))(jnp.arange(3)), envs.reset(seed=0)
+    np.testing.assert_array_equal(state.info["privileged"], info["privileged"])
+    state, info = jax.jit(jax.vmap(env.step))(state, np.zeros((3, 12))), envs.step(np.zeros((3, 12)))[-1]
+    close = abs(state.info["privileged"] - info["privileged"]).max(axis=-1) < 1e-3
+    assert close.sum() >= 2, "a capsule on its end takes another friction: see test_one_step"
+    assert "privileged" not in mjx.load(ROBOT, "walk", num_starts=1).start(0).info
+
+
 def test_interface():
     env, *_ = compiled(ROBOT)
     assert (env.dt, env.n_substeps, env.episode_length) == (0.05, 25, 1000)

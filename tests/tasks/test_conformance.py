@@ -12,10 +12,13 @@ from dm_env import specs
 from dm_env.test_utils import EnvironmentTestMixin
 from episodes import assert_same_steps, begun, flat, load, random_actions
 from numpy.testing import assert_array_equal
+from refusals import refused
 from tiers import tiers, turns
 
 import arc_suite
-from arc_suite.robots import ROBOTS
+from arc_suite.envs.gym import Env
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS, mirror
 from arc_suite.tasks import TASKS
 
 JOINTS = {name: len(body.joint_names) for name, body in ROBOTS.items()}
@@ -109,6 +112,42 @@ def test_observations_share_no_memory(domain, task):
             assert not np.shares_memory(block, following.observation[name])
             assert not any(np.shares_memory(block, field) for field in (environment.physics.data.ptr.qpos,))
     assert_array_equal(flat(timestep), kept)
+
+
+@every_task
+def test_privileged_observations_are_those_of_the_declared_blocks_in_every_driver(domain, task):
+    """And name by name without noise; the mirror of a mirror is the same."""
+    settings = {"kicks": 1.0, "observation_noise": 1.0, "time_limit": 0.4}
+    one = load(domain, task, **settings, random=6)
+    with refused("no episode has begun; call reset first", RuntimeError):
+        one.task.privileged  # noqa: B018
+    one.reset()
+    options = {"domain_name": domain, "task_name": task, "task_kwargs": settings, "privileged": True}
+    single, vector, body = Env(**options), VectorEnv(num_envs=2, **options), one.task.body
+    infos = [single.reset(seed=6)[1], vector.reset(seed=5)[1]]
+    definition = one.task.definition
+    for action in random_actions(one, 12):
+        found = one.task.privileged
+        assert {name: block.shape for name, block in found.items()} == {
+            name: (block.size,) for name, block in definition.privileged_blocks.items()
+        }
+        flattened = np.concatenate(list(found.values())).astype(np.float32)
+        assert np.isfinite(flattened).all()
+        assert_array_equal(infos[0]["privileged"], flattened)
+        if infos[1]["_privileged"][1]:
+            assert_array_equal(infos[1]["privileged"][1], flattened)
+            assert_array_equal(vector.task.privileged["velocity"][1], found["velocity"])
+        one.step(action)
+        *_, over, cut, single_info = single.step(action)
+        infos = [single_info, vector.step(np.stack([action] * 2))[-1]]
+        if over or cut:
+            one.reset()
+            infos[0] = single.reset()[1]
+            infos[1] = vector.step(np.stack([action] * 2))[-1]
+    image = mirror.image(body)
+    for block in definition.privileged_blocks.values():
+        numbers = np.arange(1.0, block.size + 1.0)
+        assert_array_equal(block.map(image)(block.map(image)(numbers)), numbers)
 
 
 @every_task

@@ -66,7 +66,8 @@ def test_the_term_and_the_block_of_the_guide():
 def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
     def step(task, memory, action, fields):
         """A control step as a driver runs it, without the simulation: everything that a task computes."""
-        readings = task.read(types.SimpleNamespace(**fields))
+        data = types.SimpleNamespace(**fields)
+        readings = task.read(data)
         memory, inputs = task.before(memory, action)
         memory = task.after(memory, readings)
         ends = tuple(end | np.zeros((), bool) for end in task.ended(memory, readings))
@@ -76,6 +77,7 @@ def test_jit_and_vmap_compute_what_numpy_computes(task_name, settings, body):
             inputs,
             terms.reward(task.terms(memory, readings), task.settings.weights, task.cost_limit),
             task.observe(memory, readings),
+            task.privileged(memory, data),
             ends[0],
             task.progress(memory),
             task.resampled(memory) | np.zeros((), bool),

@@ -91,6 +91,7 @@ class BodiesEnv(KnownAttributes, Together):
         height: int = 480,
         camera_id: int | str = "tracking",
         flat: bool = False,
+        privileged: bool = False,
     ):
         """Prepare the task of every body and allocate the environments.
 
@@ -107,6 +108,7 @@ class BodiesEnv(KnownAttributes, Together):
             height: of a picture, pixels.
             camera_id: a camera's name or index, -1 for a free one.
             flat: whether observations and actions are vectors.
+            privileged: as in `VectorEnv`; blocks of legs and joints are padded to 12 legs of 4 joints.
 
         Raises:
             ValueError: an unknown name, a body with more than 12 legs or 4 joints a leg, or a value that does not fit.
@@ -133,6 +135,7 @@ class BodiesEnv(KnownAttributes, Together):
             "width": width,
             "height": height,
             "camera_id": camera_id,
+            "privileged": privileged,
         }
         made = {body: Member(*prepared(body, task_name, _of_tasks(settings))) for body in dict.fromkeys(found)}
         which_body = [index % len(found) for index in range(num_envs)]
@@ -166,12 +169,14 @@ class BodiesEnv(KnownAttributes, Together):
         mask = self._reset_mask(options)
         if not (self._begun or mask.all()):
             raise ResetNeeded("cannot reset some environments: reset all of them first")
-        seeds = [None] * self.num_envs if seed is None else self._seeds(seed)
+        seeds, info = [None] * self.num_envs if seed is None else self._seeds(seed), {}
         for group, indices, _ in self._places:
             if mask[indices].any():
-                group.reset(seed=[seeds[index] for index in indices], options={"reset_mask": mask[indices]})
+                options = {"reset_mask": mask[indices]}
+                _, own = group.reset(seed=[seeds[index] for index in indices], options=options)
+                scatter(info, own, indices, self.num_envs)
         self._begun = True
-        return self._observed(), {}
+        return self._observed(), info
 
     @one_thread_at_a_time
     def step(self, actions):

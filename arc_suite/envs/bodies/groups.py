@@ -9,7 +9,7 @@ import numpy as np
 from arc_suite.envs import stacked
 from arc_suite.envs.vector import VectorEnv
 from arc_suite.simulation.batch import layout
-from arc_suite.tasks import Task
+from arc_suite.tasks import Task, tokens
 from arc_suite.tasks.tokens import Tokens
 
 
@@ -30,6 +30,9 @@ class Group(VectorEnv):
         """Allocate an environment for each member; for the options see `VectorEnv`."""
         self._members = members
         super().__init__(None, task_name, len(members), **options)
+
+    def _privileged_vectors(self) -> np.ndarray:
+        return tokens.padded_privileged(self._tasks[0], super()._privileged_vectors())
 
     def _prepared(self):
         tasks, models = zip(*self._members, strict=True)
@@ -63,5 +66,6 @@ def scatter(info: dict, own: Mapping[str, Any], indices: np.ndarray, count: int)
             scatter(info.setdefault(name, {}), value, indices, count)
             continue
         if name not in info:
-            info[name] = np.full(count, None, object) if value.dtype == object else np.zeros(count, value.dtype)
+            shape = (count, *value.shape[1:])
+            info[name] = np.full(count, None, object) if value.dtype == object else np.zeros(shape, value.dtype)
         info[name][indices] = value

@@ -23,6 +23,7 @@ from arc_suite.envs.prepare import prepared
 from arc_suite.envs.worlds import starts
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import device, pictures
+from arc_suite.tasks import privileged as seen
 from arc_suite.tasks import terms
 
 _MOST_ENVS = 1 << 20
@@ -42,8 +43,9 @@ class WorldState:
         done: (...) 1.0 where the episode is over, else 0.0.
         metrics: of the latest step: the task's unweighted terms as `reward_<term>`; `diverged` and `overflow`, 0 or 1.
         info: `memory` of the task and `first_memory` of the episode's start; `model`, the fields of the model that
-            are the episode's own; `truncation`, 1.0 where the task ended the episode without failure; and each live
-            command of the task by its name, NaN for what the task itself would do.
+            are the episode's own; `privileged`, the privileged observation (size,), where it was asked for;
+            `truncation`, 1.0 where the task ended the episode without failure; and each live command of the task by its
+            name, NaN for what the task itself would do.
     """
 
     data: Any
@@ -64,6 +66,7 @@ def load(
     num_starts: int = 4096,
     first_seed: int = 0,
     num_envs: int = 1,
+    privileged: bool = False,
 ) -> "Env":
     """Load a task as functions of JAX.
 
@@ -75,12 +78,13 @@ def load(
         num_starts: episodes in the table of starts, at most 16,384.
         first_seed: seed of the first of them; the others count on.
         num_envs: worlds that will step together. Warp's tables have place for so many.
+        privileged: whether infos hold the privileged observation; see `tasks.privileged`.
 
     Raises:
         ValueError: an unknown name, a value that does not fit, or a task that the implementation cannot simulate.
         MissingExtra: a package is not installed.
     """
-    return Env(domain_name, task_name, task_kwargs, impl, num_starts, first_seed, num_envs)
+    return Env(domain_name, task_name, task_kwargs, impl, num_starts, first_seed, num_envs, privileged)
 
 
 class Env:
@@ -102,13 +106,13 @@ class Env:
         mj_model: the model as compiled.
     """
 
-    def __init__(self, domain_name, task_name, task_kwargs, impl, num_starts, first_seed, num_envs):
+    def __init__(self, domain_name, task_name, task_kwargs, impl, num_starts, first_seed, num_envs, privileged):
         """Draw the starts and put the model on the device; see `load`."""
         if "random" in checks.mapping("task_kwargs", task_kwargs):
             raise ValueError("random: expected none, as `reset` takes a key, and `start` a seed")
         self.impl, self.num_envs = device.implementation(impl), checks.integer("num_envs", num_envs, 1, _MOST_ENVS)
         self.num_starts, self.first_seed = num_starts, checks.seed(first_seed)
-        self._starts = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed)
+        self._starts = starts.drawn(domain_name, task_name, task_kwargs, num_starts, first_seed, privileged)
         settings = {name: value for name, value in (task_kwargs or {}).items() if name != "on_divergence"}
         self.task, self.mj_model = prepared(domain_name, task_name, settings)
         if self.task.adapts:
@@ -148,6 +152,7 @@ class Env:
         zero = jnp.zeros(())
         info = {name: jnp.full(size, jnp.nan) for name, size in self.task.commands.items()}
         info |= {"memory": start.memory, "first_memory": start.memory, "model": start.model, "truncation": zero}
+        info |= {} if start.privileged is None else {"privileged": start.privileged}
         names = (*(f"reward_{name}" for name in self.task.settings.weights), "diverged", "overflow")
         return WorldState(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
 
@@ -222,7 +227,8 @@ class Env:
         data = device.advanced(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
         diverged, overflow = device.diverged(data), device.overflow(data)
 
-        readings = task.read(device.fields(data, task.reads))
+        fields = device.fields(data, task.reads)
+        readings = task.read(fields)
         after = task.after(moved, readings)
         found, reward = terms.reward(task.terms(after, readings), task.settings.weights, task.cost_limit)
         observation = task.vector(task.observe(after, readings), jnp.float32)
@@ -239,13 +245,16 @@ class Env:
         after = jax.tree.map(lambda new, old: jnp.where(diverged, old, new).astype(old.dtype), after, memory)
         metrics = {f"reward_{name}": jnp.where(diverged, 0.0, term) for name, term in found.items()}
         metrics |= {"diverged": diverged, "overflow": overflow}
+        told = {"memory": after, "truncation": _float(truncated & ~(terminated | diverged))}
+        if "privileged" in info:
+            told["privileged"] = jnp.where(diverged, 0.0, seen.vector(task, after, fields, jnp.float32))
         return WorldState(
             data=data,
             obs=jnp.where(diverged, 0.0, observation),
             reward=_float(jnp.where(diverged, 0.0, reward)),
             done=_float(terminated | truncated | diverged),
             metrics=state.metrics | {name: _float(metric) for name, metric in metrics.items()},  # and those of wrappers
-            info={**info, "memory": after, "truncation": _float(truncated & ~(terminated | diverged))},
+            info={**info, **told},
         )
 
 

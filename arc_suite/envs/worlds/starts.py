@@ -26,6 +26,7 @@ class Starts(NamedTuple):
         memory: of the task, from which the first step starts.
         observation: (seeds, size) float32.
         model: fields of the model that differ from seed to seed, by name.
+        privileged: (seeds, size) float32, the privileged observation; None where it is not asked for.
     """
 
     qpos: np.ndarray
@@ -34,9 +35,12 @@ class Starts(NamedTuple):
     memory: Any
     observation: np.ndarray
     model: dict[str, np.ndarray]
+    privileged: np.ndarray | None
 
 
-def drawn(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int) -> Starts:
+def drawn(
+    domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, count: int, seed: int, privileged: bool
+) -> Starts:
     """Return the starts of a number of seeds.
 
     Args:
@@ -45,20 +49,21 @@ def drawn(domain_name, task_name: str, task_kwargs: Mapping[str, Any] | None, co
         task_kwargs: as in `arc_suite.load`.
         count: how many.
         seed: the first.
+        privileged: whether they have the privileged observation.
 
     Raises:
         ValueError: as `arc_suite.load`, or a count out of range.
     """
     checks.integer("num_starts", count, 1, MOST)
-    environments = VectorEnv(domain_name, task_name, min(count, _CHUNK), task_kwargs=task_kwargs)
+    environments = VectorEnv(domain_name, task_name, min(count, _CHUNK), task_kwargs=task_kwargs, privileged=privileged)
     batch = environments.batch
     parts = []
     for first in range(0, count, _CHUNK):
-        observation, _ = environments.reset(seed=seed + first)
+        observation, info = environments.reset(seed=seed + first)
         state = batch.data.qpos.copy(), batch.data.qvel.copy(), batch.mocap_pos.copy()
         names = [*batch.changed, *_DERIVED] if batch.changed else []
         model = {name: np.stack([getattr(model, name) for model in batch.models]) for name in names}
-        parts.append(Starts(*state, environments._memory, observation, model))
+        parts.append(Starts(*state, environments._memory, observation, model, info.get("privileged")))
     environments.close()
     joined = {name: np.concatenate([part.model[name] for part in parts])[:count] for name in parts[0].model}
     table = trees.mapped(lambda *arrays: np.concatenate(arrays)[:count], *(part._replace(model=None) for part in parts))

@@ -1,0 +1,107 @@
+"""Privileged observations: what a simulation knows and a policy does not see, for critics and teachers.
+
+They are declared as the blocks of an observation are, and have neither noise nor scale: lengths are in standing
+heights h, speeds in sqrt(g h), turning rates in sqrt(g / h). A task has those of `blocks`, modifiers add what an
+episode draws, and a task of your own may add others.
+"""
+
+import itertools
+from collections.abc import Mapping
+
+import numpy as np
+
+from arc_suite import rotations
+from arc_suite.models.standing import GRAVITY
+from arc_suite.robots.mirror import Image
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import mirrors
+from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.mirrors import AXIAL, POLAR, SAME, Mirror
+
+PLANAR = Mirror.signed(1, -1)  # forward, left
+
+
+def blocks(body: Body) -> dict[str, Block]:
+    """Return the blocks of every task.
+
+    `velocity` (6): of the torso, linear as it heads and angular in its own frame, without noise. `ground` (legs):
+    height of the ground under each foot, 0 where it would be if the torso stood over it at its standing height.
+    """
+    return {
+        "velocity": Block(6, mirrors.joined([POLAR, AXIAL])),
+        "ground": Block(len(body.legs), _across_legs),
+    }
+
+
+def blocks_of_modifiers(body: Body) -> dict[str, Block]:
+    """Return the blocks that modifiers add; see `randomization.Hidden` for those that an episode draws.
+
+    `strength` (joints): shares of the torque that motors give, 0 once they have failed. `kick` (2): change of the
+    torso's velocity by a kick in the latest step, forward and left. `force` (2): on the torso in the latest step, of
+    the body's weight.
+    """
+    joints = len(body.joint_names)
+    return {
+        "friction": Block(1, SAME),
+        "mass": Block(1, SAME),
+        "payload": Block(4, mirrors.joined([SAME, POLAR])),
+        "centre_of_mass": Block(3, POLAR),
+        "joint_offset": Block(joints, mirrors.joints),
+        "gains": Block(2, Mirror.signed(1, 1)),
+        "armature": Block(1, SAME),
+        "strength": Block(joints, _across_joints),
+        "kick": Block(2, PLANAR),
+        "force": Block(2, PLANAR),
+    }
+
+
+def observed(scene, data) -> dict:
+    """Return the blocks of every task, each (..., size).
+
+    Args:
+        scene: `contract.Scene` of the task; numbers that differ between bodies may have a leading axis.
+        data: `MjData`, or anything with its fields under any leading axes.
+    """
+    numpy, height = data.qpos.__array_namespace__(), scene.standing[..., 2:3]
+    unit, rate, torso = (GRAVITY * height) ** 0.5, (GRAVITY / height) ** 0.5, data.qpos[..., :3]
+    linear, heading = data.qvel[..., :3], rotations.yaw(data.qpos[..., 3:7])
+    along = rotations.headed(linear[..., :2], heading)
+    velocity = [along / unit, linear[..., 2:] / unit, data.qvel[..., 3:6] / rate]
+    feet = data.xpos[..., scene.layout.feet, :]
+    ground = scene.arena.height(feet[..., 0], feet[..., 1]) + 0.0 * feet[..., 0]
+    return {
+        "velocity": numpy.concatenate(velocity, axis=-1),
+        "ground": (ground - torso[..., 2:]) / height + 1.0,
+    }
+
+
+def vector(task, memory, data, dtype=np.float32):
+    """Return the privileged observation of a task as one vector (..., size), blocks as in `task.privileged_blocks`.
+
+    Raises:
+        ValueError: blocks are not those that the task declares.
+    """
+    found, expected = task.privileged(memory, data), sizes(task)
+    if (got := {name: block.shape[-1] for name, block in found.items()}) != expected:
+        raise ValueError(f"privileged observation of {task.name}: expected blocks {expected}, got {got}")
+    arrays = [found[name] for name in expected]
+    return arrays[0].__array_namespace__().concatenate(arrays, axis=-1, dtype=dtype)
+
+
+def sizes(task) -> dict[str, int]:
+    """Return the sizes of the blocks by name, in the order of the vector."""
+    return {name: block.size for name, block in task.privileged_blocks.items()}
+
+
+def split(named: Mapping[str, int], vectors) -> dict[str, np.ndarray]:
+    """Return vectors (..., size) as blocks by name, views of them, given the sizes of all."""
+    ends = itertools.accumulate(named.values())
+    return {name: vectors[..., end - size : end] for (name, size), end in zip(named.items(), ends, strict=True)}
+
+
+def _across_legs(image: Image) -> Mirror:
+    return Mirror.moved(image.legs)
+
+
+def _across_joints(image: Image) -> Mirror:
+    return Mirror.moved(image.joints)

@@ -1,0 +1,115 @@
+"""Privileged observations: their values, and how many bodies share one layout."""
+
+import gymnasium
+import numpy as np
+import pytest
+from episodes import begun, load
+from numpy.testing import assert_allclose, assert_array_equal
+
+from arc_suite import rotations
+from arc_suite.envs.bodies import BodiesEnv
+from arc_suite.envs.gym import Env
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.robots import ROBOTS
+from arc_suite.tasks import privileged, tokens
+from arc_suite.tasks.modifiers import FAILS_FROM
+
+DRAWN = {"friction": (0.5, 1.0), "mass": (0.8, 1.2), "payload": (0.1, 0.3), "centre_of_mass": 0.1}
+DRAWN |= {"joint_offset": 0.05, "joint_strength": (0.5, 1.0), "motor_strength": 0.8, "armature": (0.8, 1.2)}
+
+
+def test_velocity_and_ground_are_those_of_the_simulation_without_scale():
+    environment = begun("leaper", "stairs", observation_noise=1.0)
+    physics, arena, height = environment.physics, environment.task.scene.arena, 0.5
+    physics.data.qpos[0] += 6.0  # onto the stairs
+    physics.data.qpos[3:7] = rotations.turned(physics.data.qpos[3:7].copy(), 1.0)
+    physics.data.qvel[:6] = (0.3, -0.2, 0.1, 1.0, 2.0, 3.0)
+    physics.forward()
+    found, torso = environment.task.privileged, physics.data.qpos[:3]
+    along = rotations.headed(np.array((0.3, -0.2)), rotations.yaw(physics.data.qpos[3:7]))
+    unit, rate = (9.81 * height) ** 0.5, (9.81 / height) ** 0.5
+    assert_allclose(found["velocity"], [*(along / unit), 0.1 / unit, 1.0 / rate, 2.0 / rate, 3.0 / rate], rtol=1e-12)
+    feet = np.array([physics.named.data.xpos[name] for name in environment.task.body.foot_names])
+    ground = np.array([arena.height(*foot[:2]) for foot in feet])
+    assert len(set(ground.tolist())) > 1
+    assert_allclose(found["ground"], (ground - torso[2]) / height + 1.0, atol=1e-12)
+
+
+def test_what_an_episode_draws_is_there():
+    environment = load("leaper", **DRAWN)
+    plain = environment.physics.model.ptr
+    friction, mass, armature = plain.pair_friction.copy(), plain.body_mass.copy(), plain.dof_armature.copy()
+    environment.reset()
+    found, model = environment.task.privileged, environment.physics.model.ptr
+    torso = model.body("torso").id
+    assert_allclose(model.pair_friction, found["friction"][0] * friction)
+    assert_allclose(np.delete(model.body_mass, torso), found["mass"][0] * np.delete(mass, torso))
+    assert model.body_mass.sum() == pytest.approx((1.0 + found["payload"][0]) * found["mass"][0] * mass.sum())
+    assert_allclose(model.dof_armature, found["armature"][0] * armature)
+    assert (found["strength"] < 0.8).all() and len(set(found["strength"])) == 12
+    assert (abs(found["joint_offset"]) <= 0.05).all() and (abs(found["centre_of_mass"]) <= 0.1).all()
+    assert_array_equal(found["gains"], 1.0)
+
+
+def test_kicks_forces_and_failures_are_there_in_the_step_in_which_they_act():
+    environment = begun("tick", "walk", kicks=1.0, force=0.4, actuator_failure=2)
+    height, own = ROBOTS["tick"].torso.standing_height, environment.task.memory.changes
+    first = int(own.kick_steps[0])
+    assert not environment.task.privileged["kick"].any()
+    for step in range(1, max(first, FAILS_FROM, int(own.pushes.first[0])) + 1):
+        environment.step(np.zeros(18))
+        found, heading = environment.task.privileged, rotations.yaw(environment.physics.data.qpos[3:7])
+        kick = own.kicks[0] / (9.81 * height) ** 0.5 if step == first else np.zeros(2)
+        assert_allclose(found["kick"], rotations.headed(kick, heading), atol=1e-12)
+        force = environment.physics.data.xfrc_applied[1, :2] / environment.task.definition.weight
+        assert_allclose(found["force"], rotations.headed(force, heading), atol=1e-12)
+        assert_array_equal(found["strength"] == 0.0, own.failing & (step > FAILS_FROM))
+    assert found["force"].any() or found["kick"].any()
+
+
+def test_infos_have_none_by_default():
+    for environment in (Env("tick", "walk"), VectorEnv("tick", "walk", 2), BodiesEnv("walk", 2, "tick")):
+        _, info = environment.reset(seed=0)
+        *_, after = environment.step(environment.action_space.sample())
+        assert "privileged" not in info and "privileged" not in after
+
+
+@pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
+def test_different_bodies_have_one_padded_layout(mode):
+    settings, ends = {"time_limit": 0.3, "kicks": 1.0}, 0
+    bodies = ["varied:0", "varied:1", "leaper"]
+    mixed = BodiesEnv("steer", 3, bodies, autoreset_mode=mode, task_kwargs=settings, privileged=True)
+    options = {"autoreset_mode": mode, "task_kwargs": {**settings, "actions": "position"}, "privileged": True}
+    alone = [VectorEnv(body, "steer", 1, **options) for body in mixed.bodies]
+    infos = mixed.reset(seed=4)[1], [each.reset(seed=4 + index)[1] for index, each in enumerate(alone)]
+    width = sum(tokens.privileged_sizes(mixed.tasks[0]).values())
+    for _ in range(8):
+        together, own = infos
+        assert together["privileged"].shape == (3, width) and together["privileged"].dtype == np.float32
+        for index, info in enumerate(own):
+            task = mixed.tasks[index]
+            assert_array_equal(together["privileged"][index], tokens.padded_privileged(task, info["privileged"])[0])
+            blocks = privileged.split(tokens.privileged_sizes(task), together["privileged"][index])
+            legs = len(task.scene.body.legs)
+            assert blocks["ground"][:legs].all() and not blocks["ground"][legs:].any()
+            assert (blocks["strength"] > 0.0).sum() == len(task.scene.body.joint_names)
+            if "final_info" in info:
+                last = together["final_info"]["privileged"][index]
+                assert_array_equal(last, tokens.padded_privileged(task, info["final_info"]["privileged"])[0])
+                assert (last != together["privileged"][index]).any()
+                ends += 1
+        infos = (
+            mixed.step(np.zeros((3, 12, 4)))[-1],
+            [each.step(np.zeros(each.action_space.shape))[-1] for each in alone],
+        )
+    assert (ends > 0) == (mode == "SameStep")
+
+
+def test_vector_environments_of_gymnasium_batch_them():
+    make = lambda: gymnasium.make("arc_suite/tick-walk-v0", privileged=True)  # noqa: E731
+    theirs, ours = gymnasium.vector.SyncVectorEnv([make] * 2), VectorEnv("tick", "walk", 2, privileged=True)
+    one, other = theirs.reset(seed=0)[1], ours.reset(seed=0)[1]
+    for _ in range(3):
+        for name in ("privileged", "_privileged"):
+            assert_array_equal(one[name], other[name])
+        one, other = (each.step(np.zeros((2, 18), np.float32))[-1] for each in (theirs, ours))
