@@ -8,7 +8,7 @@ from tiers import tiers, turns
 
 import arc_suite
 from arc_suite.robots import ROBOTS, generator, mirror
-from arc_suite.tasks import TASKS, mirrors
+from arc_suite.tasks import TASKS, mirrors, randomization
 from arc_suite.tasks.sensors import RAYS, SCAN
 
 STEPS = 20
@@ -55,7 +55,7 @@ def look_into_the_mirror(task):
 def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
     one, other = (arc_suite.load(body, task, {"random": 0}) for _ in range(2))
     definition = one.task.definition
-    observation, action = definition.symmetry
+    (observation, action), privileged = definition.symmetry, mirror_of_hidden(definition)
     look_into_the_mirror(other.task.definition)
     random = np.random.RandomState(1)
     timestep, image = one.reset(), other.reset()
@@ -63,6 +63,7 @@ def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
         np.testing.assert_allclose(
             definition.vector(image.observation), observation(definition.vector(timestep.observation)), atol=2e-12
         )
+        np.testing.assert_allclose(hidden(other), privileged(hidden(one)), atol=2e-12)
         acts = random.uniform(-0.15, 0.15, action.signs.shape)  # stronger ones throw bodies with sized motors
         timestep, image = one.step(acts), other.step(action(acts))
         assert image.reward == pytest.approx(timestep.reward, abs=1e-12)
@@ -71,6 +72,55 @@ def test_a_mirrored_walk_is_a_walk_in_the_mirror(body, task):
     last = definition.vector(timestep.observation)
     moving = definition.sizes["posture"] + definition.sizes["velocities"]
     assert (abs(observation(last) - last) > 1e-6)[:moving].mean() > 0.7
+
+
+def hidden(environment):
+    """The privileged observation of an environment as one vector."""
+    return np.concatenate(list(environment.task.privileged.values()))
+
+
+def mirror_of_hidden(task):
+    """The mirror map of privileged observations."""
+    image = mirror.image(task.scene.body)
+    return mirrors.joined(block.map(image) for block in task.privileged_blocks.values())
+
+
+DRAWN = {"payload": (0.1, 0.4), "centre_of_mass": 0.1, "joint_offset": 0.05, "joint_strength": (0.5, 1.0)}
+DRAWN |= {"gains": (0.8, 1.2), "actions": "position", "kicks": 0.3, "force": 0.3, "actuator_failure": True}
+
+
+def test_what_modifiers_draw_has_a_mirror_image():
+    """A walk with mirrored loads, sensors, motors, kicks and forces is mirrored, and so is what critics see of it."""
+    one, other = (arc_suite.load("tick", "walk", {"random": 29, **DRAWN}) for _ in range(2))
+    task, image = other.task.definition, mirror.image(ROBOTS["tick"])
+    look_into_the_mirror(task.task)
+    kinds, start, drawn_alike = task.privileged_blocks, task.start, mirrors.PLANAR.signs[:2]
+
+    def mirrored(random, stream):
+        begun = start(random, stream)
+        own = begun.memory.changes
+        parts = {name: kinds[name].map(image)(getattr(own.hidden, name)) for name in kinds.keys() & own.hidden._fields}
+        own = own._replace(
+            hidden=own.hidden._replace(**parts),
+            strength=own.strength[image.joints],
+            failing=own.failing[image.joints],
+            kicks=own.kicks * drawn_alike,
+            pushes=own.pushes._replace(forces=own.pushes.forces * drawn_alike),
+        )
+        model = randomization.changed_model(task.scene, task.changes, own.hidden, {})
+        return begun._replace(memory=begun.memory._replace(changes=own), model=model)
+
+    vars(task)["start"] = mirrored
+    (observation, action), privileged = one.task.definition.symmetry, mirror_of_hidden(task)
+    timestep, seen, random, pushed = one.reset(), other.reset(), np.random.RandomState(1), 0
+    for _ in range(60):
+        expected = observation(one.task.definition.vector(timestep.observation))
+        np.testing.assert_allclose(task.vector(seen.observation), expected, atol=1e-8)
+        np.testing.assert_allclose(hidden(other), privileged(hidden(one)), atol=1e-8)
+        acts = random.uniform(-0.1, 0.1, 18)
+        timestep, seen = one.step(acts), other.step(action(acts))
+        pushed += one.task.privileged["kick"].any() + one.task.privileged["force"].any()
+    assert pushed >= 2
 
 
 @pytest.mark.parametrize("task", ["walk", "steer"])
