@@ -230,7 +230,7 @@ class Modified(Wrapper):
     @functools.cached_property
     def weight(self) -> float:
         """The weight of the body without a load, N."""
-        return float(GRAVITY * self.scene.model["body_mass"].sum())
+        return GRAVITY * standing(self.scene.body).mass
 
     def begin(self, memory: ModifiedMemory, readings: Readings) -> ModifiedMemory:
         """Return the other task's memory, and the state of the joints."""

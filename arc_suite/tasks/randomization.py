@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.models.outline import torso_box
+from arc_suite.models.standing import standing
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import noise
 from arc_suite.tasks.contract import Scene
@@ -185,7 +186,7 @@ def _torso(scene: Scene, own: Hidden, model: Mapping[str, np.ndarray]) -> dict[s
     share, place = own.payload[0], own.payload[1:]
     torso = torso._replace(centre=torso.centre + height * own.centre_of_mass)
     if share > 0.0:
-        torso = torso.with_point(share * model["body_mass"].sum(), height * place)
+        torso = torso.with_point(share * own.mass[0] * standing(scene.body).mass, height * place)
     for name, value in zip(names, torso, strict=True):
         fields[name][part] = value
     return fields
