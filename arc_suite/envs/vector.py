@@ -30,7 +30,7 @@ from arc_suite.simulation.batch import Batch
 from arc_suite.simulation.cores import usable_cores
 from arc_suite.simulation.model import checked_fields
 from arc_suite.tasks import Task, privileged, terms
-from arc_suite.tasks.contract import CURRICULUM
+from arc_suite.tasks.contract import CURRICULUM, Inputs
 
 _MOST_THREADS = 1 << 10
 _RENDER_MODES = ("rgb_array", "depth_array")
@@ -253,11 +253,7 @@ class VectorEnv(KnownAttributes, Together):
         waiting = self._ended & (self.autoreset_mode == AutoresetMode.DISABLED)
         stepping, restarting = ~(self._ended | self._resting), self._ended & ~(self._resting | waiting)
         memory, inputs = task.before(before, checked_action(actions, self.action_space.shape))
-        np.copyto(data.ctrl[:, : inputs.ctrl.shape[-1]], inputs.ctrl, where=stepping[:, None])
-        if inputs.kick is not None:
-            data.qvel[stepping] += inputs.kick[stepping]
-        if inputs.force is not None:
-            self.batch.xfrc_applied[stepping, task.scene.layout.torso, :3] = inputs.force[stepping]
+        self._write(inputs, stepping)
         diverged = self.batch.step(task.scene.substeps, stepping)
         readings = task.read(data)
         self._memory = memory = trees.chosen(stepping, task.after(memory, readings), before)
@@ -543,6 +539,15 @@ class VectorEnv(KnownAttributes, Together):
             pairs = zip(self._tasks, self._next, strict=True)
             self._tasks = [pair[there] for pair, there in zip(pairs, changed.tolist(), strict=True)]
             self._task = _one(self._tasks)
+
+    def _write(self, inputs: Inputs, mask: np.ndarray) -> None:
+        """Write what a control step needs into some environments."""
+        data = self.batch.data
+        np.copyto(data.ctrl[:, : inputs.ctrl.shape[-1]], inputs.ctrl, where=mask[:, None])
+        if inputs.kick is not None:
+            data.qvel[mask] += inputs.kick[mask]
+        if inputs.force is not None:
+            self.batch.xfrc_applied[mask, self._task.scene.layout.torso, :3] = inputs.force[mask]
 
     def _info(self, mask: np.ndarray, diverged: np.ndarray) -> dict[str, Any]:
         """What the latest step tells of some environments."""

@@ -25,6 +25,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.simulation import device, pictures
 from arc_suite.tasks import privileged as seen
 from arc_suite.tasks import terms
+from arc_suite.tasks.contract import Inputs
 
 _MOST_ENVS = 1 << 20
 # Fields of the simulation that a start sets; all others follow from them in a step.
@@ -218,12 +219,7 @@ class Env:
         for name in task.commands:
             memory = task.with_command(memory, name, info[name])
         moved, inputs = task.before(memory, action)
-        data = before.replace(ctrl=before.ctrl.at[: inputs.ctrl.shape[-1]].set(inputs.ctrl))
-        if inputs.kick is not None:
-            data = data.replace(qvel=data.qvel + inputs.kick)
-        if inputs.force is not None:
-            torso = task.scene.layout.torso
-            data = data.replace(xfrc_applied=data.xfrc_applied.at[torso, :3].set(inputs.force))
+        data = _written(before, inputs, task.scene.layout.torso)
         data = device.advanced(self._mjx_model.replace(**info["model"]), data, self.n_substeps)
         diverged, overflow = device.diverged(data), device.overflow(data)
 
@@ -256,6 +252,16 @@ class Env:
             metrics=state.metrics | {name: _float(metric) for name, metric in metrics.items()},  # and those of wrappers
             info={**info, **told},
         )
+
+
+def _written(data, inputs: Inputs, torso: int):
+    """Return the data of a simulation with what a control step writes, given the torso's place among the bodies."""
+    data = data.replace(ctrl=data.ctrl.at[: inputs.ctrl.shape[-1]].set(inputs.ctrl))
+    if inputs.kick is not None:
+        data = data.replace(qvel=data.qvel + inputs.kick)
+    if inputs.force is not None:
+        data = data.replace(xfrc_applied=data.xfrc_applied.at[torso, :3].set(inputs.force))
+    return data
 
 
 def restarted(state: WorldState, start: WorldState, ended) -> WorldState:
