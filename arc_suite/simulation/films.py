@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from arc_suite import versions
+from arc_suite.models.builder import EYE
 
 _SHORTEST_FRAME = 0.02  # s; players show the frames of a GIF that ask for less at a pace of their own
 
@@ -36,7 +37,7 @@ class Footage:
             policy: maps a `TimeStep` to an action.
             camera: one of `builder.CAMERAS`.
             size: width and height of a view in pixels.
-            quality: of views; see `pictures.QUALITIES`.
+            quality: of views; see `pictures.QUALITIES`. The eye has its own.
         """
         self.robot = robot
         self.earned = 0.0
@@ -44,7 +45,7 @@ class Footage:
         self.advance = 0.0
         self._environment, self._policy = environment, policy
         self._time_step = environment.reset()
-        self._camera, self._size, self._quality = camera, size, quality
+        self._camera, self._size, self._quality = camera, size, None if camera == EYE else quality
 
     @property
     def ended(self) -> bool:

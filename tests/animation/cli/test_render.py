@@ -120,6 +120,13 @@ def test_a_film_keeps_the_sum_of_frames_between_the_units_of_its_format(tmp_path
     assert (film.n_frames, total, film.info["loop"]) == (20, milliseconds, 0)
 
 
+def test_the_eye_shows_what_a_policy_sees():
+    environment = arc_suite.load("bastion", "steer", {"random": 0})
+    footage = films.Footage("bastion", environment, alone(policy("zero", "bastion"), 0), "eye", (64, 48))
+    np.testing.assert_array_equal(footage.view(), environment.physics.render(48, 64, "eye"))
+    footage.close()
+
+
 def test_a_take_stays_at_its_end():
     environment = arc_suite.load("leaper", "walk", {"random": 0})
     footage = films.Footage("leaper", environment, alone(policy("random", "leaper"), 0), "profile", (64, 48))
