@@ -1,4 +1,4 @@
-// The player's command [forward, left, turning] from keys, a gamepad and a stick on the screen.
+// The player's command [forward, left, turning] and pose from keys, a gamepad and a stick on the screen.
 
 const KEYS = {
   ArrowUp: [1, 0, 0], KeyW: [1, 0, 0],
@@ -7,11 +7,20 @@ const KEYS = {
   ArrowRight: [0, 0, -1], KeyD: [0, 0, -1],
   KeyQ: [0, 1, 0], KeyE: [0, -1, 0],
 };
+// Height, forward, left, roll, pitch and yaw, shares of a body's room.
+const POSES = {
+  KeyC: [-1, 0, 0, 0, 0, 0], KeyV: [1, 0, 0, 0, 0, 0],
+  KeyI: [0, 1, 0, 0, 0, 0], KeyK: [0, -1, 0, 0, 0, 0],
+  KeyJ: [0, 0, 1, 0, 0, 0], KeyL: [0, 0, -1, 0, 0, 0],
+  KeyF: [0, 0, 0, -1, 0, 0], KeyH: [0, 0, 0, 1, 0, 0],
+  KeyT: [0, 0, 0, 0, -1, 0], KeyG: [0, 0, 0, 0, 1, 0],
+  KeyZ: [0, 0, 0, 0, 0, 1], KeyX: [0, 0, 0, 0, 0, -1],
+};
 const LEAST = [-0.5, -0.5, -1], MOST = [1, 0.5, 1]; // of a command, as the tasks draw them
 const SHOWN = [0.8, 0, 0.2]; // a wide circle, where the page's address ends in #walk, until somebody plays
 const DEAD = 0.15; // share of a gamepad's stick that counts as nothing
 
-const sum = (vectors) => vectors.reduce((total, vector) => total.map((value, i) => value + vector[i]), [0, 0, 0]);
+const sum = (vectors, zero) => vectors.reduce((total, vector) => total.map((value, i) => value + vector[i]), zero);
 
 // A command within what tasks ask for: the sum of speed and turning is at most 1.
 export function bounded(command) {
@@ -22,9 +31,13 @@ export function bounded(command) {
 
 const live = (value = 0) => (Math.abs(value) > DEAD ? value : 0);
 
-function gamepads() {
-  const there = (navigator.getGamepads?.() ?? []).filter((pad) => pad?.connected);
-  return there.map(({ axes }) => [-live(axes[1]), -live(axes[0]), -live(axes[2])]);
+const gamepads = () => (navigator.getGamepads?.() ?? []).filter((pad) => pad?.connected);
+const walks = ({ axes }) => [-live(axes[1]), -live(axes[0]), -live(axes[2])];
+
+// Triggers crouch and rise, shoulder buttons lean, and the right stick looks up and down.
+function poses({ axes, buttons }) {
+  const [left, right, crouch, rise] = [4, 5, 6, 7].map((button) => buttons?.[button]?.value ?? 0);
+  return [rise - crouch, 0, 0, right - left, live(axes[3]), 0];
 }
 
 export class Inputs {
@@ -34,8 +47,9 @@ export class Inputs {
     this.stick = [0, 0, 0];
     this.shows = window.location.hash === "#walk";
     window.addEventListener("keydown", (event) => {
-      if (!(event.code in KEYS) || event.ctrlKey || event.metaKey || event.altKey) return;
-      if (event.target.closest("select")) return; // whose keys these are
+      if (!(event.code in KEYS || event.code in POSES) || event.ctrlKey || event.metaKey || event.altKey) return;
+      const keyed = event.code.startsWith("Arrow") ? "select, input" : "select";
+      if (event.target.closest(keyed)) return; // whose keys these are
       event.preventDefault();
       this.held.add(event.code);
     });
@@ -61,8 +75,18 @@ export class Inputs {
     for (const end of ["pointerup", "pointercancel"]) stick.addEventListener(end, () => move(0, 0));
   }
 
+  pressed(keys) {
+    return [...this.held].filter((code) => code in keys).map((code) => keys[code]);
+  }
+
+  get pose() {
+    return sum([...this.pressed(POSES), ...gamepads().map(poses)], [0, 0, 0, 0, 0, 0]).map((value) =>
+      Math.min(Math.max(value, -1), 1),
+    );
+  }
+
   get command() {
-    const command = bounded(sum([...[...this.held].map((code) => KEYS[code]), ...gamepads(), this.stick]));
+    const command = bounded(sum([...this.pressed(KEYS), ...gamepads().map(walks)], this.stick));
     if (command.some(Boolean)) this.shows = false;
     return this.shows ? SHOWN : command;
   }

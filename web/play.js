@@ -4,6 +4,7 @@ import * as THREE from "three";
 import { bytes, unpacked } from "./data.js";
 import { grounds, triangles } from "./ground.js";
 import { Inputs } from "./inputs.js";
+import { Panel } from "./panel.js";
 import { Figure, materials, quaternion } from "./parts.js";
 import { Simulation } from "./simulation.js";
 import { View } from "./view.js";
@@ -44,12 +45,12 @@ class Play {
   }
 
   // Steps through some seconds of real time, as far as some milliseconds allow.
-  advance(seconds, command, budget = BUSY) {
+  advance(seconds, asked, budget = BUSY) {
     const { simulation, body } = this, began = performance.now();
     this.debt += seconds;
     let stepped = 0;
     while (this.debt >= body.timestep && performance.now() - began < budget) {
-      simulation.substep(command);
+      simulation.substep(asked);
       this.debt -= body.timestep;
       stepped += body.timestep;
     }
@@ -138,14 +139,14 @@ function pulls(canvas, current) {
     });
 }
 
-function shown({ simulation, body, pace }, command, playing) {
+function shown({ simulation, body, pace }, command, gait, playing) {
   const { motion, fell } = simulation.task, { units } = body.task;
   const speed = Math.hypot(motion[0] * units[0], motion[1] * units[1]);
   const asked = body.task.headed
     ? `forward ${command[0].toFixed(1)}, left ${command[1].toFixed(1)}, turn ${command[2].toFixed(1)}`
     : `course ${((simulation.task.course * 180) / Math.PI).toFixed(0)} degrees`;
   const state = playing ? (fell ? "fallen" : pace < 0.9 ? `slow motion, ${pace.toFixed(1)} of real time` : "") : "paused";
-  return [`${speed.toFixed(2)} m/s`, asked, state].filter(Boolean).join(" \u00b7 ");
+  return [`${speed.toFixed(2)} m/s`, asked, gait, state].filter(Boolean).join(" \u00b7 ");
 }
 
 async function main() {
@@ -154,12 +155,13 @@ async function main() {
     bytes(byId("engine").textContent),
   ]);
   const mujoco = await loadMujoco({ wasmBinary });
-  const inputs = new Inputs(byId("stick"));
+  const inputs = new Inputs(byId("stick")), panel = new Panel(byId("direction"));
   const state = { playing: true, play: null, stale: true }; // a page at rest draws only what changes
   const choice = byId("body"), ground = byId("ground");
   bodies.forEach(({ name }, index) => choice.append(new Option(name, index)));
   choice.parentElement.hidden = bodies.length === 1;
   byId("help").open = window.innerWidth > 700 && window.innerHeight > 500;
+  panel.element.open = byId("help").open && window.innerWidth > 1000 && !inputs.shows;
 
   const change = () => {
     state.play?.free();
@@ -169,6 +171,8 @@ async function main() {
     state.play = new Play(mujoco, body, body.grounds[ground.value], canvas);
     canvas.setAttribute("aria-label", `${body.name} on ${ground.value} ground`);
     pulls(canvas, () => state.play);
+    panel.offer(body.task.direction);
+    for (const each of document.querySelectorAll(".directed")) each.hidden = !body.task.direction;
     const stale = () => (state.stale = true);
     state.play.view.controls.addEventListener("change", stale);
     stale();
@@ -182,7 +186,9 @@ async function main() {
     restart: () => (state.play.restart(), (state.stale = true)),
     pause: () => pause(),
   };
-  const keys = { Space: "kick", KeyR: "restart", KeyP: "pause" };
+  const keys = { Space: actions.kick, KeyR: actions.restart, KeyP: actions.pause };
+  Object.assign(keys, { Digit0: () => panel.reset(), Comma: () => panel.quicken(-1), Period: () => panel.quicken(1) });
+  for (let number = 1; number < 10; number += 1) keys[`Digit${number}`] = () => panel.choose(number);
   window.addEventListener("resize", () => (state.stale = true));
   for (const [name, act] of Object.entries(actions))
     byId(name).addEventListener("click", (event) => {
@@ -191,11 +197,11 @@ async function main() {
     });
   for (const list of [choice, ground]) list.addEventListener("change", () => (list.blur(), change()));
   window.addEventListener("keydown", (event) => {
-    const name = keys[event.code];
-    const used = event.code === "Space" && event.target.closest("button, select, summary"); // pressed by the space bar
-    if (!name || used || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
+    const act = keys[event.code];
+    const used = event.code === "Space" && event.target.closest("button, select, summary, input"); // pressed by the space bar
+    if (!act || used || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
-    actions[name]();
+    act();
   });
   change();
 
@@ -203,16 +209,18 @@ async function main() {
   const frame = (now) => {
     const seconds = last === null ? 0 : Math.min(now - last, 100) / 1000;
     last = now;
-    if (state.playing) state.play.advance(seconds, inputs.command);
+    const asked = panel.asked(inputs.command, inputs.pose);
+    if (state.playing) state.play.advance(seconds, asked);
+    panel.tell(asked);
     if (state.playing || state.stale) {
       state.stale = false;
       state.play.draw();
-      byId("state").textContent = shown(state.play, inputs.command, state.playing);
+      byId("state").textContent = shown(state.play, asked.command, panel.gait, state.playing);
     }
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);
-  window.play = { state, inputs, pause }; // for tests
+  window.play = { state, inputs, panel, pause }; // for tests
 }
 
 main();

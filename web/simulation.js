@@ -68,12 +68,13 @@ export class Simulation {
     this.count = 0; // substeps
   }
 
-  // Takes one substep, at the start of a control step with a new action and command [forward, left, turning].
-  substep(command) {
+  // Takes one substep, at the start of a control step with a new action and what is asked for: a command [forward, left,
+  // turning], and of some bodies a pose and a gait.
+  substep(asked) {
     const { mujoco, model, data, task, body: { substeps } } = this;
     if (this.count % substeps === 0) {
       const action = this.driver.act(task.observe(data));
-      task.command(command);
+      task.command(asked);
       data.ctrl.set(action);
     }
     if (this.pull) this.drag(this.pull);

@@ -1,4 +1,5 @@
 // What a task reads from the simulation and remembers, as arc_suite.tasks.command_task and walk define it; no reward.
+import { Direction } from "./direction.js";
 
 const TURN = 2 * Math.PI;
 
@@ -21,7 +22,7 @@ function headed(x, y, heading) {
 }
 
 // A body in a task. A task with a command observes in the frame of the torso's heading; one without a command, which
-// walks along x, in the frame of a course, by which it is steered.
+// walks along x, in the frame of a course, by which it is steered. Some take a pose and a gait, too.
 export class Task {
   constructor(constants, ground) {
     this.constants = constants;
@@ -30,6 +31,7 @@ export class Task {
     this.motion = [0, 0, 0]; // its mean velocity in the same units
     this.course = 0; // rad
     this.phase = 0; // of the gait, rad
+    this.direction = constants.direction ? new Direction(constants.direction) : null;
     this.fell = false;
   }
 
@@ -42,11 +44,12 @@ export class Task {
     return [xpos[3 * torso], xpos[3 * torso + 1], yaw(qpos.subarray(3, 7))];
   }
 
-  // Sets the command of a control step, from -1 to 1 each.
-  command(desired) {
+  // Sets what is asked for in a control step: a command, from -1 to 1 each, a pose, and a gait.
+  command(asked) {
     const { headed: commanded, units, step } = this.constants;
-    this.desired = desired;
-    if (!commanded) this.course += desired[2] * units[2] * step;
+    this.asked = asked;
+    this.desired = asked.command;
+    if (!commanded) this.course += this.desired[2] * units[2] * step;
   }
 
   get going() {
@@ -57,7 +60,8 @@ export class Task {
   after(data) {
     const { turn, leak, units, step } = this.constants;
     const place = this.placed(data), [x, y, heading] = this.place;
-    if (this.going) this.phase = (this.phase + turn) % TURN;
+    this.direction?.after(this.asked, this.going);
+    if (this.going) this.phase = this.direction?.angle ?? (this.phase + turn) % TURN;
     const moved = [...headed(place[0] - x, place[1] - y, heading), wrapped(place[2] - heading)];
     this.motion = this.motion.map((value, i) => (1 - leak) * value + (leak * moved[i]) / (step * units[i]));
     this.place = place;
@@ -67,7 +71,8 @@ export class Task {
   fallen({ qpos, cfrc_ext: forces }) {
     const { lowest, lying, least_upright: least, weight, parts: [torso] } = this.constants;
     const [, x, y] = qpos.subarray(3, 7);
-    return !(this.height(qpos) >= lowest && forces[6 * torso + 5] / weight < lying && 1 - 2 * (x * x + y * y) >= least);
+    const high = this.height(qpos) >= lowest * (this.direction?.crouch ?? 1);
+    return !(high && forces[6 * torso + 5] / weight < lying && 1 - 2 * (x * x + y * y) >= least);
   }
 
   height(qpos) {
@@ -87,6 +92,7 @@ export class Task {
       contact_forces: this.forces(data.cfrc_ext, heading),
       gait_clock: [shown * Math.sin(this.phase), shown * Math.cos(this.phase)],
       command: [...this.desired, ...this.motion],
+      ...this.direction?.observe(),
     };
   }
 

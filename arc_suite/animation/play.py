@@ -1,7 +1,7 @@
 """Pages to play in: MuJoCo steps a body in the browser, and a policy follows keys, sticks and touch.
 
 A page is one HTML file with nothing to fetch. `make web` builds its scripts, with three.js and MuJoCo's own
-WebAssembly; the law `steered` is a port to JavaScript of what Python computes, with its constants, and trained
+WebAssembly; the law `Directed` is a port to JavaScript of what Python computes, with its constants, and trained
 policies are graphs, which the page runs as they are.
 """
 
@@ -17,18 +17,24 @@ import numpy as np
 from arc_suite import models, policies
 from arc_suite.animation import pages
 from arc_suite.cpg import Demonstrator
-from arc_suite.cpg.steering import Steered
+from arc_suite.cpg.stepping import Directed
 from arc_suite.envs.setup import Setup
+from arc_suite.models import posture
+from arc_suite.models.outline import torso_box
+from arc_suite.models.standing import GRAVITY
 from arc_suite.policies import universal, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.universal import Universal
+from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 
 GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page shows
 
-_TASK = "steer"  # whose command the player gives
+_DIRECTED, _TASK = "directed", "steer"  # whose command the player gives, to demonstrators and to others
 _BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that a page can observe
+_CLEAR = 0.15  # standing heights of a torso in its lowest pose over the ground
+_OWN = "own"  # the gait that a body has by itself
 
 
 def page(creatures: Sequence[Mapping[str, Any]]) -> str:
@@ -66,7 +72,8 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         ValueError: a policy or preset that a page cannot run, or that does not fit the body.
         OSError: a policy's file cannot be read.
     """
-    steer = Setup.of(body, _TASK).definition
+    setup = Setup.of(body, _DIRECTED if policy == "cpg" else _TASK)
+    steer = setup.definition
     if policy == "cpg":
         task, driver = steer, _law(steer, preset or "steered")
     else:
@@ -75,16 +82,16 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         "name": body.name,
         "timestep": steer.scene.control_timestep / steer.scene.substeps,
         "substeps": steer.scene.substeps,
-        "grounds": {name: _ground(body, arena) for name, arena in GROUNDS.items()},
+        "grounds": {name: _ground(setup, arena) for name, arena in GROUNDS.items()},
         "task": pages.plain(_task(task, steer), digits=None),
         "policy": pages.plain(driver, digits=None),
     }
 
 
-def _ground(body: Body, arena: str) -> dict[str, Any]:
+def _ground(setup: Setup, arena: str) -> dict[str, Any]:
     """The MJCF of a body in an arena, with the integrator of simulations, and where the body starts."""
-    task, model = Setup.of(body, _TASK, {"arena": arena}).prepared()
-    text = models.text(body, task.scene.arena)
+    task, model = Setup.of(setup.body, setup.task, {"arena": arena}).prepared()
+    text = models.text(setup.body, task.scene.arena)
     if model.opt.integrator == mujoco.mjtIntegrator.mjINT_EULER:
         text = text.replace('integrator="implicitfast"', 'integrator="Euler"')
     data = mujoco.MjData(model)
@@ -119,12 +126,38 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
+        "direction": _direction(task) if "pose" in task.commands else None,
     }
+
+
+def _direction(task: Task) -> dict[str, Any]:
+    """What a page computes of pose and gait, and what the player chooses from; see web/direction.js and panel.js."""
+    body, own, reference = task.scene.body, task.parameters, task.context.reference  # type: ignore[attr-defined]
+    made = {name: gaits.gait(body, name) for name in gaits.fitting(body)}
+    return {
+        "glide": reference.glide,
+        "step": reference.step,
+        "rate": (body.torso.standing_height / GRAVITY) ** 0.5 / reference.step,
+        "names": posture.NAMES,
+        "room": _room(body),
+        "frequency": own.gait_frequency,
+        "gaits": {
+            _OWN: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
+            **{name: [*gait.offsets, gait.duty_factor] for name, gait in made.items()},
+        },
+    }
+
+
+def _room(body: Body) -> np.ndarray:
+    """How far each number of a pose can go, (6, 2), without the torso on the ground."""
+    room, lying = posture.room(body, planted=False).copy(), -torso_box(body)[0][2] / body.torso.standing_height
+    room[0] = room[0].clip(min(0.0, lying + _CLEAR - posture.rest(body).ride))
+    return room.round(2)
 
 
 def _law(task: Task, preset: str) -> dict[str, Any]:
     law = Demonstrator(task, preset).law
-    if not isinstance(law, Steered):
+    if not isinstance(law, Directed):
         raise ValueError(
             f"preset {preset!r}: a page runs steered, surefooted or reactive, which follow a command by joint angles"
         )

@@ -108,34 +108,6 @@ class Steered(CommandLaw):
         now, later = (request.size * numpy.concatenate(targets, axis=-1) for targets in (now, later))
         return none, self.neutral + now, later - now
 
-    def constants(self) -> dict:
-        """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
-        p, cycles = self.parameters, self.cycles
-        legs = [
-            leg._asdict() | {"damping": _damping(leg), "offset": offset}
-            for leg, offset in zip(self.legs, self.offsets, strict=True)
-        ]
-        return {
-            "legs": legs,
-            "feet": self.feet,
-            "neutral": self.neutral,
-            **self.drive._asdict(),
-            "units": self.units,
-            "gain": p.gain,
-            "smoothing": self.smoothing,
-            "integral": p.integral * cycles,
-            "onset": self.onset,
-            "cycles": cycles,
-            "duty_factor": self.duty_factor,
-            "half_stance": 0.5 * self.stance,
-            "height": self.pose.height,
-            "attitude": p.attitude,
-            "unload": p.unload / p.lift,
-            "across": _ACROSS,
-            "level": p.level,
-            "step": self.step,
-        }
-
     def _legs(self):
         low, high = _ranges(self.body) - self.neutral
         first = 0

@@ -22,6 +22,7 @@ from arc_suite.tasks.contract import Task
 _STEPS = 3  # of inverse kinematics in a control step
 _MOST_OFF = 0.2  # standing heights or rad, by which feedback changes a pose
 _LARGEST = 0.05  # standing heights or rad, of the error that feedback adds up
+_OF_LEGS = ("mount", "turn", "axes", "ends", "radius", "joints", "moves", "low", "high")  # fields of `Legs`, of one leg
 _FEEDBACK = np.array((0, 3, 4))  # numbers of a pose that the torso shows: height, roll and pitch
 
 
@@ -157,3 +158,28 @@ class Directed(Stepping):
 
     def _eased(self, task: Task) -> tuple:
         return self._rest.legs, self._rest.places, self._rest.angles
+
+    def constants(self) -> dict:
+        """Return what the law computes with, arrays and numbers by name: all that a port to another language needs."""
+        p, cycles = self.parameters, self.cycles
+        legs = zip(*self.legs, self.places, self.angles, strict=True)
+        return {
+            "legs": [dict(zip((*_OF_LEGS, "place", "angles"), leg, strict=True)) for leg in legs],
+            **self.drive._asdict(),
+            "units": self.units,
+            "gain": p.gain,
+            "smoothing": self.smoothing,
+            "integral": p.integral * cycles,
+            "onset": self.onset,
+            "lead": p.lead,
+            "height": self.pose.height,
+            "ride": self._rest.ride,
+            "lift": self.lift,
+            "across": self.across,
+            "damping_of_feet": self._damping,
+            "steps": _STEPS,
+            "largest": _LARGEST,
+            "most_off": _MOST_OFF,
+            "rate": (GRAVITY / self.pose.height) ** 0.5,
+            "step": self.step,
+        }

@@ -20,10 +20,13 @@ from arc_suite.robots import ROBOTS, generator
 OTHERS = [imports.quadruped(), imports.hexapod(), imports.body("a1_like.urdf"), imports.with_arm()]
 BODIES = {body.name: body for body in (*ROBOTS.values(), *map(generator.random_body, range(10)), *OTHERS)}
 STEPS = 200  # 10 s for the robots, 4 s for those of others
+BOUNDING = {"leaper": 48}  # steps: as it bounds, differences grow tenfold in ten
 
-# Walks with turns, steps to either side and stops, each held as long.
+# Walks with turns, steps to either side and stops, each held as long; poses, shares of the room, and tempi of gaits.
 SCRIPT = [(1.0, 0.0, 0.0), (0.6, 0.0, 0.4), (0.0, 0.0, 0.0), (0.0, 0.5, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, -1.0)]
 SCRIPT += [(0.5, -0.25, -0.25), (0.0, 0.0, 0.0)]
+POSES = [np.zeros(6), np.eye(6)[4], -0.5 * np.eye(6)[0], 0.3 * np.eye(6)[5], np.array((0.3, 0.2, -0.2, 0.2, -0.1, 0.0))]
+TEMPI = (1.0, 0.8, 1.2)
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +36,28 @@ def script(tmp_path_factory):
 
 
 def commands(steps):
+    """What is asked for in each step: a command alone."""
     held = math.ceil(steps / len(SCRIPT))
-    return [SCRIPT[step // held] for step in range(steps)]
+    return [{"command": SCRIPT[step // held]} for step in range(steps)]
+
+
+def upright(creature, command):
+    """What is asked for by a command, in the pose at rest and in the body's own gait."""
+    constants = creature["task"]["direction"]
+    return {"command": command, "pose": [0.0] * 6, "gait": [*constants["gaits"]["own"], constants["frequency"]]}
+
+
+def directions(steps, creature):
+    """What is asked for in each step: commands, with poses within the body's room and gaits of it."""
+    constants = creature["task"]["direction"]
+    low, high = np.transpose(constants["room"])
+    numbers = [[*gait, tempo * constants["frequency"]] for gait in constants["gaits"].values() for tempo in TEMPI]
+    asked, held = commands(steps), math.ceil(steps / len(SCRIPT))
+    for step, each in enumerate(asked):
+        shares = POSES[step // (held // 2) % len(POSES)]  # they change while a command holds, and when it does
+        each["pose"] = (0.5 * np.where(shares < 0.0, -low, high) * shares).tolist()
+        each["gait"] = numbers[2 * step // held % len(numbers)]
+    return asked
 
 
 def played(setup, driver, given):
@@ -44,9 +67,9 @@ def played(setup, driver, given):
     desired = timestep.observation.get("command", np.zeros(6))[:3]
     start = {"qpos": data.qpos.tolist(), "qvel": data.qvel.tolist(), "desired": desired.tolist()}
     positions, actions, observations = [], [], []
-    for command in given:
-        if environment.task.definition.commands:
-            environment.command("command", command)
+    for asked in given:
+        for name, value in asked.items() if environment.task.definition.commands else ():
+            environment.command(name, value)
         observations.append(timestep.observation)
         timestep = environment.step(act(timestep))
         assert not timestep.last()
@@ -61,12 +84,15 @@ def assert_walks_agree(script, body, steps, preset="steered"):
     With elliptic cones the solvers of two versions of MuJoCo take other ways to its tolerance.
     """
     tolerance = 1e-6 if body.source and "elliptic" in body.source else 1e-9
-    setup, given = Setup.of(body, "steer", {"time_limit": 1e6}), commands(steps)
-    start, positions, actions, _ = played(setup, policy("cpg", body, preset, task=setup.definition), given)
-    episode = {"creature": play.creature(body, "cpg", preset), "ground": "level", "commands": given, **start}
-    (found,) = nodes.run(script, [episode])
+    setup, creature = Setup.of(body, "directed", {"time_limit": 1e6}), play.creature(body, "cpg", preset)
+    given = directions(steps, creature)
+    start, positions, actions, observations = played(setup, policy("cpg", body, preset, task=setup.definition), given)
+    (found,) = nodes.run(script, [{"creature": creature, "ground": "level", "asked": given, **start}])
     np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=tolerance)
     np.testing.assert_allclose(found["actions"], actions, rtol=0.0, atol=tolerance)
+    for block in ("gait_clock", "command", "pose", "gait"):
+        ported = [observation[block] for observation in found["observations"]]
+        np.testing.assert_allclose(ported, [each[block] for each in observations], rtol=0.0, atol=10.0 * tolerance)
     assert np.ptp(positions[:, :2], axis=0).max() > 0.2 * body.torso.standing_height  # it does walk
 
 
@@ -76,10 +102,11 @@ def assert_walks_agree(script, body, steps, preset="steered"):
     ("name", "preset", "steps"),
     [
         ("tick", "steered", 64),
+        ("leaper", "reactive", 40),
         ("random_4", "surefooted", 64),
-        ("quadruped_15_kg", "steered", 200),
-        ("hexapod_2kg", "steered", 200),
-        ("with_arm", "steered", 200),
+        ("quadruped_15_kg", "steered", 100),
+        ("hexapod_2kg", "steered", 100),
+        ("with_arm", "steered", 100),
     ],
 )
 def test_a_short_walk_is_that_of_python(script, name, preset, steps):
@@ -90,15 +117,17 @@ def test_a_short_walk_is_that_of_python(script, name, preset, steps):
 @nodes.needs_node
 @pytest.mark.parametrize("name", BODIES)
 def test_walks_of_ten_seconds_are_those_of_python(script, name):
-    assert_walks_agree(script, BODIES[name], STEPS)
+    assert_walks_agree(script, BODIES[name], BOUNDING.get(name, STEPS))
 
 
 def assert_networks_agree(script, setup, driver, name, tolerance=1e-9):
     """In states that Python went through, a network observes and does the same."""
-    given = commands(16) if setup.definition.commands else [(0.0, 0.0, 0.0)] * 16  # else they turn the course
+    given = (
+        commands(16) if setup.definition.commands else [{"command": (0.0, 0.0, 0.0)}] * 16
+    )  # else they turn the course
     start, positions, actions, observations = played(setup, driver, given)
     creature = play.creature(setup.body, name)
-    episode = {"creature": creature, "ground": "level", "commands": given, "replayed": actions.tolist(), **start}
+    episode = {"creature": creature, "ground": "level", "asked": given, "replayed": actions.tolist(), **start}
     (found,) = nodes.run(script, [episode])
     np.testing.assert_allclose(found["positions"], positions, rtol=0.0, atol=tolerance)
     for block in creature["policy"]["constants"]["blocks"]:
@@ -155,7 +184,13 @@ def test_heights_on_bumps_are_those_of_python(script):
     arena = Setup.of("tick", "steer", {"arena": "bumps"}).definition.scene.arena
     creature = play.creature(ROBOTS["tick"])
     places = np.random.default_rng(0).uniform((-20.0, -5.0), (20.0, 5.0), (40, 2))  # beyond the edges, too
-    still = {"creature": creature, "ground": "bumps", "qvel": [], "desired": [0.0] * 3, "commands": [[0.0] * 3]}
+    still = {
+        "creature": creature,
+        "ground": "bumps",
+        "qvel": [],
+        "desired": [0.0] * 3,
+        "asked": [upright(creature, [0.0] * 3)],
+    }
     pose = creature["grounds"]["bumps"]["start"][3:]
     episodes = [still | {"qpos": [*place, 1.0, *pose]} for place in places]
     heights = [path["observations"][0]["posture"][0] for path in nodes.run(script, episodes)]
@@ -171,8 +206,9 @@ def test_bodies_walk_from_their_start(script, ground):
     body, steps = ROBOTS["tick"], 100
     creature = play.creature(body)
     walk = {"qpos": creature["grounds"][ground]["start"], "qvel": [], "desired": [0.0, 0.0, 0.0]}
-    walk |= {"creature": creature, "ground": ground, "commands": [[1.0, 0.0, 0.0]] * steps}
-    over = walk | {"qpos": [0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, *walk["qpos"][7:]], "commands": [[0.0, 0.0, 0.0]] * 20}
+    walk |= {"creature": creature, "ground": ground, "asked": [upright(creature, [1.0, 0.0, 0.0])] * steps}
+    over = walk | {"qpos": [0.0, 0.0, 0.1, 0.0, 1.0, 0.0, 0.0, *walk["qpos"][7:]]}
+    over |= {"asked": [upright(creature, [0.0] * 3)] * 20}
     walked, lain = nodes.run(script, [walk, over])
     task = creature["task"]
     assert walked["positions"][-1][0] > 0.6 * steps * task["step"] * task["units"][0]

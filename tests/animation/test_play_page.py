@@ -7,8 +7,9 @@ import pytest
 import tabs
 
 from arc_suite.animation import play
-from arc_suite.robots import ROBOTS, generator
+from arc_suite.robots import ROBOTS, gaits, generator
 
+ASKED = "play.panel.asked(play.inputs.command, play.inputs.pose)"
 SIZES = [(1440, 900), (390, 844), (844, 390), (320, 256)]
 
 
@@ -18,7 +19,12 @@ pytestmark = [pytest.mark.slow, nodes.needs_viewer]
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     path = tmp_path_factory.mktemp("play") / "play.html"
-    path.write_text(play.page([play.creature(ROBOTS["tick"]), play.creature(generator.generate(6, 3))]), "utf-8")
+    bodies = [
+        play.creature(ROBOTS["tick"]),
+        play.creature(generator.generate(6, 3)),
+        play.creature(ROBOTS["queen"], "ppo"),
+    ]
+    path.write_text(play.page(bodies), "utf-8")
     return path
 
 
@@ -33,7 +39,7 @@ def opened(browser, page):
 @pytest.fixture
 def tab(opened):
     """The page, paused, with a body that has just started: tests step it without pictures."""
-    opened.evaluate("play.pause(false)")
+    opened.evaluate("play.pause(false); play.inputs.held.clear(); delete navigator.getGamepads")
     opened.select_option("#ground", "level")
     opened.select_option("#body", "0")
     opened.click("#restart")
@@ -41,8 +47,8 @@ def tab(opened):
 
 
 def advanced(tab, seconds):
-    """Positions and velocities after some seconds under the present command."""
-    tab.evaluate(f"play.state.play.advance({seconds}, play.inputs.command, Infinity)")
+    """Positions and velocities after some seconds of what is asked for."""
+    tab.evaluate(f"play.state.play.advance({seconds}, {ASKED}, Infinity)")
     return tab.evaluate("[[...play.state.play.simulation.data.qpos], [...play.state.play.simulation.data.qvel]]")
 
 
@@ -91,6 +97,77 @@ def test_keys_kick_restart_and_pause(tab):
     assert sum(value**2 for value in qvel) ** 0.5 == pytest.approx(speed)
 
 
+def posed(tab):
+    """The pose that is asked for."""
+    return tab.evaluate(f"{ASKED}.pose")
+
+
+def test_keys_and_sliders_pose(tab):
+    (low, _), *_, (_, twisted) = tab.evaluate("play.state.play.body.task.direction.room")
+    height = ROBOTS["tick"].torso.standing_height
+    (_, _, rest, *_), _ = advanced(tab, 1.0)
+    tab.keyboard.down("c")
+    assert posed(tab) == [low, 0, 0, 0, 0, 0]
+    (_, _, crouched, *_), _ = advanced(tab, 2.0)
+    assert (crouched - rest) / height == pytest.approx(low, abs=0.05)
+    tab.keyboard.up("c")
+    (_, _, again, *_), _ = advanced(tab, 2.0)
+    assert again == pytest.approx(rest, abs=0.05 * height)
+    tab.evaluate("document.getElementById('direction').open = true")
+    slider = tab.locator("#direction .sliders input").nth(5)
+    slider.focus()
+    slider.press("End")  # with the focus, arrows are the slider's, and no way to walk
+    assert tab.evaluate("play.inputs.command") == [0, 0, 0]
+    assert posed(tab) == pytest.approx([0, 0, 0, 0, 0, twisted])
+    tab.keyboard.down("v")  # not both as far as each goes
+    assert posed(tab)[5] == pytest.approx(0.5 * twisted)
+    tab.keyboard.up("v")
+    slider.evaluate("each => each.blur()")
+    tab.keyboard.press("0")
+    assert posed(tab) == [0] * 6
+    slider.scroll_into_view_if_needed()
+    slider.click(position={"x": 1, "y": 8})  # a pointer gives the keys back
+    assert posed(tab)[5] < 0 and tab.evaluate("document.activeElement === document.body")
+    tab.click("#upright")
+    assert posed(tab) == [0] * 6
+    tab.evaluate("document.getElementById('direction').open = false")
+
+
+def test_keys_and_the_list_change_the_gait(tab):
+    own = tab.evaluate(f"{ASKED}.gait")
+    names = ["own", *gaits.fitting(ROBOTS["tick"])]
+    assert tab.locator("#gait option").all_text_contents() == names
+    tab.keyboard.down("w")
+    advanced(tab, 1.0)
+    for number, name in enumerate(names[1:], start=1):
+        tab.keyboard.press(str(number))
+        gait = gaits.gait(ROBOTS["tick"], name)
+        assert tab.evaluate(f"{ASKED}.gait") == pytest.approx([*gait.offsets, gait.duty_factor, own[-1]])
+    x, _ = (advanced(tab, seconds)[0][0] for seconds in (2.0, 2.0))
+    units = tab.evaluate("play.state.play.simulation.task.direction.gait")
+    assert units[:-1] == [round(2**20 * part) for part in (*gait.offsets, gait.duty_factor)]  # it has glided there
+    tab.keyboard.press("9")  # there is none
+    tab.keyboard.press(".")
+    tab.keyboard.press(".")
+    tab.keyboard.press(",")
+    assert tab.input_value("#gait") == name
+    assert tab.evaluate(f"{ASKED}.gait")[-1] == pytest.approx(1.1 * own[-1])
+    tab.keyboard.up("w")
+    tab.keyboard.press("0")
+    assert tab.evaluate(f"{ASKED}.gait") == own
+
+
+def test_a_trained_policy_is_offered_no_pose(tab):
+    tab.select_option("#body", "2")
+    assert not tab.is_visible("#direction") and not tab.locator(".directed").first.is_visible()
+    assert tab.evaluate(ASKED) == {"command": [0, 0, 0]}
+    tab.keyboard.down("c")
+    advanced(tab, 0.2)
+    tab.keyboard.up("c")
+    tab.select_option("#body", "0")
+    assert tab.is_visible("#direction")
+
+
 def test_the_pointer_pulls(tab):
     """A body that is dragged upwards leaves the ground; elsewhere the pointer turns the view."""
     (_, _, height, *_), _ = advanced(tab, 0.5)
@@ -117,7 +194,7 @@ def test_the_pointer_pulls(tab):
 
 
 def test_bodies_and_grounds_are_chosen(tab):
-    assert tab.locator("#body option").all_text_contents() == ["tick", "walker_6x3"]
+    assert tab.locator("#body option").all_text_contents() == ["tick", "walker_6x3", "queen"]
     tab.select_option("#ground", "bumps")
     tab.keyboard.down("ArrowUp")
     heights = [advanced(tab, 1.0)[0][2] for _ in range(6)]
@@ -151,6 +228,11 @@ def test_a_gamepad_steers(tab):
     tab.evaluate("navigator.getGamepads = () => [null, { connected: true, axes: [0.05, -0.8, 0.4, 0] }]")
     forward, left, turn = tab.evaluate("play.inputs.command")
     assert (forward, left, turn) == pytest.approx((0.8 / 1.2, 0.0, -0.4 / 1.2))
+    tab.evaluate(
+        """navigator.getGamepads = () => [{ connected: true, axes: [0, 0, 0, -1],
+        buttons: Array.from({ length: 8 }, (_, button) => ({ value: button === 6 ? 0.5 : 0 })) }]"""
+    )
+    assert tab.evaluate("play.inputs.pose") == [-0.5, 0, 0, 0, -1, 0]  # a trigger, and the right stick
     tab.evaluate("delete navigator.getGamepads")
     assert tab.evaluate("play.inputs.command") == [0, 0, 0]
 
@@ -182,11 +264,15 @@ def test_everything_has_its_place(browser, page, width, height):
         assert apart, (name, other)
     covered = sum((right - left) * (bottom - top) for left, top, right, bottom in found.values())
     assert covered < 0.6 * width * height
-    for control in tab.locator("button, select").all():
+    tab.evaluate("document.getElementById('direction').open = true")
+    panel = tab.locator("#direction > div").bounding_box()
+    assert panel["x"] >= 0 and panel["y"] + panel["height"] <= height
+    for control in tab.locator("button, select, input").all():
         box = control.bounding_box()
         assert min(box["width"], box["height"]) >= 24
         named = control.evaluate("each => (each.labels?.[0] ?? each).textContent.trim()")
         assert named
+    tab.evaluate("document.getElementById('direction').open = false")
     if touch:
         box = tab.locator("#stick").bounding_box()
         x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2

@@ -10,7 +10,7 @@ const mujoco = await loadMujoco({ wasmBinary: zlib.inflateSync(fs.readFileSync(p
 
 // Positions, actions and falls at the ends of control steps, and observations before their beginnings. Actions that are
 // given are applied in place of the policy's.
-function path({ creature, ground, qpos, qvel, desired, commands, replayed }) {
+function path({ creature, ground, qpos, qvel, desired, asked, replayed }) {
   const simulation = new Simulation(mujoco, creature, creature.grounds[ground]);
   simulation.restart(qpos, qvel);
   const { data, driver, task } = simulation;
@@ -22,8 +22,8 @@ function path({ creature, ground, qpos, qvel, desired, commands, replayed }) {
     actions.push(act(observation));
     return replayed ? replayed[actions.length - 1] : actions.at(-1);
   };
-  for (const command of commands) {
-    for (let count = 0; count < creature.substeps; count += 1) simulation.substep(command);
+  for (const each of asked) {
+    for (let count = 0; count < creature.substeps; count += 1) simulation.substep(each);
     positions.push([...data.qpos]);
     falls.push(task.fell);
   }

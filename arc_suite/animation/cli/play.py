@@ -8,8 +8,8 @@
 
 The page holds MuJoCo itself and requests nothing: open it from disk, or send it. Arrows or WASD walk and turn, Q and
 E step to a side; dragging the body pulls it, space kicks it, R restarts. Bodies are chosen among those that the
-command names. The demonstrator follows the command. A policy of a task with a command, such as steer, is given the
-keys' command; one of walk keeps walking, and left and right turn its course.
+command names. The demonstrator also takes a pose and a gait, by keys and by sliders. A policy of a task with a command,
+such as steer, is given the keys' command; one of walk keeps walking, and left and right turn its course.
 """
 
 from absl import flags
