@@ -11,14 +11,19 @@ from website import markdown, returns, settings
 
 # Modules that users import, by title of their page.
 API = {
-    "Environments": ("arc_suite", "arc_suite.envs.vector", "arc_suite.envs.bodies"),
+    "Environments": ("arc_suite", "arc_suite.envs.vector", "arc_suite.envs.bodies", "arc_suite.envs.pixels"),
     "Demonstrators and policies": ("arc_suite.cpg", "arc_suite.policies"),
     "Evaluation": ("arc_suite.evaluation", "arc_suite.evaluation.published"),
     "Style": ("arc_suite.style", "arc_suite.style.metrics"),
     "Datasets and export": ("arc_suite.data", "arc_suite.animation.clips"),
     "Bodies": ("arc_suite.robots.spec", "arc_suite.robots.spec_files", "arc_suite.robots.generator"),
     "Gaits and shapes": ("arc_suite.robots.gaits", "arc_suite.robots.shaping", "arc_suite.models.families"),
-    "Tasks": ("arc_suite.tasks.contract", "arc_suite.tasks.modifiers", "arc_suite.tasks.terms"),
+    "Tasks": (
+        "arc_suite.tasks.contract",
+        "arc_suite.tasks.modifiers",
+        "arc_suite.tasks.terms",
+        "arc_suite.tasks.privileged",
+    ),
     "Arenas": ("arc_suite.arenas.arena",),
     "Studies": ("arc_suite.learning.studies.tables",),
 }
