@@ -24,6 +24,8 @@ from arc_suite.tasks.readings import component
 from arc_suite.tasks.sensors import FAR
 
 BAND = 0.75  # of the command, and of half of the unit at least: the error at which tracking earns nothing
+RANGES = ((-0.5, 1.0), (-0.5, 0.5), (-1.0, 1.0))  # of commands that are drawn: forward, left and turning
+DIRECTIONS, FARTHEST = ("forward", "left", "turning"), 10.0  # names of these, and bound of what may be drawn
 COMMANDS, SHORTEST, LONGEST = 17, 60, 161  # of a schedule, and control steps that each is held
 
 GOALS = 16  # of a chain; after the last one the way leads back
@@ -93,6 +95,10 @@ class Command(ABC):
         """Return the blocks that it adds to the observation, by name."""
         return {}
 
+    def schedule(self, random: np.random.RandomState, share: float) -> "Scheduled":
+        """Draw a schedule, which every command does; `share` says how far a curriculum has widened its ranges."""
+        return draw_schedule(random)
+
     @abstractmethod
     def start(self, context: Context, random: np.random.RandomState, schedule: "Scheduled") -> Any:
         """Return the memory at the start; see `CommandTask.start` for the order of draws."""
@@ -130,7 +136,7 @@ class Command(ABC):
         """Return the velocity (..., 3) that holds at a place after control steps (...)."""
 
     @abstractmethod
-    def follow(self, context: Context, memory, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory, steps, before, place, motion, readings, stepped) -> Followed:
         """Return the command after a control step.
 
         Args:
@@ -141,6 +147,7 @@ class Command(ABC):
             place: (..., 3) the place after it.
             motion: (..., 3) mean velocity of the torso.
             readings: after the step.
+            stepped: (...) share of the feet that followed the contact schedule.
         """
 
     def resampled(self, memory, steps) -> Any:
@@ -151,9 +158,17 @@ class Command(ABC):
         """Return the memory with a live command (..., 3) in place of the task's own where it is not NaN."""
         return memory._replace(live=value)
 
-    def terms(self, memory, followed, upright) -> dict:
-        """Return the bonuses for following, given the step's tracking (...) and the cosine (...) of the tilt."""
-        return {"progress": _bounded(memory.gained) * upright, "tracking": followed}
+    def terms(self, memory, followed, upright, stepped) -> dict:
+        """Return the bonuses for following.
+
+        Args:
+            memory: of the command, after the step.
+            followed: (...) tracking of the step.
+            upright: (...) cosine of the torso's tilt.
+            stepped: (...) share of the feet that followed the contact schedule.
+        """
+        earned = {"progress": _bounded(memory.gained) * upright, "tracking": followed}
+        return {**earned, "obedient_gait": followed * stepped}
 
     def observe(self, context: Context, memory) -> dict:
         """Return the blocks that it adds to the observation."""
@@ -202,19 +217,24 @@ class Scheduled(NamedTuple):
     gained: np.ndarray
 
 
-def draw_schedule(random: np.random.RandomState) -> Scheduled:
-    """Draw how long each command is held, then the commands."""
+def draw_schedule(random: np.random.RandomState, ranges=RANGES) -> Scheduled:
+    """Draw how long each command is held, then the commands between ranges (3, 2)."""
     ends = random.randint(SHORTEST, LONGEST, COMMANDS).cumsum()
-    schedule = np.array([draw_command(random) for _ in range(COMMANDS)])
+    schedule = np.array([draw_command(random, ranges) for _ in range(COMMANDS)])
     return Scheduled(ends, schedule, np.full(3, np.nan), np.float64(0.0))
 
 
-def draw_command(random: np.random.RandomState) -> np.ndarray:
-    """Draw a command (3,): mostly forward, some turning or sideways, one in ten a stop; always six draws."""
-    command = random.uniform((-0.5, -0.5, -1.0), (1.0, 0.5, 1.0))
+def draw_command(random: np.random.RandomState, ranges=RANGES) -> np.ndarray:
+    """Draw a command (3,): mostly forward, some turning or sideways, one in ten a stop; always six draws.
+
+    Speed and turning, as shares of the farthest of their ranges (3, 2) or of 1, are at most 1 together.
+    """
+    low, high = np.transpose(ranges)
+    command = random.uniform(low, high)
     sideways, turns, goes = random.uniform(size=3) < (0.5, 0.7, 0.95)
     command = command * (1.0, sideways, turns)
-    size = np.hypot(command[0], command[1]) + abs(command[2])
+    fast, quick = max(1.0, *np.abs(ranges[:2]).flat), max(1.0, *np.abs(ranges[2]))
+    size = np.hypot(command[0], command[1]) / fast + abs(command[2]) / quick
     return command / max(size, 1.0) * (goes and size >= 0.2)
 
 
@@ -243,7 +263,29 @@ def _product(one, other):
 
 @dataclasses.dataclass(frozen=True)
 class Schedule(Command):
-    """Commands that are drawn for the episode, each held for some seconds; stops are among them."""
+    """Commands that are drawn for the episode, each held for some seconds; stops are among them.
+
+    Attributes:
+        commands: ranges that replace some of `RANGES`, by the names in `DIRECTIONS`, in units of the command.
+    """
+
+    commands: tuple[tuple[float, float], ...] = RANGES
+
+    settings: ClassVar[tuple[str, ...]] = ("commands",)
+
+    def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> Self:
+        """Return the schedule with checked ranges in place of its own."""
+        ranges = dict(zip(DIRECTIONS, self.commands, strict=True))
+        for name, span in checks.mapping("commands", overrides.get("commands")).items():
+            checks.name(name, DIRECTIONS, "command")
+            ranges[name] = checks.span(f"commands[{name!r}]", span, -FARTHEST, FARTHEST)
+        return dataclasses.replace(self, commands=tuple(ranges.values()))
+
+    def schedule(self, random: np.random.RandomState, share: float) -> Scheduled:
+        """Draw a schedule between the ranges, as far as a curriculum has widened them."""
+        if share == 1.0:
+            return draw_schedule(random, self.commands)
+        return draw_schedule(random, np.array(RANGES) + share * np.subtract(self.commands, RANGES))
 
     def start(self, context: Context, random, schedule: Scheduled) -> Scheduled:
         """Return the drawn schedule."""
@@ -254,7 +296,7 @@ class Schedule(Command):
         numpy = memory.ends.__array_namespace__()
         return numpy.where(numpy.isnan(memory.live), held(memory.ends, memory.schedule, steps), memory.live)
 
-    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Scheduled, steps, before, place, motion, readings, stepped) -> Followed:
         """Return the command after a control step, and how far the motion reaches in its direction."""
         desired = self.desired(context, memory, steps, place)
         memory = memory._replace(gained=along(desired, motion))
@@ -299,7 +341,7 @@ class AlongLane(Command):
         along = numpy.stack([numpy.cos(heading), -numpy.sin(heading), turn], axis=-1)
         return numpy.where(numpy.isnan(memory.live), along, memory.live)
 
-    def follow(self, context: Context, memory: Live, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Live, steps, before, place, motion, readings, stepped) -> Followed:
         """Return the command after a control step, and the distance."""
         desired = self.desired(context, memory, steps, place)
         displacement = component(place, 0) - component(before, 0)
@@ -390,7 +432,7 @@ class ToGoal(Command):
         goal, numpy = memory.to_goal, memory.goals.__array_namespace__()
         return at_goal(numpy.arctan2(goal[..., 1], goal[..., 0]))
 
-    def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Chain, steps, before, place, motion, readings, stepped) -> Followed:
         """Return the command after a control step: progress to the goal, and the next goal where it is reached."""
         numpy, unit = place.__array_namespace__(), context.arena.unit
         far = numpy.hypot(memory.to_goal[..., 0], memory.to_goal[..., 1])
@@ -407,9 +449,10 @@ class ToGoal(Command):
         )
         return Followed(memory, self.desired(context, memory, steps, place), _bounded(memory.gained), arrived)
 
-    def terms(self, memory: Chain, followed, upright) -> dict:
+    def terms(self, memory: Chain, followed, upright, stepped) -> dict:
         """Return the bonuses for progress to the goal and for reaching it."""
-        return {"progress": _bounded(memory.gained) * upright, "goal": memory.arrived * 1.0}
+        earned = {"progress": _bounded(memory.gained) * upright, "goal": memory.arrived * 1.0}
+        return {**earned, "obedient_gait": followed * stepped}
 
     def observe(self, context: Context, memory: Chain) -> dict:
         """Return cosine and sine of the goal's bearing, and its distance."""

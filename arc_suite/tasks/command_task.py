@@ -23,7 +23,7 @@ from arc_suite.tasks import blocks, clock, energy, mirrors, parameters, terms
 from arc_suite.tasks import readings as reading
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.clock import Clock
-from arc_suite.tasks.command import Command, draw_schedule
+from arc_suite.tasks.command import Command
 from arc_suite.tasks.context import Context
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.ground import Ground, Level
@@ -248,7 +248,7 @@ class CommandTask(Task):
         qpos, qvel = self.settings.noise.drawn(ground.pose(self.scene), random)
         qpos[:2] += displacement
         qpos[3:7] = rotations.turned(qpos[3:7], random.uniform(-self.yaw, self.yaw))
-        schedule = draw_schedule(random)
+        schedule = self.settings.command.schedule(random, ground.share(ground_memory))
         ground_memory, obstacles = ground.obstacles(context, random, ground_memory)
         command_memory = self.settings.command.start(context, random, schedule)
         still, zero = np.zeros(len(self.scene.body.joint_names)), np.float64(0.0)
@@ -303,7 +303,8 @@ class CommandTask(Task):
         schedule_errors = clock.schedule_errors(readings.foot_heights, self.parameters.stance_threshold, stance)
         health = self.health.after(context, memory.health, readings, steps, asked.crouch(command))
         motion = self._motion(core, place)
-        followed = asked.follow(context, command, steps, core.place, place, motion, readings)
+        stepped = 1.0 - schedule_errors / self.parameters.feet
+        followed = asked.follow(context, command, steps, core.place, place, motion, readings, stepped)
         ground = self.settings.ground.after(context, memory.ground, place, readings, followed.arrived)
         core = Core(
             steps=steps,
@@ -345,16 +346,16 @@ class CommandTask(Task):
         `transport` is the cost of transport of a step at the target velocity; its weight is 0.
         """
         core, command, height, feet = memory.core, self.settings.command, self.context.height, self.parameters.feet
+        stepped = 1.0 - core.schedule_errors / feet
         default = command.default_angles(self.context, memory.command, self.parameters.default_angles)
         costs = terms.costs(readings, core.action, core.previous_action, core.schedule_errors, default)
         return {
             **costs,
             "angular_velocity": costs["angular_velocity"] * (height / GRAVITY),
             "vertical_velocity": costs["vertical_velocity"] / (GRAVITY * height),
-            "obedient_gait": core.followed * (1.0 - core.schedule_errors / feet),
             "transport": core.energy.step / self.context.pace,
             **self.health.terms(memory.health),
-            **command.terms(memory.command, core.followed, memory.health.upright),
+            **command.terms(memory.command, core.followed, memory.health.upright, stepped),
         }
 
     def observe(self, memory: CommandTaskMemory, readings: Sensed) -> dict:

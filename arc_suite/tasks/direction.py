@@ -31,6 +31,7 @@ _TEMPI = (0.8, 1.2)  # of the frequencies that are drawn, multiples of the presc
 _SHARE = 0.5  # of the numbers of a pose that are drawn; others are 0
 _SPEED = 0.25  # at which a pose glides, standing heights or rad a sqrt(h / g)
 _LEAST = 0.1  # standing heights or rad: a pose as far from the rest is judged as strictly as any nearer one
+_UNTIMED = 0.7  # share of the feet that follow a contact schedule by chance, when a body walks in another gait
 _DUTIES = (0.05, 0.95)
 _FASTEST = 0.25  # cycles a control step
 
@@ -76,7 +77,7 @@ class Reference(NamedTuple):
 _Directed = NamedTuple(
     "_Directed",
     [(field, np.ndarray) for field in (*Scheduled._fields, "pose_ends", "poses", "live_pose", "gait_ends", "gaits")]
-    + [(field, np.ndarray) for field in ("live_gait", "pose", "gait", "phase", "off", "posed", "all_posed")],
+    + [(field, np.ndarray) for field in ("live_gait", "pose", "gait", "phase", "off", "posed", "all_posed", "stepped")],
 )
 
 
@@ -96,6 +97,7 @@ class Directed(_Directed):
         off: (..., 6) by which the torso is off the pose that holds, a leaky mean over a cycle of the prescribed gait.
         posed: (...) how well the latest step kept the pose, 0 to 1.
         all_posed: (...) sum of `posed` over the steps.
+        stepped: (...) share of the feet that follow the contact schedule, a leaky mean over the same cycle.
     """
 
     __slots__ = ()
@@ -117,16 +119,17 @@ class Direction(Schedule):
     poses: float = 0.6
     gaits: tuple[str, ...] | None = None
 
-    settings: ClassVar[tuple[str, ...]] = ("poses", "gaits")
+    settings: ClassVar[tuple[str, ...]] = ("commands", "poses", "gaits")
     sees_feet: ClassVar[bool] = True
 
     def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> "Direction":
         """Return the direction with checked settings in place of its own."""
+        asked = super().with_settings(body, overrides)
         names = _listed(overrides.get("gaits", self.gaits))
         if names is not None:
             names = tuple(checks.name(name, gaits.fitting(body), "gait") for name in names)
         return dataclasses.replace(
-            self, poses=checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0), gaits=names
+            asked, poses=checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0), gaits=names
         )
 
     def live(self, body: Body) -> dict[str, int]:
@@ -189,6 +192,7 @@ class Direction(Schedule):
             off=still,
             posed=zero,
             all_posed=zero,
+            stepped=np.float64(1.0),
         )
 
     def stepped(self, context: Context, memory: Directed, steps, going) -> Directed:
@@ -204,14 +208,15 @@ class Direction(Schedule):
         phase = (memory.phase + gait[..., -1] * going) % CYCLE
         return memory._replace(pose=pose, gait=gait, phase=phase)
 
-    def follow(self, context: Context, memory: Directed, steps, before, place, motion, readings) -> Followed:
+    def follow(self, context: Context, memory: Directed, steps, before, place, motion, readings, stepped) -> Followed:
         """Return the command after a control step, and how well the torso keeps its pose."""
         numpy = motion.__array_namespace__()
         leaks = numpy.asarray(context.leak)[..., None]
         off = (1.0 - leaks) * memory.off + leaks * (measured(context, readings) - memory.pose)
         posed = kept(memory.pose[..., :3], off[..., :3]) * kept(memory.pose[..., 3:], off[..., 3:])
-        memory = memory._replace(off=off, posed=posed, all_posed=memory.all_posed + posed)
-        return super().follow(context, memory, steps, before, place, motion, readings)
+        stepped = (1.0 - context.leak) * memory.stepped + context.leak * stepped
+        memory = memory._replace(off=off, posed=posed, all_posed=memory.all_posed + posed, stepped=stepped)
+        return super().follow(context, memory, steps, before, place, motion, readings, stepped)
 
     def resampled(self, memory: Directed, steps) -> Any:
         """Return whether (...) another drawn velocity, pose or gait holds since step `steps`, unless live."""
@@ -263,9 +268,13 @@ class Direction(Schedule):
         turned = (reference.turns * memory.pose[..., None, :]).sum(axis=-1)
         return default_angles + reference.angles + turned
 
-    def terms(self, memory: Directed, followed, upright) -> dict:
-        """Return the bonuses of a velocity, and that for keeping the pose meanwhile."""
-        return {**super().terms(memory, followed, upright), "obedient_pose": followed * memory.posed}
+    def terms(self, memory: Directed, followed, upright, stepped) -> dict:
+        """Return the bonuses for the velocity, and that for following it in the pose and the gait."""
+        earned = super().terms(memory, followed, upright, stepped)
+        in_gait = ((memory.stepped - _UNTIMED) / (1.0 - _UNTIMED)).clip(0.0)
+        return {name: earned[name] for name in ("progress", "tracking")} | {
+            "obedience": followed * memory.posed * in_gait
+        }
 
     def observe(self, context: Context, memory: Directed) -> dict:
         """Return the pose and the gait that hold."""

@@ -95,6 +95,10 @@ class Ground:
         """Draw where the body starts: return the memory, and the displacement of the start, x and y, m."""
         return Nothing(), (0.0, 0.0)
 
+    def share(self, memory) -> float:
+        """Return how far a curriculum has widened the ranges of commands, from 0 to 1."""
+        return 1.0
+
     def obstacles(self, context: Context, random: np.random.RandomState, memory) -> tuple[Any, np.ndarray | None]:
         """Draw where obstacles stand: return the memory, and their positions (n, 3), m; None where there are none."""
         return memory, None
@@ -122,40 +126,6 @@ class Ground:
     def stream_state(self, memory, outcome, fell) -> Any:
         """Return what the next episode of the stream starts from."""
         return None
-
-
-@dataclasses.dataclass(frozen=True)
-class Level(Ground):
-    """Any arena that a caller chooses, flat ground by default.
-
-    Attributes:
-        start: "standing", or "belly": the body begins with its torso on the ground.
-    """
-
-    start: str = STARTS[0]
-
-    @property
-    def settings(self) -> tuple[str, ...]:
-        """The name of the field that a caller may set."""
-        return ("start",)
-
-    def with_settings(self, overrides: Mapping[str, Any]) -> "Level":
-        """Return the ground with a checked start."""
-        return Level(checks.name(overrides.get("start", self.start), STARTS, "start"))
-
-    @property
-    def lies(self) -> bool:
-        """Whether a body starts with its torso on the ground."""
-        return self.start == "belly"
-
-    def pose(self, scene) -> np.ndarray:
-        """Return the pose of the start, lying or standing."""
-        if not self.lies:
-            return scene.standing
-        (height, angles), qpos = posture.belly(scene.body), scene.standing.copy()
-        qpos[2] = height
-        qpos[scene.layout.joint_angles] += angles
-        return qpos
 
 
 class Stream(NamedTuple):
@@ -215,6 +185,96 @@ def next_level(stream: Stream, stays, other, down: float, up: float):
     fallen = numpy.where(stream.outcome < down, (level - 1).clip(0), level)
     returns = stream.visited & ~goes_on
     return numpy.where(returns, highest, numpy.where(rises, risen, fallen)), starts | goes_on
+
+
+class Widened(NamedTuple):
+    """Memory of level ground with a curriculum.
+
+    Attributes:
+        level: (...) of the curriculum.
+        visits: (...) whether the level is any one in place of the highest.
+    """
+
+    level: np.ndarray
+    visits: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class Level(Ground):
+    """Any arena that a caller chooses, flat ground by default.
+
+    Attributes:
+        start: "standing", or "belly": the body begins with its torso on the ground.
+        curriculum: whether the ranges of commands widen from the usual ones to those that are asked for.
+        level: at which a curriculum begins.
+        thresholds: outcomes below and above which its level falls and rises.
+    """
+
+    start: str = STARTS[0]
+    curriculum: bool = False
+    level: int = 0
+    thresholds: tuple[float, float] = (0.25, 0.5)
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """The names of the fields that a caller may set."""
+        return ("start", *CURRICULUM)
+
+    def with_settings(self, overrides: Mapping[str, Any]) -> Self:
+        """Return the ground with checked settings."""
+        start = checks.name(overrides.get("start", self.start), STARTS, "start")
+        curriculum = checks.boolean("curriculum", overrides.get("curriculum", self.curriculum))
+        level = checks.integer("level", overrides.get("level", self.level), 0, LEVELS - 1)
+        for name, given in (
+            ("curriculum", curriculum and not overrides.get("commands")),
+            ("level", level and not curriculum),
+        ):
+            if given:
+                wanted = "commands, whose ranges it widens" if name == "curriculum" else "curriculum=True"
+                raise ValueError(f"{name}: expected with {wanted}, got {overrides[name]}")
+        return dataclasses.replace(self, start=start, curriculum=curriculum, level=level)
+
+    @property
+    def adapts(self) -> bool:
+        """Whether there is a curriculum."""
+        return self.curriculum
+
+    def first(self) -> Stream | None:
+        """Return the level at which a stream begins."""
+        return Stream(self.level, np.nan, False) if self.curriculum else None
+
+    def place(self, context: Context, random: np.random.RandomState, stream):
+        """Draw the level of a curriculum, in two draws; the body starts at the origin."""
+        if not self.curriculum:
+            return super().place(context, random, stream)
+        level, visits = next_level(stream, random.uniform(), random.randint(LEVELS), *self.thresholds)
+        return Widened(int(level), visits), (0.0, 0.0)
+
+    def share(self, memory) -> float:
+        """Return how far the ranges of commands are widened, from 0 to 1."""
+        return memory.level / (LEVELS - 1.0) if self.curriculum else 1.0
+
+    def progress(self, memory) -> dict:
+        """Return the `level` of a curriculum."""
+        return {"level": memory.level * 1.0} if self.curriculum else {}
+
+    def stream_state(self, memory, outcome, fell) -> Stream | None:
+        """Return what the next level follows from."""
+        return Stream(memory.level, outcome, fell, memory.visits) if self.curriculum else None
+
+    @property
+    def lies(self) -> bool:
+        """Whether a body starts with its torso on the ground."""
+        return self.start == "belly"
+
+    def pose(self, scene) -> np.ndarray:
+        """Return the pose of the start, lying or standing."""
+        if not self.lies:
+            return scene.standing
+        (height, angles), qpos = posture.belly(scene.body), scene.standing.copy()
+        qpos[2] = height
+        qpos[scene.layout.joint_angles] += angles
+        return qpos
 
 
 @dataclasses.dataclass(frozen=True)

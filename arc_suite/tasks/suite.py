@@ -36,11 +36,10 @@ class Directed(CommandTask):
     name, command, from_body = "directed", Direction(), _STACKED
     demonstrators = ("balanced", "steered")
     weights: ClassVar[Mapping[str, float]] = {
-        "progress": 0.5,
-        "tracking": 1.0,
+        "progress": 0.25,
+        "tracking": 0.25,
         "healthy": 1.0,
-        "obedient_gait": 1.0,
-        "obedient_pose": 1.0,
+        "obedience": 3.0,
         **COSTS,
     }
 

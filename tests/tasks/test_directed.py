@@ -40,7 +40,7 @@ def test_a_walk_keeps_the_pose(command):
     timestep = walk(120)
     assert_allclose(timestep.observation["pose"], pose)
     off = environment.task.memory.command.off
-    assert abs(off[[0, 3, 4]]).max() <= 0.01 and environment.task.terms["obedient_pose"] >= 0.7
+    assert abs(off[[0, 3, 4]]).max() <= 0.01 and environment.task.memory.command.posed >= 0.7
     assert timestep.observation["posture"][0] == pytest.approx(0.18 * (0.71 - 0.2), abs=0.003)
 
 

@@ -1,4 +1,4 @@
-"""Motions in which nobody walks, from the pose at rest: a breath, a blow, a rise from the belly, a death."""
+"""Motions in which nobody walks, from the pose at rest: a breath, a lean, a blow, a rise from the belly, a death."""
 
 import copy
 import math
@@ -10,7 +10,7 @@ from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
 from arc_suite.animation.clips.root_motion import Motion, Pose, standing
 from arc_suite.cpg.drives import drive
-from arc_suite.models import sizing
+from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import solid_corners
 from arc_suite.models.standing import posed, stood
@@ -28,6 +28,8 @@ _BREATH = 0.012  # of the standing height, by which the torso sinks and rises
 _ASTRAY = 0.01  # of the standing height: a breath is shallower where a sole would be further from its place
 _PERIOD = 12.0  # sqrt(h / g): about a breath, which takes longer the larger the animal
 _ROUNDS = 50  # of the search for joint angles
+_TURN, _OF_ROOM, _LEAST_TURN = 0.2, 0.8, 0.03  # rad, that a torso turns, at most a share of its room, and at least
+_EASE, _SHOWN = 3.0, 4.0  # durations of a turn, and of the pose after it
 _WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a sole's place: legs of two joints slide rather than sink
 _DAMPING = 0.02  # of the standing height
 
@@ -159,6 +161,33 @@ def _driven(body: Body, rest: Pose, targets: np.ndarray, push: float = 0.0, damp
     return Recording(model.opt.timestep, sized.simulation.substeps, readings.pose(np.stack(moved), layout))
 
 
+def turned(body: Body, rest: Pose, number: str, sign: float) -> Motion:
+    """Return how a torso turns over its feet, stays so, and turns back.
+
+    Args:
+        body: the spec.
+        rest: pose from which it turns.
+        number: of the pose that changes; see `posture.NAMES`.
+        sign: of the change.
+
+    Raises:
+        ValueError: the legs have no room for it.
+    """
+    place = posture.NAMES.index(number)
+    bounds = posture.room(body, planted=False)[place]
+    size = min(_TURN, _OF_ROOM * abs(bounds[int(sign > 0.0)]))
+    if size < _LEAST_TURN:
+        raise ValueError(f"the legs leave the torso no room to {number}")
+    eased = _eased(_steps(body, _EASE))
+    share = np.concatenate([eased, np.ones(_steps(body, _SHOWN)), eased[::-1], [0.0]])
+    poses = sign * size * share[:, None] * np.eye(6)[place]
+    joints, _ = over_feet(body, rest, poses)
+    half = 0.5 * poses[:, 3:]
+    quaternions = np.concatenate([np.cos(half.sum(axis=-1, keepdims=True)), np.sin(half)], axis=-1)  # about one axis
+    motion = held(rest, len(poses) - 1, sizing.control_timestep(body))
+    return motion._replace(joints=joints, quaternions=rotations.product(quaternions, motion.quaternions))
+
+
 def sunk(body: Body, rest: Pose, depths: np.ndarray) -> tuple[np.ndarray, float]:
     """Return joint angles (samples, joints), rad, that keep soles in place while the torso sinks, and their error, m.
 
@@ -167,12 +196,25 @@ def sunk(body: Body, rest: Pose, depths: np.ndarray) -> tuple[np.ndarray, float]
         rest: pose from which it sinks.
         depths: (samples,) m.
     """
+    poses = np.zeros((len(depths), 6))
+    poses[:, 0] = -depths / body.torso.standing_height
+    return over_feet(body, rest, poses)
+
+
+def over_feet(body: Body, rest: Pose, poses: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return joint angles (samples, joints), rad, that keep soles in place under a posed torso, and their error, m.
+
+    Args:
+        body: the spec.
+        rest: pose from which the torso moves.
+        poses: (samples, 6) from there; see `posture`.
+    """
+    height, frame = body.torso.standing_height, rotations.matrix(rest.quaternion)
     legs = Legs.of(body, used=1.0)
     angles = legs.by_leg(rest.joints)
     # A joint at rest may be a little beyond its range, as limits are soft.
     legs = legs._replace(low=np.minimum(legs.low, angles), high=np.maximum(legs.high, angles))
-    up = rotations.matrix(rest.quaternion)[2]  # the world's, as the torso sees it
-    goals = legs.soles(angles)[0] + depths[:, None, None] * up
-    angles = np.tile(angles, (len(depths), 1, 1))
-    angles = legs.reached(angles, goals, _WEIGHTS, _DAMPING * body.torso.standing_height, _ROUNDS)
+    goals = posture.moved(legs.soles(angles)[0] @ frame.T, poses, height) @ frame
+    angles = np.tile(angles, (len(poses), 1, 1))
+    angles = legs.reached(angles, goals, _WEIGHTS, _DAMPING * height, _ROUNDS)
     return legs.by_joint(angles), float(abs(legs.soles(angles)[0] - goals).max())

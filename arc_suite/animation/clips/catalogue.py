@@ -1,5 +1,6 @@
 """The clips that a body can have, by name."""
 
+import functools
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -14,10 +15,12 @@ class WalkLoop(NamedTuple):
     Attributes:
         command: forward, left and turning, in units of the task: the body's own speed.
         failing: index of a leg whose motors fail; None for a sound body.
+        crouch: by which the torso is lowered, standing heights, as far as the legs fold.
     """
 
     command: tuple[float, float, float]
     failing: int | None = None
+    crouch: float = 0.0
 
 
 class Passage(NamedTuple):
@@ -37,7 +40,7 @@ class Idle(NamedTuple):
 
 
 class Acted(NamedTuple):
-    """A motion simulated from rest.
+    """A motion from rest, simulated or drawn.
 
     Attributes:
         play: makes it of the body and its pose at rest.
@@ -75,6 +78,11 @@ CLIPS: dict[str, WalkLoop | Passage | Idle | Acted | Showcase] = {
     "start": Passage(starts=True, cycles=3),
     "stop": Passage(starts=False, cycles=3),
     "idle": Idle(),
+    "crouch_walk": WalkLoop((0.6, 0.0, 0.0), crouch=0.3),
+    "lean_left": Acted(functools.partial(acting.turned, number="roll", sign=-1.0), (0, -1)),
+    "lean_right": Acted(functools.partial(acting.turned, number="roll", sign=1.0), (0, -1)),
+    "look_up": Acted(functools.partial(acting.turned, number="pitch", sign=-1.0), (0, -1)),
+    "look_down": Acted(functools.partial(acting.turned, number="pitch", sign=1.0), (0, -1)),
     "hit": Acted(acting.hit, (0, -1)),
     "limp": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "rise": Acted(acting.rise, (-1,)),

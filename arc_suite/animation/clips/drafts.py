@@ -118,7 +118,7 @@ def _recording(recorder: Recorder, source: str) -> Recorded | Transition:
     spec = cast(WalkLoop | Showcase, CLIPS[source])  # `sources` names no others
     if isinstance(spec, Showcase):
         return recorder.showcase(spec.preset)
-    return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(spec.command, spec.failing)
+    return recorder.alone() if source == "walk" and not recorder.follows else recorder.walk(*spec)
 
 
 def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: float, left_out) -> dict[str, Draft]:

@@ -8,12 +8,14 @@ from arc_suite.animation.clips import loops
 from arc_suite.animation.clips.recordings import Recording, record
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
+from arc_suite.models import posture
 from arc_suite.policies import policy as named_policy
 from arc_suite.tasks.fitting import velocity_units
 
 _SETTLE = 200  # control steps, after which starts and changes of command are forgotten
 _LONG = 700  # control steps without a command: a speed that varies is that of most of an episode
 _CYCLES = 20  # of the gait in a recording under a command, to choose loops from
+_OF_ROOM, _LEAST_CROUCH = 0.7, 0.05  # share of the room in which a body crouches, and least crouch, standing heights
 _BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
 
 
@@ -88,19 +90,23 @@ class Recorder:
         self.units = velocity_units(self.body, task.parameters.target_velocity) if self.follows else None
         self._setup = setup
 
-    def walk(self, command: tuple[float, float, float], failing: int | None = None) -> Recorded:
+    def walk(self, command: tuple[float, float, float], failing: int | None = None, crouch: float = 0.0) -> Recorded:
         """Return a recording of the policy under a command.
 
         Args:
             command: forward, left and turning, in units of the task.
             failing: index of the leg whose motors fail; None for a sound body.
+            crouch: by which the torso is lowered, standing heights, as far as the legs fold; demonstrators do so in
+                the task `directed`.
 
         Raises:
-            ValueError: the episode ends, or the task has no command.
+            ValueError: the episode ends, the task has no command, or nobody crouches.
         """
-        setup = self._setup if failing is None else _changed(self._setup, actuator_failure=failing)
+        setup, held = self._setup if failing is None else _changed(self._setup, actuator_failure=failing), {}
+        if crouch:
+            setup, held = self._directed(), {"pose": (-self._crouch(crouch), *(0.0,) * 5)}
         cycle, offset, step = self._gait()
-        recording = self._recorded(setup, _SETTLE, round(_CYCLES * cycle / step), [(0, command)])
+        recording = self._recorded(setup, _SETTLE, round(_CYCLES * cycle / step), [(0, command)], **held)
         return Recorded(recording, cycle, (_SETTLE * step / cycle + offset) % 1.0)
 
     def alone(self) -> Recorded:
@@ -145,6 +151,20 @@ class Recorder:
         stop, start = (substeps * (count - _SETTLE) for count in (stop, start))
         return Transition(Recorded(recording, cycle, phase(_SETTLE)), stop - late, start, late)
 
+    def _directed(self) -> Setup:
+        """The setup with a pose by command."""
+        if "pose" in self._setup.definition.commands:
+            return self._setup
+        if self._policy != "cpg":
+            raise ValueError(f"the policy {self._policy} takes no pose")
+        return Setup.of(self.body, "directed", self._setup.task_kwargs | {"poses": 0.0, "gaits": ()})
+
+    def _crouch(self, depth: float) -> float:
+        room = _OF_ROOM * abs(posture.room(self.body, planted=False)[0, 0])
+        if room < _LEAST_CROUCH:
+            raise ValueError("the legs do not fold far enough to crouch")
+        return min(depth, room)
+
     def _gait(self) -> tuple[float, float, float]:
         """The cycle, s, the offset of the first foot, cycles, and the control step, s; ValueError without a command."""
         if not self.follows:
@@ -152,10 +172,10 @@ class Recorder:
         task, gait = self._setup.definition, self._setup.definition.parameters
         return 1.0 / gait.gait_frequency, gait.phase_offsets[0] / (2.0 * np.pi), task.scene.control_timestep
 
-    def _recorded(self, setup: Setup, settle: int, steps: int, commands=()) -> Recording:
+    def _recorded(self, setup: Setup, settle: int, steps: int, commands=(), **held) -> Recording:
         environment = setup.load(seed=0)
         actor = named_policy(self._policy, self.body, self._preset, task=environment.task.definition)
-        return record(environment, actor, settle, steps, commands)
+        return record(environment, actor, settle, steps, commands, **held)
 
 
 def _periodic(recording: Recording) -> Recorded:

@@ -30,7 +30,12 @@ class Recording(NamedTuple):
 
 
 def record(
-    environment: Environment, policy: Policy, settle: int, steps: int, commands: Iterable[tuple[int, tuple]] = ()
+    environment: Environment,
+    policy: Policy,
+    settle: int,
+    steps: int,
+    commands: Iterable[tuple[int, tuple]] = (),
+    **held,
 ) -> Recording:
     """Play a policy and record it, once it has settled.
 
@@ -44,6 +49,7 @@ def record(
         steps: control steps to record.
         commands: pairs of a control step, counted from the start, and the value that the task's `command`
             takes there.
+        held: values of its other commands by name, from the start on.
 
     Returns:
         A pose for every substep, and the first one.
@@ -54,6 +60,8 @@ def record(
     act, commands = alone(policy), dict(commands)
     model, data = environment.physics.model.ptr, environment.physics.data.ptr
     timestep, controls = environment.reset(), []
+    for name, value in held.items():
+        environment.command(name, value)
     for count in range(settle + steps):
         if count in commands:
             environment.command("command", commands[count])
