@@ -32,17 +32,17 @@ STRAIGHT = ((0.7, 0.0, 0.0), (0.4, 0.0, 0.3))
 SWITCHES, HELD, SETTLES = 20, 60, 30
 STANDING = {"height": 0.02, "attitude": 0.01}
 ADDED, TILTED, COMPLIANT = 0.05, 0.03, 0.95
+RISEN, SHARE = 0.1, 0.9  # standing heights that a body that rose is off its pose, and share of bodies that succeed
 STEADY = 0.1  # error of motion with which a body walks a gait steadily
 
 
 class Run:
     """Environments of a body in `directed`, with a demonstrator."""
 
-    def __init__(self, body, count):
+    def __init__(self, body, count, **settings):
         """Open them."""
-        self.envs = VectorEnv(
-            body, "directed", count, task_kwargs={"poses": 0.0, "gaits": ()}, autoreset_mode="Disabled"
-        )
+        settings = {"poses": 0.0, "gaits": (), **settings}
+        self.envs = VectorEnv(body, "directed", count, task_kwargs=settings, autoreset_mode="Disabled")
         self.task = self.envs.task.definition
         self.policy = Demonstrator(self.task, suited_preset(self.task))
         self.observation = self.envs.reset(seed=5000)[0]
@@ -141,17 +141,46 @@ def switching(body) -> dict:
     }
 
 
+def rising(body) -> dict:
+    """Return how many of three starts on the belly a body does not rise from."""
+    run = Run(body, 3, start="belly")
+    run.envs.command("command", (0.0, 0.0, 0.0))
+    _, found, _ = run.walk(120, 10)
+    return {"lie": int((run.fell | (abs(found[:, 0]) > RISEN)).sum())}
+
+
+def failures(found: dict) -> dict[str, bool]:
+    """Return by what is measured whether a body fails at it."""
+    walks = not found["walk fell"] and found["added"] <= ADDED and found["tilt"] <= TILTED
+    changes = not found["change fell"] and found["change"] <= ADDED and found["compliance"] >= COMPLIANT
+    return {
+        "standing": bool(found["fell"]) or any(found[name] > most for name, most in STANDING.items()),
+        "walking": not walks,
+        "changing gaits": not (found["gaits"] and changes),
+        "rising": bool(found["lie"]),
+    }
+
+
 def main(count: str = "40") -> int:
-    """Measure the bodies, and return the exit status."""
+    """Measure the bodies, print them, and return the exit status."""
     bodies = dict(ROBOTS)
     bodies |= {f"random:{seed}": FAMILIES["random"](seed) for seed in range(FIRST, FIRST + int(count))}
-    found = {}
+    fails: dict[str, dict[str, bool]] = {}
     for name, body in tqdm(bodies.items(), disable=None, unit="body"):
-        found[name] = standing(body) | walking(body) | switching(body)
+        found = standing(body) | walking(body) | switching(body) | rising(body)
+        fails[name] = failures(found)
         links = "-".join(sorted({str(len(leg.joints)) for leg in body.legs}))
-        told = ", ".join(f"{key} {value:.3g}" for key, value in found[name].items())
-        print(f"{name} ({len(body.legs)} legs of {links}): {told}", flush=True)
-    return 0
+        told = ", ".join(f"{key} {value:.3g}" for key, value in found.items())
+        wrong = [what for what, failed in fails[name].items() if failed]
+        print(f"{name} ({len(body.legs)} legs of {links}): {told}; fails: {', '.join(wrong) or 'none'}", flush=True)
+    random = [each for name, each in fails.items() if name not in ROBOTS]
+    most = int((1.0 - SHARE) * len(random))
+    enough = True
+    for what in random[0] if random else ():
+        failed = sum(each[what] for each in random)
+        enough &= failed <= most
+        print(f"{what}: {len(random) - failed} of {len(random)} random bodies; {most} may fail")
+    return int(not enough)
 
 
 if __name__ == "__main__":

@@ -61,7 +61,8 @@ class Demonstrator:
         # Presets of the published law were found for a body as it is.
         if not isinstance(preset, Preset) and (found := hopeless(body)):
             raise ValueError(f"{body.name} cannot walk: {found[0].text}")
-        self._body, self.law = body, law(task or prepared(body, "walk")[0], preset)
+        task = task or prepared(body, "walk")[0]
+        self._body, self._lies, self.law = body, task.lies, law(task, preset)
         self._state, self._started = None, []
 
     def reset(self, indices: Sequence[int], seeds: Sequence[int] = ()) -> None:
@@ -93,7 +94,7 @@ class Demonstrator:
         if self._state is None or len(self._state[0]) != count:
             self._state = self.law.initial(count)
         self._state, actions = self.law(self._state, blocks)
-        if self._started:
+        if self._started and not self._lies:
             self._check_heights(blocks["posture"][self._started, 0])
         return actions[0] if alone else actions
 

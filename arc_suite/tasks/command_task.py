@@ -202,6 +202,11 @@ class CommandTask(Task):
         return self.settings.command.named(self.scene.body, name, value)
 
     @property
+    def lies(self) -> bool:
+        """Whether an episode starts with the torso on the ground."""
+        return self.settings.ground.lies
+
+    @property
     def adapts(self) -> bool:
         """Whether there is a curriculum."""
         return self.settings.ground.adapts

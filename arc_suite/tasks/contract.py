@@ -291,6 +291,11 @@ class Task(Observed):
         raise ValueError(f"command {name!r}: expected numbers, got {checks.shown(value)}")
 
     @property
+    def lies(self) -> bool:
+        """Whether an episode starts with the torso on the ground."""
+        return False
+
+    @property
     def adapts(self) -> bool:
         """Whether the start of an episode depends on the outcome of the one before, as in a curriculum."""
         return False

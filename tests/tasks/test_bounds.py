@@ -11,6 +11,7 @@ import arc_suite
 from arc_suite.arenas import terrain
 from arc_suite.envs.gym import Env
 from arc_suite.tasks import TASKS, modifiers, parameters
+from arc_suite.tasks.command import FARTHEST
 from arc_suite.tasks.ground import LEVELS
 
 LARGEST = parameters.LARGEST
@@ -27,8 +28,11 @@ BOUNDS = {
     "weights": ({"healthy": -LARGEST}, {"control": LARGEST}),
     "time_limit": (1e-9, LARGEST),
     "actuator_failure": (0, 5),
+    "poses": (0.0, 1.0),
+    "commands": ({"forward": -FARTHEST}, {"left": FARTHEST, "turning": (-FARTHEST, FARTHEST)}),
 }
-NOT_NUMBERS = ("gait", "curriculum")
+NOT_NUMBERS = ("gait", "gaits", "start", "curriculum")
+LEVEL = ("steer", "directed", "shoved", "limp")
 FEW = ("walk", "steer", "rough", "navigate")
 
 
@@ -38,7 +42,8 @@ def values(task, name):
     if name == "target_velocity":
         least = parameters.LEAST_SPEED
         bounds = (least, bounds[1], *((-least, bounds[0]) if task == "walk" else ()))
-    return [{name: value, **({"curriculum": True} if name == "level" else {})} for value in bounds]
+    wider = {"commands": {"forward": 1.5}} if task in LEVEL else {}
+    return [{name: value, **({"curriculum": True, **wider} if name == "level" else {})} for value in bounds]
 
 
 @pytest.mark.parametrize("task", [pytest.param(task, marks=() if task in FEW else pytest.mark.long) for task in TASKS])

@@ -267,7 +267,8 @@ def test_who_is_carried_by_the_torso_has_fallen():
     for share, healthy in ((0.4, True), (0.6, False)):
         forces = np.zeros_like(readings.contact_forces)
         forces[5] = share  # upwards, on the first part, in the body's weight
-        assert task.health.after(task.context, readings._replace(contact_forces=forces)).fell != healthy
+        carried = readings._replace(contact_forces=forces)
+        assert task.health.after(task.context, task.health.start(), carried, 1).fell != healthy
 
 
 def test_a_body_that_lies_on_its_torso_is_not_healthy():
