@@ -36,6 +36,7 @@ _DUTIES = (0.05, 0.95)
 _FASTEST = 0.25  # cycles a control step
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
 class Choices:
     """What poses and gaits are drawn from.
 
@@ -45,9 +46,9 @@ class Choices:
         tempi: between which their frequencies are drawn, multiples of the prescribed one.
     """
 
-    def __init__(self, room: np.ndarray, gaits: np.ndarray, tempi: tuple[float, float]):
-        """Keep them."""
-        self.room, self.gaits, self.tempi = room, gaits, tempi
+    room: np.ndarray
+    gaits: np.ndarray
+    tempi: tuple[float, float]
 
 
 class Reference(NamedTuple):
