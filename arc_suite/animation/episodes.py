@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
+from arc_suite.animation import direction
 from arc_suite.markers import Marker
 
 LONGEST = 0.5  # s of simulated time between two pictures; a slower machine shows slow motion
@@ -34,6 +35,7 @@ class Episodes:
         self.environment, self._act = environment, act
         self.follows_velocities = environment.task.definition.commands.get("command") == 3
         self.desired: np.ndarray | None = None
+        self._pose, self._gait = None, None
         self.control_timestep = environment.control_timestep()
         self.restart()
 
@@ -48,6 +50,11 @@ class Episodes:
         if self.follows_velocities:
             self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
             self._command()
+
+    def direct(self, pose: Sequence[float] | np.ndarray | None, gait: str | None) -> None:
+        """Set pose and gait, or leave them to the task; one that has no such commands ignores it."""
+        self._pose, self._gait = pose, gait
+        self._command()
 
     def step(self, forces: np.ndarray | float = 0.0) -> None:
         """Advance by a control step, or start the next episode where the last one has ended.
@@ -85,8 +92,9 @@ class Episodes:
         ]
 
     def _command(self) -> None:
-        if self.follows_velocities:
-            self.environment.command("command", self.desired)
+        task = self.environment.task.definition
+        for name, value in direction.commands(task, self.desired, self._pose, self._gait).items():
+            self.environment.command(name, value)
 
     def _asked(self) -> list[Marker]:
         return self.environment.task.markers(self.environment.physics)

@@ -15,17 +15,15 @@ import mujoco
 import numpy as np
 
 from arc_suite import models, policies
-from arc_suite.animation import pages
+from arc_suite.animation import direction, pages
 from arc_suite.cpg import Demonstrator
 from arc_suite.cpg.stepping import Directed
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
-from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import GRAVITY
 from arc_suite.policies import universal, zips
 from arc_suite.policies.network import Network
 from arc_suite.policies.universal import Universal
-from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 
@@ -33,8 +31,6 @@ GROUNDS = {"level": "flat", "bumps": "bumps"}  # arenas by the names that a page
 
 _DIRECTED, _TASK = "directed", "steer"  # whose command the player gives, to demonstrators and to others
 _BLOCKS = ("posture", "velocities", "contact_forces", "gait_clock", "command")  # that a page can observe
-_CLEAR = 0.15  # standing heights of a torso in its lowest pose over the ground
-_OWN = "own"  # the gait that a body has by itself
 
 
 def page(creatures: Sequence[Mapping[str, Any]]) -> str:
@@ -126,33 +122,22 @@ def _task(task: Task, steer: Task) -> dict[str, Any]:
         "lowest": health.lowest * context.height,
         "lying": health.lying,
         "least_upright": health.least_upright,
-        "direction": _direction(task) if "pose" in task.commands else None,
+        "direction": _direction(task) if direction.directs(task) else None,
     }
 
 
 def _direction(task: Task) -> dict[str, Any]:
     """What a page computes of pose and gait, and what the player chooses from; see web/direction.js and panel.js."""
-    body, own, reference = task.scene.body, task.parameters, task.context.reference  # type: ignore[attr-defined]
-    made = {name: gaits.gait(body, name) for name in gaits.fitting(body)}
+    body, reference = task.scene.body, task.context.reference  # type: ignore[attr-defined]  # of commands
     return {
         "glide": reference.glide,
         "step": reference.step,
         "rate": (body.torso.standing_height / GRAVITY) ** 0.5 / reference.step,
         "names": posture.NAMES,
-        "room": _room(body),
-        "frequency": own.gait_frequency,
-        "gaits": {
-            _OWN: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
-            **{name: [*gait.offsets, gait.duty_factor] for name, gait in made.items()},
-        },
+        "room": direction.room(body),
+        "frequency": task.parameters.gait_frequency,
+        "gaits": direction.named(task),
     }
-
-
-def _room(body: Body) -> np.ndarray:
-    """How far each number of a pose can go, (6, 2), without the torso on the ground."""
-    room, lying = posture.room(body, planted=False).copy(), -torso_box(body)[0][2] / body.torso.standing_height
-    room[0] = room[0].clip(min(0.0, lying + _CLEAR - posture.rest(body).ride))
-    return room.round(2)
 
 
 def _law(task: Task, preset: str) -> dict[str, Any]:

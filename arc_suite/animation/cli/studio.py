@@ -8,7 +8,7 @@
 Sliders change body, gait, speed, task and ground; the creature changes in about a second and walks on. Buttons save
 spec, MJCF, clips, page, picture and film. All visitors see one creature. Closing the page ends nothing; Ctrl-C does.
 The page listens on this machine alone, unless --host says otherwise; over SSH, forward the port:
-ssh -L 8080:localhost:8080 MACHINE.
+ssh -L 8080:localhost:8080 MACHINE. Without --task a demonstrator acts in directed, where sliders pose it.
 """
 
 import dataclasses
@@ -40,7 +40,14 @@ def _sketch() -> Sketch:
     settings = setup.task_kwargs
     ground, kicks = settings.pop("arena", "flat"), settings.pop("kicks", 0.0)
     player = {"policy": policy_name(FLAGS.policy), "preset": FLAGS.preset or OWN}
-    doing = Sketch(task=setup.task, ground=ground, kicks=kicks, settings=json.dumps(settings), **player)
+    directed = player["policy"] == "cpg" and not FLAGS["task"].present
+    doing = Sketch(
+        task=Sketch.task if directed else setup.task,
+        ground=ground,
+        kicks=kicks,
+        settings=json.dumps(settings),
+        **player,
+    )
     shape = {"lengths": tuple(named_values("length", FLAGS.length).items()), "palette": FLAGS.palette or OWN}
     if FLAGS.legs is not None:
         return dataclasses.replace(doing, legs=FLAGS.legs, links=FLAGS.links or 3, **shape)

@@ -13,6 +13,7 @@ from typing import Any
 
 import viser
 
+from arc_suite.animation import direction
 from arc_suite.animation.studio import saving, texts
 from arc_suite.animation.studio import sketch as sketches
 from arc_suite.animation.studio.charts import Charts
@@ -48,6 +49,7 @@ _KEYS = (
     ("To the left", "U", (0.0, _PRESS, 0.0)),
     ("To the right", "O", (0.0, -_PRESS, 0.0)),
 )
+_POSE = ("Height", "Shift forward", "Shift left", "Roll", "Pitch", "Yaw")  # numbers of a pose
 _KEYS_TOLD = ", ".join(f"{key} {label.lower()}" for label, key, _ in _KEYS)
 
 
@@ -159,7 +161,13 @@ class Page:
             gui.add_slider(label, -1.0, 1.0, 0.05, value)
             for label, value in (("Forward", 1.0), ("Left", 0.0), ("Turn", 0.0))
         ]
-        for widget in (self._by_hand, *self._sticks):
+        self._direction = gui.add_folder("Pose and gait")
+        with self._direction:
+            self._gait = gui.add_dropdown("Gait now", [direction.OWN], initial_value=direction.OWN)
+            hint = "Standing heights or rad"
+            self._pose = [gui.add_slider(label, -1.0, 1.0, 0.01, 0.0, hint=hint) for label in _POSE]
+            gui.add_button("Upright").on_click(lambda event: self._stand())
+        for widget in (self._by_hand, *self._sticks, self._gait, *self._pose):
             widget.on_update(lambda event: self._command())
         for label, key, change in _KEYS:
             command = gui.add_command(label, hotkey=key)
@@ -182,6 +190,7 @@ class Page:
         widgets["preset"].options = _listed(creature.sketch.preset, (OWN, *presets_of(body)))
         self._show_what_applies(creature.sketch)
         self._fit_links(creature)
+        self._fit_direction(creature)
         for handle in self._cures:
             handle.remove()
         with self._check:
@@ -202,6 +211,22 @@ class Page:
         for slider, name in itertools.zip_longest(self._lengths, names):
             slider.visible = name is not None
             slider.label, slider.value = name or "", given.get(name, 1.0)
+
+    def _fit_direction(self, creature: Creature) -> None:
+        """Offer the poses and gaits of a body, if they are by command in its task."""
+        task = creature.environment.task.definition
+        self._direction.visible = direction.directs(task)
+        if not self._direction.visible:
+            return
+        names = direction.named(task)
+        if self._gait.value not in names:
+            self._gait.value = direction.OWN
+        self._gait.options = list(names)
+        for slider, (low, high) in zip(self._pose, direction.room(creature.setup.body), strict=True):
+            slider.visible = bool(low < high)
+            slider.value = min(max(slider.value, low), high)
+            if slider.visible:
+                slider.min, slider.max = float(low), float(high)
 
     def _show_what_applies(self, sketch: Sketch) -> None:
         for name in ("legs", "links", "layout"):
@@ -233,7 +258,16 @@ class Page:
         self._apply(opened_file(self._read(), text))
 
     def _command(self) -> None:
-        self._session.command([stick.value for stick in self._sticks] if self._by_hand.value else None)
+        by_hand = self._by_hand.value
+        self._session.command([stick.value for stick in self._sticks] if by_hand else None)
+        pose, gait = [slider.value for slider in self._pose], self._gait.value
+        self._session.direct(*((pose, gait) if by_hand else (None, None)))
+
+    def _stand(self) -> None:
+        """Ask for the pose at rest and the body's own gait."""
+        self._gait.value = direction.OWN
+        for slider in self._pose:
+            slider.value = 0.0
 
     def _press(self, change: Sequence[float], event: viser.CommandEvent) -> None:
         """Change the command by a step."""
@@ -243,11 +277,11 @@ class Page:
 
     def _save(self, file: saving.File, event: viser.GuiEvent) -> None:
         """Make a file, and send it to the visitor who asks for it."""
-        creature, desired = self._session.creature, self._session.desired
+        creature, commands = self._session.creature, self._session.commands
         name, client = saving.name(creature, file), event.client
         note = client.add_notification(f"Making {name}", "", loading=True)
         try:
-            content = file.content(creature, creature.environment.physics.data.qpos.copy(), desired)
+            content = file.content(creature, creature.environment.physics.data.qpos.copy(), commands)
         except (ValueError, OSError, RenderingUnavailable) as error:
             client.add_notification(f"No {name}", " ".join(str(error).split()), color="red")
         else:

@@ -2,9 +2,9 @@
 
 import contextlib
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import imageio.v3 as imageio
 import numpy as np
@@ -24,6 +24,8 @@ from arc_suite.simulation.pictures import picture
 _PAGE_STEPS, _FILM_STEPS = 400, 100
 _SIZE = (640, 480)  # of pictures and films, pixels
 
+Commands = Mapping[str, Any]  # values by name, None for what the task itself would do
+
 
 class File(NamedTuple):
     """A file of a creature.
@@ -31,13 +33,12 @@ class File(NamedTuple):
     Attributes:
         label: of its button.
         extension: of its name.
-        content: makes it of a creature, the positions (nq,) in which it stands, and the command (3,), None for that of
-            the task.
+        content: makes it of a creature, the positions (nq,) in which it stands, and commands of its task.
     """
 
     label: str
     extension: str
-    content: Callable[[Creature, np.ndarray, np.ndarray | None], bytes]
+    content: Callable[[Creature, np.ndarray, Commands], bytes]
 
 
 def name(creature: Creature, file: File) -> str:
@@ -45,18 +46,18 @@ def name(creature: Creature, file: File) -> str:
     return f"{creature.setup.body.name}{file.extension}"
 
 
-def spec(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def spec(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return the spec as JSON."""
     return body_to_json(creature.setup.body).encode()
 
 
-def mjcf(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def mjcf(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return the model, on the ground of the task, as MuJoCo loads it."""
     arena = creature.environment.task.definition.scene.arena
     return models.text(creature.setup.body, arena).encode()
 
 
-def glb(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def glb(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return animation clips as binary glTF; see `export.clips`.
 
     Raises:
@@ -69,7 +70,7 @@ def glb(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> byt
     )
 
 
-def page(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def page(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a page that plays an episode.
 
     Raises:
@@ -78,13 +79,13 @@ def page(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> by
     pages.viewer()  # finds out at once whether there is one
     environment = load(creature.setup)
     with contextlib.closing(environment):
-        act = _commanded(environment, creature.sketch, desired)
+        act = _commanded(environment, creature.sketch, commands)
         acting = Individuals(lambda: act, 1, len(creature.setup.body.joint_names))
         track = style.record(environment, acting, 0, _PAGE_STEPS)
     return pages.page({creature.setup.body.name: track}).encode()
 
 
-def playable(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def playable(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a page in which keys walk the creature about; see `export.play`.
 
     Raises:
@@ -94,7 +95,7 @@ def playable(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -
     return play.page([play.creature(creature.setup.body, sketch.policy, sketches.preset(sketch))]).encode()
 
 
-def image(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def image(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a picture of the creature where it stands, as PNG.
 
     Raises:
@@ -106,14 +107,14 @@ def image(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> b
     return imageio.imwrite("<bytes>", view, extension=".png")
 
 
-def film(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> bytes:
+def film(creature: Creature, qpos: np.ndarray, commands: Commands) -> bytes:
     """Return a film of an episode, as MP4.
 
     Raises:
         RenderingUnavailable: no OpenGL here.
     """
     environment = load(creature.setup)
-    act = _commanded(environment, creature.sketch, desired)
+    act = _commanded(environment, creature.sketch, commands)
     footage = films.Footage(creature.setup.body.name, environment, act, "profile", _SIZE)
     seconds = films.steps_per_frame(footage.control_timestep) * footage.control_timestep
     with contextlib.closing(footage), tempfile.TemporaryDirectory() as folder:
@@ -122,13 +123,14 @@ def film(creature: Creature, qpos: np.ndarray, desired: np.ndarray | None) -> by
         return path.read_bytes()
 
 
-def _commanded(environment: Environment, sketch: Sketch, desired: np.ndarray | None):
-    """Return the policy of a sketch as a function of a `TimeStep`, which sets the command at the start of episodes."""
+def _commanded(environment: Environment, sketch: Sketch, commands: Commands):
+    """Return the policy of a sketch as a function of a `TimeStep`, which sets commands at the start of episodes."""
     act = alone(policy(sketch, environment))
 
     def acting(timestep):
-        if timestep.first() and environment.task.definition.commands.get("command") == 3:
-            environment.command("command", desired)
+        if timestep.first():
+            for name, value in commands.items():
+                environment.command(name, value)
         return act(timestep)
 
     return acting

@@ -6,9 +6,11 @@ import queue
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
+from arc_suite.animation import direction
 from arc_suite.animation.episodes import LONGEST, Episodes
 from arc_suite.animation.studio.creature import Creature, opened
 from arc_suite.animation.studio.history import History
@@ -30,6 +32,8 @@ class Session:
         history: of the episodes.
         error: one line, why the latest sketch made no creature; empty if it did.
         desired: (3,) command that visitors have set; None for that of the task.
+        pose: (6,) that they have set, or None; see `posture`.
+        gait: name of the gait that they have set, or None.
         paused: whether time stands still.
         pace: simulated seconds a second, of late.
         open: whether `run` goes on.
@@ -43,6 +47,8 @@ class Session:
         self.error, self.paused, self.open = "", False, True
         self.pace = 1.0
         self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
+        self.pose: np.ndarray | None = np.zeros(6)
+        self.gait: str | None = direction.OWN
         self._replace(opened(sketch))
 
     def ask(self, sketch: Sketch) -> None:
@@ -62,6 +68,21 @@ class Session:
             self.episodes.command(self.desired)
 
         self.do(change)
+
+    def direct(self, pose: Sequence[float] | None, gait: str | None) -> None:
+        """Set pose and gait, now and for later creatures, from any thread; None leaves them to the task."""
+
+        def change():
+            self.pose, self.gait = None if pose is None else np.array(pose), gait
+            self.episodes.direct(self.pose, self.gait)
+
+        self.do(change)
+
+    @property
+    def commands(self) -> dict[str, Any]:
+        """What visitors have set of the commands of the creature's task, by name."""
+        task = self.creature.environment.task.definition
+        return direction.commands(task, self.desired, self.pose, self.gait)
 
     def kick(self, angle: float) -> None:
         """Kick the torso in a direction of the world, rad, from any thread."""
@@ -134,4 +155,5 @@ class Session:
         self.creature, self.error = creature, ""
         self.episodes = Episodes(creature.environment, creature.act)
         self.episodes.command(self.desired)
+        self.episodes.direct(self.pose, self.gait)
         self.history = History(self.episodes)

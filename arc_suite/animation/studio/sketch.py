@@ -55,7 +55,7 @@ class Sketch:
     fan: float = 0.0
     lengths: tuple[tuple[str, float], ...] = ()
     palette: str = OWN
-    task: str = "steer"
+    task: str = "directed"
     gait: str = OWN
     speed: float = 1.0
     ground: str = "flat"

@@ -8,9 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from arc_suite.animation import direction
 from arc_suite.animation.studio.session import Session
 from arc_suite.animation.studio.sketch import FILE, Sketch
-from arc_suite.robots import generator
+from arc_suite.robots import gaits, generator
 from arc_suite.robots.spec_files import body_from_json, body_to_json
 
 viser = pytest.importorskip("viser", reason="no viser here: make check-studio")
@@ -141,13 +142,32 @@ def test_the_command_is_followed(served, tab):
     served.until(lambda: served.session.episodes.timestep.observation["command"][0] == -0.75)
 
 
+def test_pose_and_gait_are_followed(served, tab):
+    open_tab(tab, "Command")
+    press(tab, "Height", "Home")
+    low = direction.room(served.session.creature.setup.body)[0, 0]
+    served.until(lambda: served.session.pose[0] == pytest.approx(low))
+    choose(tab, "Gait now", "ripple")
+    ripple = gaits.gait(served.session.creature.setup.body, "ripple")
+    served.until(lambda: served.session.episodes.timestep.observation["gait"][-2] == pytest.approx(ripple.duty_factor))
+    served.until(lambda: served.session.episodes.timestep.observation["pose"][0] == pytest.approx(low))
+    tab.get_by_role("button", name="Upright").click()
+    served.until(lambda: served.session.gait == "own" and not served.session.pose.any())
+    open_tab(tab, "Task")
+    choose(tab, "Task", "steer")
+    open_tab(tab, "Command")
+    tab.get_by_text("Gait now").wait_for(state="hidden")
+    open_tab(tab, "Task")
+    choose(tab, "Task", "directed")
+
+
 def test_tasks_and_grounds(served, tab):
     open_tab(tab, "Task")
     choose(tab, "Ground", "bumps")
     served.until(lambda: served.session.creature.setup.task_kwargs.get("arena") == "bumps")
     choose(tab, "Task", "navigate")
     served.until(lambda: served.session.creature.setup.task == "navigate")
-    choose(tab, "Task", "steer")
+    choose(tab, "Task", "directed")
     choose(tab, "Ground", "flat")
     served.until(lambda: served.session.creature.setup.task_kwargs == {})
 
@@ -180,7 +200,7 @@ def test_lines_are_copied(served, tab):
     open_tab(tab, "Files")
     tab.get_by_role("button", name="Copy command").click()
     line = tab.evaluate("navigator.clipboard.readText()")
-    assert line == "arc-suite view --spec walker_6x2.json --task steer"
+    assert line == "arc-suite view --spec walker_6x2.json --task directed"
 
 
 def test_another_visitor_sees_the_same_creature(served, tab):

@@ -26,8 +26,8 @@ def creature():
     return made
 
 
-def content(creature, label, desired=None):
-    return FILES[label].content(creature, creature.environment.physics.data.qpos.copy(), desired)
+def content(creature, label, **commands):
+    return FILES[label].content(creature, creature.environment.physics.data.qpos.copy(), commands)
 
 
 def test_names(creature):
@@ -57,7 +57,7 @@ def test_a_page_plays_the_walk_under_the_command(creature, monkeypatch):
     monkeypatch.setattr(saving, "_PAGE_STEPS", 40)
     tracks = []
     monkeypatch.setattr(saving.pages, "page", lambda given: tracks.append(given) or "<html>")
-    assert content(creature, "Page", AHEAD) == b"<html>"
+    assert content(creature, "Page", command=AHEAD) == b"<html>"
     (track,) = tracks[0].values()
     assert track.body == creature.setup.body and len(track.times) == 40
     forward, start = track.quaternions[-1], track.positions[[0, -1]]
@@ -76,7 +76,7 @@ def test_a_page_to_play_in_has_the_body_and_its_law(creature, monkeypatch):
 @pytest.mark.slow
 def test_a_film(creature, monkeypatch):
     monkeypatch.setattr(saving, "_FILM_STEPS", 6)
-    film = content(creature, "Film", AHEAD)
+    film = content(creature, "Film", command=AHEAD)
     assert film[4:8] == b"ftyp" and len(film) > 1000
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from arc_suite import style
+from arc_suite.animation import direction
 from arc_suite.animation.episodes import Episodes
 from arc_suite.animation.studio import session as sessions
 from arc_suite.animation.studio import texts
@@ -76,6 +77,24 @@ def test_another_creature_walks_under_the_same_command():
         assert shown.states[-1][0] == "walker_4x3" and len(shown.states[-1][3]) == 7 + 12
 
 
+def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
+    with running() as (session, shown):
+        session.command((0.0, 0.0, 0.0))
+        session.direct((-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple")
+        observed = lambda name: session.episodes.timestep.observation[name]  # noqa: E731
+        shown.until(lambda: observed("gait")[-2] == pytest.approx(0.75))
+        low = direction.room(session.creature.setup.body)[0, 0]
+        shown.until(lambda: observed("pose")[0] == pytest.approx(low))
+        assert session.commands["pose"] == pytest.approx([low, 0.0, 0.0, 0.0, 0.0, 0.0])
+        session.ask(Sketch(legs=4, links=3))  # whose legs do not ripple
+        shown.until(lambda: session.creature.sketch.legs == 4)
+        own = session.episodes.environment.task.definition.parameters
+        assert session.commands["gait"][-2:] == [own.duty_factor, own.gait_frequency]
+        session.ask(Sketch(legs=4, links=3, task="steer"))
+        shown.until(lambda: session.creature.sketch.task == "steer")
+        assert list(session.commands) == ["command"]
+
+
 @pytest.mark.slow
 def test_of_several_sketches_the_last_is_made():
     with running() as (session, shown):
@@ -107,9 +126,9 @@ def test_texts_of_the_page():
         shown.until(lambda: session.error)
         told = texts.status(session)
         assert 'role="alert"' in told and "&lt;img src=x&gt;" in told and "<img" not in told
-        assert "walker_6x2, steer" in told and "real time" in told
+        assert "walker_6x2, directed" in told and "real time" in told
         assert "walker_6x2 stands and can take steps" in texts.checked(session.creature)
-        assert "arc-suite view --legs 6 --links 2 --task steer" in texts.copied(session.creature.sketch)
+        assert "arc-suite view --legs 6 --links 2 --task directed" in texts.copied(session.creature.sketch)
 
 
 def test_a_mistake_of_ours_is_told_too(monkeypatch, capsys):

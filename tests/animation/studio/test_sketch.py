@@ -90,14 +90,14 @@ def test_the_command_line_is_understood(sketch, tmp_path):
 
 
 def test_command_lines():
-    assert sketches.command_line(SKETCHES["legs"]) == "arc-suite view --legs 6 --links 2 --task steer"
-    assert sketches.command_line(SKETCHES["layout"]).startswith("arc-suite view --spec walker_6x3.json --task steer")
+    assert sketches.command_line(SKETCHES["legs"]) == "arc-suite view --legs 6 --links 2 --task directed"
+    assert sketches.command_line(SKETCHES["layout"]).startswith("arc-suite view --spec walker_6x3.json --task directed")
     assert sketches.command_line(SKETCHES["robot"]) == (
         "arc-suite view --robot queen --task walk --set=arena=bumps --set=kicks=0.5 --preset tuned"
     )
     assert "--spec spider" in sketches.command_line(SKETCHES["example"])
     assert "--spec tick_shaped.json" in sketches.command_line(SKETCHES["shaped robot"])
-    assert sketches.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task steer --policy zero")
+    assert sketches.command_line(SKETCHES["random"]).endswith("--spec random_7.json --task directed --policy zero")
 
 
 @pytest.mark.parametrize("name", ["legs", "robot", "example"])
@@ -144,7 +144,7 @@ def test_legs_that_overlap_are_moved_apart():
         (Sketch(source=FILE, file="{}"), "name: missing; a Body needs it"),
         (Sketch(task="walk", preset="balanced"), "unknown preset 'balanced'"),
         (Sketch(preset="sighted"), "observation: expected a block scan, as the task rough has"),
-        (Sketch(policy="ppo"), "policy ppo: none for walker_8x3-steer"),
+        (Sketch(policy="ppo"), "policy ppo: none for walker_8x3-directed"),
     ],
 )
 def test_a_bad_combination_is_one_line(sketch, message):

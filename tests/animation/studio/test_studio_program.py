@@ -23,13 +23,15 @@ def test_flags(tmp_path):
     body = generator.generate(5, 2)
     (tmp_path / "own.json").write_text(body_to_json(body))
     arguments = {
-        (): Sketch(source="queen", task="walk"),
-        ("--legs=6", "--links=2", "--task=steer", "--preset=surefooted"): Sketch(legs=6, links=2, preset="surefooted"),
+        (): Sketch(source="queen", task="directed"),
+        ("--legs=6", "--links=2", "--task=steer", "--preset=surefooted"): Sketch(
+            legs=6, links=2, task="steer", preset="surefooted"
+        ),
         ("--legs=4", "--length=lower=1.5", "--palette=7"): Sketch(
-            legs=4, lengths=(("lower", 1.5),), palette="7", task="walk"
+            legs=4, lengths=(("lower", 1.5),), palette="7", task="directed"
         ),
         ("--spec=spider", "--set=arena=bumps", "--set=kicks=0.5", "--set=friction=0.7"): Sketch(
-            source="spider", task="walk", ground="bumps", kicks=0.5, settings='{"friction": 0.7}'
+            source="spider", task="directed", ground="bumps", kicks=0.5, settings='{"friction": 0.7}'
         ),
         ("--spec=own.json", "--policy=zero"): Sketch(
             source=FILE, file=body_to_json(body), task="walk", policy="zero", preset=OWN

@@ -1,0 +1,67 @@
+"""What a person chooses from where pose and gait are by command: poses within a body's room, gaits by name."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from arc_suite.models import posture
+from arc_suite.models.outline import torso_box
+from arc_suite.robots import gaits
+from arc_suite.robots.spec import Body
+from arc_suite.tasks import Task, clock
+
+OWN = "own"  # the gait that a task prescribes
+
+_CLEAR = 0.15  # standing heights of a torso in its lowest pose over the ground
+
+
+def directs(task: Task) -> bool:
+    """Return whether pose and gait of a task are by command."""
+    return task.commands.get("pose") == len(posture.NAMES) and "gait" in task.commands
+
+
+def room(body: Body) -> np.ndarray:
+    """Return how far each number of a pose can go, (6, 2), with feet that may slide, and without a torso that lies."""
+    bounds, lying = posture.room(body, planted=False).round(2), -torso_box(body)[0][2] / body.torso.standing_height
+    bounds[0] = bounds[0].clip(round(min(0.0, lying + _CLEAR - posture.rest(body).ride), 2))
+    return bounds
+
+
+def named(task: Task) -> dict[str, list[float]]:
+    """Return offsets, cycles, and duty factor of the gaits that fit a body, by name; first its own."""
+    body, own = task.scene.body, task.parameters
+    made = {name: gaits.gait(body, name) for name in gaits.fitting(body)}
+    return {
+        OWN: [*np.divide(own.phase_offsets, clock.TWO_PI), own.duty_factor],
+        **{name: [*gait.offsets, gait.duty_factor] for name, gait in made.items()},
+    }
+
+
+def commands(
+    task: Task,
+    desired: Sequence[float] | np.ndarray | None,
+    pose: Sequence[float] | np.ndarray | None,
+    gait: str | None,
+) -> dict[str, Any]:
+    """Return what a person sets of a task's commands, by name; None leaves it to the task.
+
+    Args:
+        task: whose other commands are left out.
+        desired: (3,) velocity, or None.
+        pose: (6,), of which as much is taken as the room has, or None.
+        gait: name of it, in place of which its own stands where it does not fit, or None.
+    """
+    asked: dict[str, Any] = {"command": desired} if task.commands.get("command") == 3 else {}
+    if directs(task):
+        numbers = named(task)
+        own = [*numbers.get(gait, numbers[OWN]), task.parameters.gait_frequency] if gait else None
+        asked |= {"pose": None if pose is None else _within(room(task.scene.body), np.asarray(pose)), "gait": own}
+    return asked
+
+
+def _within(bounds: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """As much of a pose (6,) as bounds (6, 2) have; not all numbers go to their bounds at once."""
+    pose = pose.clip(*bounds.T)
+    most = abs(np.where(pose < 0.0, bounds[:, 0], bounds[:, 1]))
+    return pose / max(1.0, (abs(pose) / np.maximum(most, 1e-9)).sum())
