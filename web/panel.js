@@ -12,8 +12,8 @@ export class Panel {
     [this.tempo, this.hertz] = element.querySelectorAll("input, output");
     element.querySelector("button").addEventListener("click", () => this.reset());
     this.list.addEventListener("change", () => this.list.blur());
-    // A slider that a pointer has moved gives the keys back.
-    element.addEventListener("pointerup", ({ target }) => target.matches("input") && target.blur());
+    // What a pointer has moved or pressed gives the keys back.
+    element.addEventListener("pointerup", ({ target }) => target.closest("input, button, summary")?.blur());
   }
 
   // Offers the poses and gaits of a body, or nothing to one that has none.

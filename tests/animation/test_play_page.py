@@ -129,7 +129,7 @@ def test_keys_and_sliders_pose(tab):
     slider.click(position={"x": 1, "y": 8})  # a pointer gives the keys back
     assert posed(tab)[5] < 0 and tab.evaluate("document.activeElement === document.body")
     tab.click("#upright")
-    assert posed(tab) == [0] * 6
+    assert posed(tab) == [0] * 6 and tab.evaluate("document.activeElement === document.body")
     tab.evaluate("document.getElementById('direction').open = false")
 
 

@@ -88,6 +88,8 @@ class Recorder:
             steps = max(1, round(1.0 / (task.parameters.gait_frequency * step)))
             setup = _changed(setup, gait_frequency=1.0 / (steps * step))
         self.units = velocity_units(self.body, task.parameters.target_velocity) if self.follows else None
+        if "pose" in task.commands:
+            setup = _changed(setup, poses=0.0, gaits=())
         self._setup = setup
 
     def walk(self, command: tuple[float, float, float], failing: int | None = None, crouch: float = 0.0) -> Recorded:

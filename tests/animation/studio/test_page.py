@@ -64,6 +64,7 @@ def tab(browser, served):
     tab.goto(served.addresses[0])
     tab.wait_for_selector("#status")
     tab.get_by_text("Fan of the legs").wait_for()
+    tab.add_style_tag(content="#webgl-software-rendering { display: none }")  # a note, over the tabs
     yield tab
     assert wrong == []
     at_home = served.addresses[0].partition("?")[0], "data:", "blob:"
