@@ -19,7 +19,7 @@
 #   web, play, studio   pages in Chromium and Node, played by keys and pointers; the studio, its sliders and its gate
 #   glb, blender, godot clips in Khronos' validator and three programs that open them
 #   robots              robots of others, in wheels (320 MB): they come in, with the same bits, and walk; minutes
-#   bodies, survey, following, directing, clip-sets    many bodies: bit-equality, walks, commands, clips; minutes to half an hour
+#   bodies, survey, following, directing, leaps, clip-sets    many bodies: bit-equality, walks, commands, clips; half an hour
 #   soak, fuzz, loopholes, mutants    memory over two million steps; damaged files; policies that cheat; planted mistakes (hours)
 
 SHELL := /bin/bash
@@ -218,6 +218,7 @@ check-robots: RUN = $(PYTHON) tests/robots_of_others/zoo.py out/robots && \
 check-survey: RUN = $(VENV)/bin/arc-suite survey --count 500
 check-following: RUN = $(PYTHON) tests/following.py
 check-directing: RUN = $(PYTHON) tests/directing.py
+check-leaps: RUN = $(PYTHON) tests/leaps.py
 check-clip-sets: RUN = $(PYTHON) tests/clip_sets.py
 check-soak: RUN = $(PYTHON) tests/soak.py
 check-loopholes: RUN = $(PYTHON) tests/loopholes.py

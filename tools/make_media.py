@@ -89,6 +89,7 @@ TASKS = {
     "stairs": View("bastion", "stairs", **{**_SIDE, "azimuth": -112.0}),
     "gaps": View("tick", "gaps", **{**_SIDE, "elevation": 25.0}),
     "course": View("queen", "course", start=110, **_SIDE),
+    "leap": View("queen", "leap", start=288, moment=32, **{**_SIDE, "elevation": 20.0}),
     "shoved": View("bastion", "shoved", 1, 45, 30, (1.0, 0.0, 0.0), azimuth=35.0, elevation=18.0, distance=5.0),
     "limp": View("tick", "limp", 1, 60, 20, (1.0, 0.0, 0.0), azimuth=60.0),
     "roam": View("queen", "roam", 0, 40, 31, elevation=20.0, distance=6.0, drives=False),

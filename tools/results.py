@@ -20,7 +20,6 @@ import numpy as np
 from absl import flags
 
 from arc_suite import checks, evaluation, files, policies, registry
-from arc_suite.arenas import terrain
 from arc_suite.cli import program
 from arc_suite.cpg.selection import presets_of
 from arc_suite.envs.setup import Setup
@@ -30,7 +29,7 @@ from arc_suite.robots import ROBOTS
 from arc_suite.tasks import TASKS
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "results.md"
-LANES = (*terrain.KINDS, "course")
+LANES = ("rough", "slopes", "stairs", "gaps", "course")
 
 # Task -> presets to compare; zero stands still.
 PRESETS = {
@@ -40,6 +39,7 @@ PRESETS = {
     "roam": ("zero", "steered", "surefooted", "balanced"),
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),
+    "leap": ("zero", "surefooted", "sighted", "leaping"),
 }
 # Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.
 WALK = ("zero", "medium", "tuned", "refined")

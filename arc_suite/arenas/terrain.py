@@ -1,7 +1,7 @@
-"""Terrain: lanes of rough ground, slopes, stairs and trenches side by side, each level where a body starts.
+"""Terrain: lanes of rough ground, slopes, stairs, trenches and hurdles side by side, each level where a body starts.
 
-Lanes lead along x. Rough ground and slopes are one height field with cells larger than feet. Stairs and
-trenches are boxes, since feet sink into a steep height field.
+Lanes lead along x. Rough ground and slopes are one height field with cells larger than feet. All else is
+of boxes, since feet sink into a steep height field.
 """
 
 import dataclasses
@@ -29,6 +29,8 @@ _CELL = 0.5  # of the height field
 _GRAIN = 1.0 / 16.0  # of stairs and trenches along x, as near as a width is a multiple of it
 _THICKNESS = 2.0  # of the ground
 _TRENCH = 0.6  # depth
+_BAR = 4  # grains of a hurdle along x, which a height scan of legs as long as the body is high meets
+_RUN_UP = (7.0, 9.0)  # level ground before a trench or hurdle that bodies leap
 _NEAR = 0.5  # how far around its centre the ground under a torso counts
 
 
@@ -52,6 +54,8 @@ _DIFFICULTIES = {
     "slopes": lambda difficulty: {"slope": 0.3 * difficulty},
     "stairs": lambda difficulty: {"rise": 0.05 + 0.25 * difficulty, "width": 1.0},
     "gaps": lambda difficulty: {"width": round(1.0 + 9.0 * difficulty) * _GRAIN},
+    "trenches": lambda difficulty: {"width": round(12.8 + 19.2 * difficulty) * _GRAIN},
+    "hurdles": lambda difficulty: {"rise": 0.1 + 0.3 * difficulty},
 }
 # What a caller may give in metres, the slope in radians, with bounds.
 SIZES = {"rise": (0.0, 100.0), "slope": (0.0, 1.2), "width": (1e-9, 1000.0)}
@@ -59,8 +63,9 @@ _NARROWEST = 0.125  # tread or trench: every step is a box, and boxes take time
 
 
 def sizes(kinds: Sequence[str]) -> tuple[str, ...]:
-    """Return the sizes that a caller may give where all lanes are of these kinds: none of several kinds."""
-    return tuple(_DIFFICULTIES[kinds[0]](0.0)) if len(kinds) == 1 else ()
+    """Return the sizes that a caller may give where all lanes are of these kinds: none if kinds share one."""
+    names = tuple(name for kind in kinds for name in _DIFFICULTIES[kind](0.0))
+    return names if len(set(names)) == len(names) else ()
 
 
 def _rough(random: np.random.RandomState, obstacle: Obstacle, x: np.ndarray, rows: int) -> np.ndarray:
@@ -85,18 +90,36 @@ def _stairs(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray
 
 def _gaps(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray, grain: float) -> np.ndarray:
     """Trenches across lands of 1.5 to 3."""
-    heights, at, width = np.zeros(len(cells)), 0, round(obstacle.width / grain)
+    width = round(obstacle.width / grain)
     lands = np.round(random.uniform(1.5, 3.0, int(len(cells) * grain)) / grain).astype(int)  # more than fit
-    for land in lands:
-        heights[(cells >= at) & (cells < at + width)] = -_TRENCH
-        at += width + land
-    return heights
+    return _across(cells, width, np.concatenate([[0], lands]), -_TRENCH)
+
+
+def _trenches(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray, grain: float) -> np.ndarray:
+    """Trenches with run-ups."""
+    return _across(cells, round(obstacle.width / grain), _run_ups(random, cells, grain), -_TRENCH)
+
+
+def _hurdles(random: np.random.RandomState, obstacle: Obstacle, cells: np.ndarray, grain: float) -> np.ndarray:
+    """Thin bars with run-ups."""
+    return _across(cells, _BAR, _run_ups(random, cells, grain), obstacle.rise)
+
+
+def _run_ups(random: np.random.RandomState, cells: np.ndarray, grain: float) -> np.ndarray:
+    """Cells of level ground before each of more obstacles than fit."""
+    return np.round(random.uniform(*_RUN_UP, int(len(cells) * grain)) / grain).astype(int)
+
+
+def _across(cells: np.ndarray, width: int, lands: np.ndarray, height: float) -> np.ndarray:
+    """Heights of obstacles of a width, each behind a land, lengths in cells; 0 elsewhere."""
+    place = cells[:, None] - (lands + width).cumsum()
+    return np.where(((place >= -width) & (place < 0)).any(axis=-1), height, 0.0)
 
 
 # Kind of ground -> heights, in standing heights, of a lane with its stream of random numbers and its obstacle, at
 # places along x, or in cells of a length from where the level ground ends.
 FIELDS = {"rough": _rough, "slopes": _slopes}
-STEPS = {"stairs": _stairs, "gaps": _gaps}
+STEPS = {"stairs": _stairs, "gaps": _gaps, "trenches": _trenches, "hurdles": _hurdles}
 KINDS = (*FIELDS, *STEPS)
 
 

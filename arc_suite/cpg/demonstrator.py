@@ -45,8 +45,8 @@ class Demonstrator:
                 settings.
             preset: a name: slow, medium or fast, which every body has; for the four robots also tuned, which
                 earns most of what the paper's law can earn in walk, and refined, which earns most of all;
-                steered or surefooted, which follow a command; sighted, which needs a height scan; for leaper
-                balanced; planned, for the task navigate. Or parameters of a law: a `Preset`,
+                steered or surefooted, which follow a command; sighted and leaping, which need a height scan;
+                for leaper balanced; planned, for the task navigate. Or parameters of a law: a `Preset`,
                 `SteeringParameters`, ...; a number is a target speed as a share of sqrt(g h), h being the
                 standing height, negative for backwards.
 

@@ -56,14 +56,20 @@ def shifts(view: View, landing, along, places, height: float):
         places: (feet, 2) where feet stand at ease, m.
         height: the standing height, m.
     """
+    return landings(view, landing, along, places, height)[0]
+
+
+def landings(view: View, landing, along, places, height: float, around=AROUND) -> tuple:
+    """Return `shifts`, and whether there is ground to land on, (environments, feet), with ground around, in h."""
     numpy = landing.__array_namespace__()
     at_ease = numpy.broadcast_to(numpy.asarray(places), landing.shape)
     level = numpy.median(view.ground(at_ease[..., 0], at_ease[..., 1]), axis=-1)
-    tried = (SHIFTS[:, None] + AROUND).ravel() * height
+    tried = (SHIFTS[:, None] + around).ravel() * height
     points = landing[..., None, :] + along[..., None, :] * tried[:, None]
-    ground = view.ground(points[..., 0], points[..., 1]).reshape(*landing.shape[:2], len(SHIFTS), len(AROUND))
+    ground = view.ground(points[..., 0], points[..., 1]).reshape(*landing.shape[:2], len(SHIFTS), len(around))
     safe = (ground > level[:, None, None, None] - DEEP).all(axis=-1)
-    return height * numpy.where(safe.any(axis=-1), numpy.asarray(SHIFTS)[safe.argmax(axis=-1)], 0.0)
+    found = safe.any(axis=-1)
+    return height * numpy.where(found, numpy.asarray(SHIFTS)[safe.argmax(axis=-1)], 0.0), found
 
 
 def _index(place, places):

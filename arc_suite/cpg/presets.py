@@ -4,14 +4,20 @@ import json
 from pathlib import Path
 
 from arc_suite.cpg.balancing import BalancingParameters
+from arc_suite.cpg.leaping import LeapingParameters
+from arc_suite.cpg.leaps import Leap
 from arc_suite.cpg.planner import PlanningParameters
 from arc_suite.cpg.prescribed import Bend, Preset
 from arc_suite.cpg.sighted import SightedParameters
 from arc_suite.cpg.steering import SteeringParameters
 from arc_suite.robots.gaits import TRIPOD, TROT
 
+# Leaps that generated bodies try. Their feet stand wide, so that they step over trenches of the standing height.
+_LEAPS = Leap(drive=1.5), Leap(), Leap(drive=4.0), Leap(back=0.3, forward=0.7, drive=4.0)
+_LEAPING = LeapingParameters(choice=_LEAPS, widest=1.0)
 
-def _commanded(sighted: SightedParameters, **build) -> dict:
+
+def _commanded(sighted: SightedParameters, leaping: LeapingParameters = _LEAPING, **build) -> dict:
     """Presets of a body that follow a command, given the parameters of steering that depend on its build."""
     steered = SteeringParameters(**build)
     surefooted = steered._replace(lift=0.45, gain=(2.0, 2.0, 1.0), integral=0.6, attitude=0.3)
@@ -23,6 +29,7 @@ def _commanded(sighted: SightedParameters, **build) -> dict:
         "surefooted": surefooted,
         "reactive": reactive,
         "sighted": sighted,
+        "leaping": leaping._replace(walk=sighted),
         "planned": planned,
     }
 
@@ -43,6 +50,7 @@ DEFAULTS_OF_SERVOS = {
     "surefooted": _STEERED._replace(lift=0.3),
     "reactive": _STEERED._replace(integral=0.0),
     "sighted": _SIGHTED,
+    "leaping": _LEAPING._replace(walk=_SIGHTED),
     "planned": PlanningParameters(_STEERED),
 }
 # Of imported bodies that step for their balance; on six legs such steps tip them.
@@ -107,8 +115,14 @@ for _robot, _found in _SEARCHED.items():
     PRESETS[_robot] |= {"tuned": _tuned, "refined": _tuned._replace(**_found["refined"])}
 
 # Leads, and what differs from other bodies, were found by search and by trying.
-PRESETS["queen"] |= _commanded(SightedParameters(ride=0.93), lead=0.12)
-PRESETS["bastion"] |= _commanded(SightedParameters(lift=0.35, lead=0.06, longer=0.0), lead=0.08)
+_QUEENS = Leap(crouch=0.52, back=0.52, forward=0.6, drive=4.1, tuck=0.1, ahead=0.27)
+_BASTIONS = Leap(crouch=0.61, back=0.6, forward=0.51, drive=2.0, tuck=0.37, stretch=1.19, fly=2.6)
+PRESETS["queen"] |= _commanded(SightedParameters(ride=0.93), LeapingParameters(choice=(_QUEENS,)), lead=0.12)
+PRESETS["bastion"] |= _commanded(
+    SightedParameters(lift=0.35, lead=0.06, longer=0.0),
+    LeapingParameters(choice=(_BASTIONS,), near=0.4, most=0.5),
+    lead=0.08,
+)
 PRESETS["tick"] |= _commanded(SightedParameters(trust=0.5), lead=0.1)
 PRESETS["leaper"] |= _commanded(SightedParameters(), share=0.03, level=1.0, sweep=0.8, unload=0.0, lead=0.04)
 PRESETS["leaper"]["balanced"] = BalancingParameters(

@@ -6,6 +6,7 @@ from typing import Any
 
 from arc_suite import robots
 from arc_suite.cpg.balancing import Balanced, BalancingParameters
+from arc_suite.cpg.leaping import Leaping, LeapingParameters
 from arc_suite.cpg.planner import Planned, PlanningParameters
 from arc_suite.cpg.prescribed import PrescribedLaw, Preset
 from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
@@ -22,6 +23,7 @@ LAWS = {
     float: StrideLaw,
     SteeringParameters: Steered,
     SightedParameters: Sighted,
+    LeapingParameters: Leaping,
     BalancingParameters: Balanced,
     PlanningParameters: Planned,
 }

@@ -1,9 +1,8 @@
-"""The eleven tasks that follow a command: each is a command on a ground, with what differs in numbers."""
+"""The twelve tasks that follow a command: each is a command on a ground, with what differs in numbers."""
 
 from collections.abc import Mapping
 from typing import ClassVar
 
-from arc_suite.arenas import terrain
 from arc_suite.tasks.command import AlongLane, Schedule, ToGoal
 from arc_suite.tasks.command_task import COSTS, CommandTask
 from arc_suite.tasks.direction import Direction
@@ -85,8 +84,17 @@ class Course(CommandTask):
 
     from_body = _STACKED
     name, yaw = "course", 0.3
-    command, ground = AlongLane(), Lanes(terrain.KINDS, copies=(2, 1))
+    command, ground = AlongLane(), Lanes(("rough", "slopes", "stairs", "gaps"), copies=(2, 1))
     demonstrators = ("balanced", "surefooted")
+
+
+class Leap(CommandTask):
+    """Leaping over trenches or hurdles, drawn for every episode."""
+
+    from_body = _STACKED
+    name, yaw = "leap", 0.3
+    command, ground = AlongLane(), Lanes(("trenches", "hurdles"), copies=(4, 1), difficulty=0.0)
+    demonstrators = ("leaping", "sighted")
 
 
 class Roam(CommandTask):

@@ -42,7 +42,9 @@ def test_it_is_a_preset_of_leaper_alone():
     assert "balanced" in presets_of(ROBOTS["leaper"])
     for body in (ROBOTS["queen"], ROBOTS["bastion"], ROBOTS["tick"], generator.random_body(4)):
         assert "balanced" not in presets_of(body)
-    with pytest.raises(ValueError, match="^unknown preset 'balanced'; did you mean 'planned'.*sighted, planned.$"):
+    with pytest.raises(
+        ValueError, match="^unknown preset 'balanced'; did you mean 'planned'.*sighted, leaping, planned.$"
+    ):
         Demonstrator("queen", "balanced")
 
 

@@ -23,6 +23,7 @@ PRESETS = [
     ("leaper", "steer", "surefooted"),
     ("queen", "gaps", "sighted"),
     ("leaper", "roam", "balanced"),
+    ("queen", "leap", "leaping"),
 ]
 
 

@@ -340,3 +340,16 @@ def test_roaming_follows_commands_from_the_middle_of_the_lane():
     assert task.stream_state(walked).outcome == pytest.approx(0.6)
     fell = walked._replace(health=memory.health._replace(fell=np.True_))
     assert task.stream_state(fell).outcome == pytest.approx(0.12)
+
+
+def test_trenches_and_hurdles_stand_apart():
+    arena = prepared("queen", "leap", {"width": 0.75, "rise": 0.3})[0].scene.arena
+    x = np.arange(0.0, 40.0, 1.0 / 32.0) + 1.0 / 64.0
+    for lane, (kind, _) in enumerate(arena.lanes):
+        heights = arena.height(x * arena.unit, np.full_like(x, arena.start(lane))) / arena.unit
+        edges = x[1:][np.diff(heights != 0.0)]
+        height, length = {"trenches": (-0.6, 1.0), "hurdles": (0.4, 0.25)}[kind]
+        assert set(heights.round(9)) == {0.0, height}
+        np.testing.assert_allclose(np.diff(edges)[::2], length)
+        lands = np.diff(edges)[1::2]
+        assert 6.9 < lands.min() <= lands.max() < 9.1

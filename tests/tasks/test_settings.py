@@ -73,7 +73,14 @@ def test_tasks_that_differ_in_data_alone_have_the_same_settings():
     assert {task: names(task) for task in TASKS if task in ("shoved", "limp")} == dict.fromkeys(
         ("shoved", "limp"), names("steer")
     )
-    sizes = {"rough": ["rise"], "slopes": ["slope"], "stairs": ["rise", "width"], "gaps": ["width"], "course": []}
+    sizes = {
+        "rough": ["rise"],
+        "slopes": ["slope"],
+        "stairs": ["rise", "width"],
+        "gaps": ["width"],
+        "leap": ["rise", "width"],
+        "course": [],
+    }
     for task, own in (sizes | {"roam": ["commands", "rise"]}).items():
         assert sorted(names(task)) == sorted((*names("course"), *own))
 

@@ -49,7 +49,7 @@ METRICS = {
 }
 
 # The page that explains a task, where it is another one than that of the task's name.
-_EXPLAINED = dict.fromkeys(("rough", "slopes", "stairs", "gaps", "course", "roam"), "ground")
+_EXPLAINED = dict.fromkeys(("rough", "slopes", "stairs", "gaps", "course", "leap", "roam"), "ground")
 
 
 def terms(kind: type[Task]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Motions in which nobody walks, from the pose at rest: a breath, a lean, a blow, a rise from the belly, a death."""
+"""Motions in which nobody walks, from the pose at rest: a breath, a lean, a blow, a rise, jumps, a death."""
 
 import copy
 import math
@@ -8,8 +8,10 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.animation.clips.recordings import Recording
-from arc_suite.animation.clips.root_motion import Motion, Pose, standing
+from arc_suite.animation.clips.root_motion import Motion, Pose, advancing, standing
+from arc_suite.cpg import leaps
 from arc_suite.cpg.drives import drive
+from arc_suite.cpg.selection import presets_of
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.outline import solid_corners
@@ -23,6 +25,7 @@ _BLOW = 0.5  # change of the torso's velocity, backwards
 _STAGGER, _SINK, _HOLD, _GIVE, _FALL = 8.0, 6.0, 2.0, 1.5, 6.0
 _FLACCID = 0.05  # of the damping of joints without life
 _LIES = 0.6  # of the height at rest, below which a torso lies
+_LEAST = {"clearance": 0.1, "distance": 0.8}  # of the standing height: of feet in a jump and in a leap
 _NEAR = 0.1  # of the height at rest, within which a torso lies on the ground
 _BREATH = 0.012  # of the standing height, by which the torso sinks and rises
 _ASTRAY = 0.01  # of the standing height: a breath is shallower where a sole would be further from its place
@@ -80,6 +83,37 @@ def rise(body: Body, rest: Pose) -> Motion:
     first = sizing.simulation(body).substeps * (sink + hold)
     _check_lies(body, rest, recording.poses[first])
     return standing(recording, first, len(recording.poses) - 1 - first)
+
+
+def jump(body: Body, rest: Pose) -> Motion:
+    """Return how a body jumps on the spot.
+
+    Raises:
+        ValueError: its feet do not leave the ground, or it does not land on them.
+    """
+    recording = _leapt(body, rest, leaps.JUMPS, "clearance")
+    return standing(recording, 0, len(recording.poses) - 1)
+
+
+def leap(body: Body, rest: Pose) -> Motion:
+    """Return how a body leaps ahead, over a root that goes along below its torso.
+
+    Raises:
+        ValueError: its feet do not leave the ground, or it does not land on them.
+    """
+    return advancing(_leapt(body, rest, presets_of(body)["leaping"].choice, "distance"))
+
+
+def _leapt(body: Body, rest: Pose, choice: tuple[leaps.Leap, ...], measure: str) -> Recording:
+    legs = Legs.of(sizing.sized(body))
+    found, flight = leaps.best(body, tuple(rest.joints.tolist()), choice, measure)
+    if not flight.landed:
+        raise ValueError("it does not land on its feet")
+    if (reached := getattr(flight, measure)) < _LEAST[measure]:
+        raise ValueError(f"the {measure} of its feet is {reached:.2f} standing heights, less than {_LEAST[measure]}")
+    targets = leaps.keyframes(body, legs, legs.by_leg(rest.joints), found)
+    held = np.tile(rest.joints, (_steps(body, _HOLD), 1))
+    return _driven(body, rest, np.concatenate([targets, held]) + _holding(body, rest) - rest.joints)
 
 
 def death(body: Body, rest: Pose) -> Motion:

@@ -86,6 +86,8 @@ CLIPS: dict[str, WalkLoop | Passage | Idle | Acted | Showcase] = {
     "hit": Acted(acting.hit, (0, -1)),
     "limp": WalkLoop((1.0, 0.0, 0.0), failing=0),
     "rise": Acted(acting.rise, (-1,)),
+    "jump": Acted(acting.jump, (0, -1)),
+    "leap": Acted(acting.leap, (0, -1)),
     "death": Acted(acting.death, (0,)),
     "tuned": Showcase("tuned"),
     "refined": Showcase("refined"),

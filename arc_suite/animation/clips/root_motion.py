@@ -194,6 +194,14 @@ def standing(recording: Recording, first: int, samples: int) -> Motion:
     return on_root(recording.step, poses, root, relative(place[0], place))
 
 
+def advancing(recording: Recording) -> Motion:
+    """Return a recording whose root goes straight ahead below the torso."""
+    place = places(recording.poses)
+    root = (place - place[0]) * (1.0, 0.0, 0.0)
+    motion = on_root(recording.step, recording.poses, root, relative(root, relative(place[0], place)))
+    return motion._replace(twist=logarithm(root[-1]) / motion.seconds)
+
+
 def on_root(step: float, poses, root, local) -> Motion:
     """Put poses onto a root, given where the torso is (samples, 3) in the root's frame, seen from above."""
     turn = local[:, 2] - rotations.yaw(poses[:, 3:7])

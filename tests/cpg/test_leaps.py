@@ -1,0 +1,48 @@
+"""Leaps: keyframes of joints, what a trial tells, and the demonstrator over a trench."""
+
+import numpy as np
+import pytest
+
+from arc_suite.cpg import Demonstrator, leaps
+from arc_suite.envs.vector import VectorEnv
+from arc_suite.models.kinematics import Legs
+from arc_suite.models.sizing import sized
+from arc_suite.robots import ROBOTS
+
+
+def test_keyframes_crouch_and_come_back():
+    body = sized(ROBOTS["queen"])
+    legs = Legs.of(body)
+    rest = legs.by_leg(np.zeros(len(body.joint_names)))
+    angles = leaps.keyframes(body, legs, rest, leaps.Leap())
+    made = leaps.movement(body, legs, rest, leaps.Leap())
+    assert made.crouched < made.stretched < made.landed < len(angles) == len(made.offsets)
+    low = legs.soles(legs.by_leg(angles[made.crouched - 1]))[0] - legs.soles(rest)[0]
+    assert low[:, 2].min() > 0.3 * body.torso.standing_height  # soles come up to the torso
+    np.testing.assert_allclose(angles[-1], legs.by_joint(rest), atol=0.05)
+
+
+def test_a_jump_leaves_the_ground_and_lands():
+    rest = (0.0,) * len(ROBOTS["queen"].joint_names)
+    _, flight = leaps.best(ROBOTS["queen"], rest, leaps.JUMPS[-1:], "clearance")
+    assert flight.landed and flight.seconds > 0.2 and flight.clearance > 0.2
+    assert flight.rise > 0.2 and abs(flight.distance) < 0.5
+
+
+def test_queen_leaps_over_a_trench():
+    """In the lane that seed 0 draws; by steps alone she falls."""
+    environment = VectorEnv("queen", "leap", 1, 1, "Disabled", task_kwargs={"width": 0.75})
+    policy, far = Demonstrator(environment, "leaping"), 0.0
+    observation, _ = environment.reset(seed=0)
+    for _ in range(370):
+        observation, _, ended, *_ = environment.step(policy.act(environment.task.split(observation)))
+        far = environment.batch.data.qpos[0, 0]
+    assert not ended.any() and policy.law.flight.landed
+    assert far > 12.5 * ROBOTS["queen"].torso.standing_height
+
+
+def test_who_cannot_leap_is_told():
+    with pytest.warns(
+        UserWarning, match="^tick cannot leap: its feet get .* h ahead, and 0.8 h are needed; leaping walks"
+    ):
+        Demonstrator(VectorEnv("tick", "leap", 1, 1), "leaping")
