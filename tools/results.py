@@ -39,7 +39,7 @@ PRESETS = {
     "roam": ("zero", "steered", "surefooted", "balanced"),
     "navigate": ("zero", "steered", "planned"),
     **dict.fromkeys(LANES, ("zero", "tuned", "surefooted", "balanced", "sighted")),
-    "leap": ("zero", "surefooted", "sighted", "leaping"),
+    "leap": ("zero", "sighted", "leaping"),
 }
 # Presets that straight walks are compared with, for anchors alone: docs/results.md has them by `arc-suite evaluate`.
 WALK = ("zero", "medium", "tuned", "refined")
