@@ -35,7 +35,8 @@ class Episodes:
         self.environment, self._act = environment, act
         self.follows_velocities = environment.task.definition.commands.get("command") == 3
         self.desired: np.ndarray | None = None
-        self._pose, self._gait = None, None
+        self._pose: Sequence[float] | np.ndarray | None = None
+        self._gait: str | None = None
         self.control_timestep = environment.control_timestep()
         self.restart()
 

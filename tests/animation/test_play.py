@@ -224,6 +224,10 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     assert data_of(page) == [creature]
     assert page == play.page([creature])
     assert all('integrator="Euler"' in ground["xml"] for ground in creature["grounds"].values())
+    choices = creature["task"]["direction"]
+    assert choices["names"] == ["height", "forward", "left", "roll", "pitch", "yaw"] and len(choices["room"]) == 6
+    assert list(choices["gaits"]) == ["own", "trot", "pace", "bound", "walk", "wave"]
+    assert play.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
 
 
 def test_a_page_begins_with_the_licences(monkeypatch):
