@@ -280,15 +280,15 @@ def test_the_sidecar_has_blend_spaces_and_tells_missing_steps(robot):
 
 @pytest.mark.slow
 def test_what_is_played_from_rest_begins_or_ends_with_idle():
-    clips = made("tick", "idle", "hit", "limp", "rise", "death")
+    clips = made("tick", "idle", "hit", "limp", "rise", "jump", "death")
     rest, body = clips["idle"].motion.pose(0), ROBOTS["tick"]
-    for name, ends in (("hit", (0, -1)), ("rise", (-1,)), ("death", (0,))):
+    for name, ends in (("hit", (0, -1)), ("rise", (-1,)), ("jump", (0, -1)), ("death", (0,))):
         for end in ends:
             for one, other in zip(clips[name].motion.pose(end), rest, strict=True):
                 np.testing.assert_allclose(one, other, atol=1e-6)
         assert not clips[name].loops and not clips[name].moves
     heights = {name: clip.motion.positions[:, 2] / rest.position[2] for name, clip in clips.items()}
-    assert heights["death"][-1] < 0.6 and heights["rise"][0] < 0.6
+    assert heights["death"][-1] < 0.6 and heights["rise"][0] < 0.6 < 1.3 < heights["jump"].max()
     assert np.ptp(clips["hit"].motion.positions[:, 0]) > 0.05 * body.torso.standing_height
     told = export.sidecar(body, list(clips.values()))["clips"]
     assert {name for name, figures in told.items() if "additive_to" in figures} == {"hit", "limp_loop"}
