@@ -84,6 +84,7 @@ ROBOTS = {robot: View(robot, **_CLOSE) for robot in ("queen", "bastion", "tick",
 TASKS = {
     "walk": View("queen", azimuth=-60.0, distance=4.0),
     "steer": View("bastion", "steer", 39, 105, 60, azimuth=-25.0, elevation=32.0, distance=6.2),
+    "directed": View("queen", "directed", 5, 45, 50, azimuth=-75.0, elevation=10.0, distance=4.5),
     "rough": View("tick", "rough", **_SIDE),
     "slopes": View("queen", "slopes", start=120, **{**_SIDE, "elevation": 8.0}),
     "stairs": View("bastion", "stairs", **{**_SIDE, "azimuth": -112.0}),

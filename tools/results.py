@@ -34,6 +34,7 @@ LANES = ("rough", "slopes", "stairs", "gaps", "course")
 # Task -> presets to compare; zero stands still.
 PRESETS = {
     "steer": ("zero", "tuned", "steered", "surefooted", "reactive"),
+    "directed": ("zero", "steered", "surefooted", "reactive", "balanced"),
     "shoved": ("zero", "tuned", "steered", "surefooted", "reactive"),
     "limp": ("zero", "tuned", "steered", "surefooted", "reactive"),
     "roam": ("zero", "steered", "surefooted", "balanced"),

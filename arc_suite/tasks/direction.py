@@ -28,7 +28,7 @@ CYCLE = 1 << 20  # units of the clock
 STEADY = ("trot", "walk", "tripod", "tetrapod", "ripple")  # gaits that are drawn, where they fit
 
 _TEMPI = (0.8, 1.2)  # of the frequencies that are drawn, multiples of the prescribed one
-_SHARE = 0.5  # of the numbers of a pose that are drawn; others are 0
+_SHARE = 0.35  # of the numbers of a pose that are drawn; others are 0
 _SPEED = 0.25  # at which a pose glides, standing heights or rad a sqrt(h / g)
 _LEAST = 0.1  # standing heights or rad: a pose as far from the rest is judged as strictly as any nearer one
 _UNTIMED = 0.7  # share of the feet that follow a contact schedule by chance, when a body walks in another gait
@@ -117,7 +117,7 @@ class Direction(Schedule):
             them for the prescribed gait alone.
     """
 
-    poses: float = 0.6
+    poses: float = 0.8
     gaits: tuple[str, ...] | None = None
 
     settings: ClassVar[tuple[str, ...]] = ("commands", "poses", "gaits")

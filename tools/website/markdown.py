@@ -55,7 +55,7 @@ def number(value) -> str:
     """Return a number, several numbers, a name or None as a cell of a table."""
     if isinstance(value, tuple | list | np.ndarray):
         values = np.asarray(value).tolist()
-        same = len(values) > 2 and len(set(values)) == 1
+        same = len(values) > 2 and all(each == values[0] for each in values)
         return number(values[0]) if same else f"({', '.join(map(number, values))})"
     if isinstance(value, Mapping):
         return ", ".join(f"{name} {number(each)}" for name, each in value.items()) or "none"

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from arc_suite.models import posture
 from arc_suite.tasks import TASKS, sensors
 from arc_suite.tasks.command_task import CommandTask
 from arc_suite.tasks.contract import Task
@@ -16,6 +17,8 @@ BLOCKS = {
     "contact_forces": "torque and force of the contacts on each rigid part, clipped to [-1, 1]",
     "gait_clock": "sine and cosine of the gait's phase",
     "command": "desired velocity, and the measured motion, a leaky mean over a gait cycle",
+    "pose": "height, forward and left of the torso at rest; roll, pitch and yaw",
+    "gait": "sine and cosine of the phase of each foot, duty factor and frequency of the gait",
     "goal": "direction of the goal as cosine and sine, and its distance, at most 1",
     "scan": "height of the ground at 25 x 7 points around the torso, clipped to [-1, 1]; 0 is level ground",
     "ranges": "distance of the nearest pillar along 24 rays, at most 1",
@@ -80,6 +83,17 @@ def _command(task: Task) -> Iterator[tuple[str, str]]:
         yield from ((f"{what} {direction}", unit) for direction, unit in units.items())
 
 
+def _pose(task: Task) -> Iterator[tuple[str, str]]:
+    yield from zip(posture.NAMES, ("h", "h", "h", "rad", "rad", "rad"), strict=True)
+
+
+def _gait(task: Task) -> Iterator[tuple[str, str]]:
+    for function in ("sine", "cosine"):
+        yield from ((f"{function} of the phase of {leg.name}", "") for leg in task.scene.body.legs)
+    yield "duty factor", ""
+    yield "frequency", "sqrt(g / h)"
+
+
 def _goal(task: Task) -> Iterator[tuple[str, str]]:
     yield from ((f"{function} of the goal's direction", "") for function in ("cosine", "sine"))
     yield "distance of the goal", f"{sensors.FAR:g} R"
@@ -100,6 +114,8 @@ _NAMES = {
     "contact_forces": _contact_forces,
     "gait_clock": _gait_clock,
     "command": _command,
+    "pose": _pose,
+    "gait": _gait,
     "goal": _goal,
     "scan": _scan,
     "ranges": _ranges,

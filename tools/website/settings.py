@@ -8,8 +8,10 @@ from arc_suite.envs.setup import Setup
 from arc_suite.learning.studies.leaderboard import table
 from arc_suite.robots import ROBOTS, gaits
 from arc_suite.tasks import modifiers, parameters, walk
+from arc_suite.tasks.command import Schedule
 from arc_suite.tasks.contract import STEPS, Task
-from arc_suite.tasks.ground import LEVELS, Lanes
+from arc_suite.tasks.direction import Direction
+from arc_suite.tasks.ground import LEVELS, Lanes, Level
 from arc_suite.tasks.modifiers import Modifiers
 from arc_suite.tasks.parameters import Noise, Parameters
 from website import markdown
@@ -30,7 +32,7 @@ _MEANINGS = {
 MEANINGS = {
     **{
         name: text
-        for kind in (Parameters, Noise, walk.WalkSettings, Lanes, Modifiers)
+        for kind in (Parameters, Noise, walk.WalkSettings, Schedule, Direction, Level, Lanes, Modifiers)
         for name, text in markdown.fields(kind).items()
     },
     **_MEANINGS,
@@ -39,6 +41,7 @@ _BOUNDS = {
     **parameters.BOUNDS,
     **modifiers.BOUNDS,
     **terrain.SIZES,
+    "poses": (0.0, 1.0),
     "difficulty": (0.0, 1.0),
     "level": (0, LEVELS - 1),
     "terrain_seed": (0, 2**32 - 1),
@@ -78,5 +81,5 @@ def bounds(name: str) -> str:
 def _defaults(task: Task) -> dict[str, Any]:
     given = task.settings
     found = {**given.parameters._asdict(), **given.noise._asdict(), **given._asdict()}
-    ground = found.get("ground")
-    return {**found, **(vars(ground) if ground is not None else {}), "weights": "see Reward"}
+    parts = (vars(found[name]) for name in ("ground", "command") if name in found)
+    return {**found, **{name: value for part in parts for name, value in part.items()}, "weights": "see Reward"}

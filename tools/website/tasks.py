@@ -33,6 +33,8 @@ _COMMAND = {
     "the tilt",
     "healthy": "1 while the body has not fallen",
     "obedient_gait": "what the step earns for following the command, times the share of feet as prescribed",
+    "obedience": "what the step earns for following the velocity, times that for the pose, times 1 where all feet keep "
+    "to the gait, 0 where 0.7 of them do, a leaky mean",
     "goal": "1 in the step that reaches a goal",
     "transport": "work of the motors by weight, over the displacement at v*",
 }
@@ -41,6 +43,8 @@ METRICS = {
     "distance": "distance along the lane, as a share of that at v*, over the whole episode",
     "goals": "number of goals reached",
     "tracking": "mean of what the steps earn for following the command, at most 1",
+    "pose_tracking": "mean of what the steps earn for keeping the pose, at most 1",
+    "level": "of the curriculum",
     "fell": "1 if the body fell",
     "sank": "1 if a foot got stuck under the ground, a contact artefact",
     "gait_compliance": "share of foot samples that agree with the prescribed contact schedule",
