@@ -198,7 +198,7 @@ async function main() {
   for (const list of [choice, ground]) list.addEventListener("change", () => (list.blur(), change()));
   window.addEventListener("keydown", (event) => {
     const act = keys[event.code];
-    const used = event.code === "Space" && event.target.closest("button, select, summary, input"); // pressed by the space bar
+    const used = event.code === "Space" && event.target.closest("button, select, summary"); // pressed by the space bar
     if (!act || used || event.repeat || event.ctrlKey || event.metaKey || event.altKey) return;
     event.preventDefault();
     act();

@@ -69,17 +69,17 @@ def creature(body: Body, policy: str = "cpg", preset: str | None = None) -> dict
         OSError: a policy's file cannot be read.
     """
     setup = Setup.of(body, _DIRECTED if policy == "cpg" else _TASK)
-    steer = setup.definition
+    commanded = setup.definition
     if policy == "cpg":
-        task, driver = steer, _law(steer, preset or "steered")
+        task, driver = commanded, _law(commanded, preset or "steered")
     else:
-        task, driver = _graph(body, policy, steer)
+        task, driver = _graph(body, policy, commanded)
     return pages.drawn(body) | {
         "name": body.name,
-        "timestep": steer.scene.control_timestep / steer.scene.substeps,
-        "substeps": steer.scene.substeps,
+        "timestep": commanded.scene.control_timestep / commanded.scene.substeps,
+        "substeps": commanded.scene.substeps,
         "grounds": {name: _ground(setup, arena) for name, arena in GROUNDS.items()},
-        "task": pages.plain(_task(task, steer), digits=None),
+        "task": pages.plain(_task(task, commanded), digits=None),
         "policy": pages.plain(driver, digits=None),
     }
 
@@ -96,16 +96,16 @@ def _ground(setup: Setup, arena: str) -> dict[str, Any]:
     return {"xml": text, "start": pages.plain(task.cleared(task.read(data)), digits=None)}
 
 
-def _task(task: Task, steer: Task) -> dict[str, Any]:
+def _task(task: Task, commanded: Task) -> dict[str, Any]:
     """What a page computes of a task: its frame, clock, units and health; see web/task.js.
 
     Args:
         task: of the policy.
-        steer: of the same body, whose units and health hold where the task has none.
+        commanded: of the same body, whose units and health hold where the task has none.
     """
     headed = "command" in task.commands
-    context, health = (task if headed else steer).context, steer.health  # type: ignore[attr-defined]  # of commands
-    scene, (force_unit,) = steer.scene, context.force_unit
+    context, health = (task if headed else commanded).context, commanded.health  # type: ignore[attr-defined]  # of commands
+    scene, (force_unit,) = commanded.scene, context.force_unit
     layout, angles = scene.layout, np.r_[scene.layout.joint_angles]
     return {
         "headed": headed,
