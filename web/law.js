@@ -48,7 +48,7 @@ export class Law {
   // Angles of the links of each leg, rad, that bring the soles where they are to be in the next control step.
   planned(requested, size, going, gait, posed) {
     const c = this.constants, count = c.legs.length;
-    const [forward, left, turn] = requested.map((value, i) => value * c.units[i]);
+    const [forward, left, turn] = requested.map((value, i) => clamp(value, -c.most, c.most) * c.units[i]);
     const [duty, rate] = gait.slice(2 * count), frequency = rate * c.rate, half = (0.5 * duty) / frequency;
     return c.legs.map((leg, index) => {
       const [x, y, z] = leg.place, flow = [forward - turn * y, left + turn * x];

@@ -6,14 +6,11 @@ from typing import Any
 import numpy as np
 
 from arc_suite.models import posture
-from arc_suite.models.outline import torso_box
 from arc_suite.robots import gaits
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 
 OWN = "own"  # the gait that a task prescribes
-
-_CLEAR = 0.15  # standing heights of a torso in its lowest pose over the ground
 
 
 def directs(task: Task) -> bool:
@@ -22,10 +19,8 @@ def directs(task: Task) -> bool:
 
 
 def room(body: Body) -> np.ndarray:
-    """Return how far each number of a pose can go, (6, 2), with feet that may slide, and without a torso that lies."""
-    bounds, lying = posture.room(body, planted=False).round(2), -torso_box(body)[0][2] / body.torso.standing_height
-    bounds[0] = bounds[0].clip(round(min(0.0, lying + _CLEAR - posture.rest(body).ride), 2))
-    return bounds
+    """Return how far each number of a pose can go, (6, 2), with feet that may slide."""
+    return posture.room(body, planted=False).round(2)
 
 
 def named(task: Task) -> dict[str, list[float]]:

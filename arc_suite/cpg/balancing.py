@@ -69,7 +69,7 @@ class Balanced(Stepping):
         if feet is not None and len(feet) != (ranks := max(body.ranks) + 1):
             raise ValueError(f"preset: {body.name} has {ranks} ranks of legs, and feet is for {len(feet)}")
         super().__init__(task, parameters)
-        self.shorter, self.attitude = parameters.shorter, parameters.attitude
+        self.shorter, self.attitude, self.most = parameters.shorter, parameters.attitude, parameters.most
         self.duty_factor -= parameters.shorter
         self.stance = self.duty_factor / gait_of(task).frequency
         self._ride = -self.places[:, 2].mean()
@@ -86,7 +86,7 @@ class Balanced(Stepping):
     def balanced(self, motion, vertical, observation: Mapping) -> tuple:
         """Return the velocity that feet give, and shifts of footholds; see `Stepping`."""
         numpy, p = motion.__array_namespace__(), self.parameters
-        motion = motion.clip(-p.most, p.most) * self.units
+        motion, _ = super().balanced(motion, vertical, observation)
         motion = motion * (2.0 - numpy.hypot(vertical[:, :1], vertical[:, 1:2]) / _STEEP).clip(0.0, 1.0)
         surplus = observation["velocities"][:, :2] - observation["command"][:, :2] * self.units[:2]
         return motion, p.capture * self._fall * surplus - p.lean * self._ride * vertical[:, :2]

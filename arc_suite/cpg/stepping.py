@@ -51,9 +51,10 @@ class Stepping(CommandLaw):
         lift: of a foot in mid-swing, m.
         attitude: how far a foot is pushed down, as a share of how far the torso's tilt sinks its place.
         damping: of inverse kinematics, in standing heights.
+        most: largest request, in units of the command.
     """
 
-    across, shorter, attitude, damping = 1.0, 0.0, 0.0, posture.DAMPING
+    across, shorter, attitude, damping, most = 1.0, 0.0, 0.0, posture.DAMPING, np.inf
 
     def __init__(self, task: Task, parameters):
         """Fit the law to a task; see `CommandLaw`."""
@@ -111,7 +112,7 @@ class Stepping(CommandLaw):
             vertical: (environments, 3) in the torso's frame, less the attitude that is asked for.
             observation: blocks by name.
         """
-        return motion * self.units, motion[:, :2] * 0.0
+        return motion.clip(-self.most, self.most) * self.units, motion[:, :2] * 0.0
 
     def _corrected(self, off, pose, height, vertical) -> tuple:
         """The integral of the error of a pose (environments, 6), and the pose that makes up for it."""
@@ -154,7 +155,8 @@ class Directed(Stepping):
     """Follows a velocity in a pose and a gait by command, on level ground, without sight."""
 
     across = 0.3
-    damping = 0.05  # with less of it, legs that are stretched out jump
+    damping = 0.1  # with less of it, legs that are stretched out jump
+    most = 2.0  # of a request, in units of the command: feedback on a body that cannot go on would throw it
 
     def _eased(self, task: Task) -> tuple:
         return self._rest.legs, self._rest.places, self._rest.angles
@@ -167,6 +169,7 @@ class Directed(Stepping):
             "legs": [dict(zip((*_OF_LEGS, "place", "angles"), leg, strict=True)) for leg in legs],
             **self.drive._asdict(),
             "units": self.units,
+            "most": self.most,
             "gain": p.gain,
             "smoothing": self.smoothing,
             "integral": p.integral * cycles,
