@@ -76,7 +76,7 @@ def gait(tracks: Mapping[str, Track]) -> Figure:
                 spans = [(start + dt * first, dt * (last - first)) for first, last in _runs(mask)]
                 axis.broken_barh(spans, (leg - height / 2, height), color=colour, linewidth=0)
         compliance, duty, error = metrics.gait_compliance(track), metrics.duty_factor(track), metrics.phase_error(track)
-        wanted = track.parameters.duty_factor
+        wanted = track.duty_factors.mean()
         for column, heading, texts in (
             (1.06, "compliance", [f"{100 * share:.0f} %" for share in compliance]),
             (1.195, f"duty factor\n({wanted:.2f} wanted)", [f"{share:.2f}" for share in duty]),

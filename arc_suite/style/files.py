@@ -14,10 +14,10 @@ import numpy as np
 from arc_suite import archives, checks, files, registry, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.robots.spec import Body
-from arc_suite.style.tracks import Track
+from arc_suite.style.tracks import UNTIMED, Track
 from arc_suite.tasks.parameters import Parameters
 
-FORMAT = "arc_suite tracks 3"  # another number for every change of what a file holds
+FORMAT = "arc_suite tracks 4"  # another number for every change of what a file holds
 
 _MOST = 1 << 32  # bytes of all arrays
 
@@ -28,9 +28,9 @@ _FIELDS = {
     **dict.fromkeys(("positions", "linear_velocities", "angular_velocities"), ("steps", 3)),
     "quaternions": ("steps", 4),
     **dict.fromkeys(("joint_angles", "joint_velocities", "actions", "torques"), ("steps", "joints")),
-    **dict.fromkeys(("torso_heights", "phases"), ("steps",)),
+    **dict.fromkeys(("torso_heights", "phases", "duty_factors"), ("steps",)),
     **dict.fromkeys(("foot_positions", "foot_velocities"), ("steps", "feet", 3)),
-    **dict.fromkeys(("foot_heights", "contacts"), ("steps", "feet")),
+    **dict.fromkeys(("foot_heights", "leg_phases", "contacts"), ("steps", "feet")),
 }
 _PARAMETERS = dict.fromkeys(Parameters._fields, float) | {"phase_offsets": ("feet",)}
 _KINDS = {"contacts": "b"}  # of dtype; others are numbers
@@ -110,7 +110,7 @@ def _track(setup: Setup, arrays: Mapping[str, np.ndarray], index: int) -> Track:
     _check(fields, setup.body)
     if "parameters" in fields:
         fields["parameters"] = Parameters(**fields["parameters"])
-    absent = {"phases": None, "parameters": None, "progress": {}}
+    absent = {**UNTIMED, "parameters": None, "progress": {}}
     return Track(setup=setup, **absent | fields)
 
 
@@ -133,8 +133,8 @@ def _check(fields: Mapping[str, Any], body: Body) -> None:
         for name, value in parameters.items():
             joints = name == "default_angles" and np.ndim(value) == 1
             _value(f"parameters/{name}", value, ("joints",) if joints else _PARAMETERS[name], lengths)
-        if "phases" not in fields:
-            raise ValueError("phases: missing, and there are parameters of a gait")
+        if missing := [name for name in UNTIMED if name not in fields]:
+            raise ValueError(f"{missing[0]}: missing, and there are parameters of a gait")
     for name in ("time_step", "mass", "gravity"):
         checks.number(name, fields[name], 1e-12)
     checks.seed(fields["seed"])

@@ -21,6 +21,12 @@ def _stride_length(track: Track) -> float:
     return track.target_velocity / (_stride_frequency(track) or np.nan)
 
 
+def _duty_factor(track: Track) -> float:
+    """Return the mean duty factor of the gait, without rounding where it is constant."""
+    first = track.duty_factors[0]
+    return float(first + (track.duty_factors - first).mean())
+
+
 class Metric(NamedTuple):
     """The entry of a metric in the table.
 
@@ -48,7 +54,7 @@ METRICS = {
     metric.function.__name__: metric
     for metric in (
         Metric(metrics.gait_compliance, "", lambda track: 1.0, of_gait=True),
-        Metric(metrics.duty_factor, "", lambda track: track.parameters.duty_factor, of_gait=True),
+        Metric(metrics.duty_factor, "", _duty_factor, of_gait=True),
         Metric(metrics.phase_error, "cycles", lambda track: 0.0, of_gait=True),
         Metric(metrics.phase_scatter, "", lambda track: 0.0, of_gait=True),
         Metric(metrics.stride_length, "m", _stride_length, of_gait=True),

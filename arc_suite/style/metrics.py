@@ -38,7 +38,7 @@ def phase_error(track: Track) -> np.ndarray:
     circular data", 1993), taken of the schedule on the same samples too. NaN for a leg that never
     changes between stance and swing, or does so in another rhythm than the clock's.
     """
-    turns = np.exp(1j * (track.phases[:, None] + track.parameters.phase_offsets))
+    turns = np.exp(1j * track.leg_phases)
 
     def middle(stance):
         return ((stance - stance.mean(axis=0)) * turns).mean(axis=0)
@@ -185,8 +185,7 @@ def asymmetry(track: Track) -> np.ndarray:
     """
     torso = track.positions[:, None]
     paths = np.einsum("tij,tfi->tfj", rotations.matrix(track.quaternions), track.foot_positions - torso)
-    cycles = (track.phases[:, None] + track.parameters.phase_offsets) / TWO_PI % 1.0
-    bins = (cycles * _BINS).astype(int) % _BINS  # a cycle that is rounded to 1 is 0
+    bins = (track.leg_phases / TWO_PI % 1.0 * _BINS).astype(int) % _BINS  # a cycle that is rounded to 1 is 0
     means = np.full((len(track.legs), _BINS, 3), np.nan)
     for leg in range(len(track.legs)):
         for occupied in np.unique(bins[:, leg]):

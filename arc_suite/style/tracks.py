@@ -10,9 +10,11 @@ from arc_suite import evaluation
 from arc_suite.envs.setup import Setup
 from arc_suite.policies import Policy
 from arc_suite.robots.spec import Body
-from arc_suite.tasks.clock import desired_contacts
+from arc_suite.tasks.clock import TWO_PI
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.terms import reward
+
+UNTIMED = dict.fromkeys(("phases", "leg_phases", "duty_factors"))  # fields of a track in a task without a gait
 
 
 class Track(NamedTuple):
@@ -36,6 +38,8 @@ class Track(NamedTuple):
         foot_velocities: (steps, feet, 3) of the lowest points of the feet, world frame.
         contacts: (steps, feet) whether the ground pushes on the foot.
         phases: (steps,) of the gait clock, rad; None in a task without a gait.
+        leg_phases: (steps, feet) of the legs in the gait that holds, up to whole turns; None in a task without a gait.
+        duty_factors: (steps,) of the gait that holds; None in a task without a gait.
         terms: the reward's unweighted terms by name, each (steps,).
         weights: signed weight of every term.
         progress: the task's metrics at the end by name.
@@ -62,6 +66,8 @@ class Track(NamedTuple):
     foot_velocities: np.ndarray
     contacts: np.ndarray
     phases: np.ndarray | None
+    leg_phases: np.ndarray | None
+    duty_factors: np.ndarray | None
     terms: Mapping[str, np.ndarray]
     weights: Mapping[str, float]
     progress: Mapping[str, float]
@@ -112,7 +118,7 @@ class Track(NamedTuple):
     @property
     def schedule(self) -> np.ndarray:
         """Feet that the gait wants in stance (the paper's Section 4), (steps, feet) booleans."""
-        return desired_contacts(self.phases, self.parameters.duty_factor, self.parameters.phase_offsets)
+        return self.leg_phases % TWO_PI < TWO_PI * self.duty_factors[:, None]
 
     @property
     def rewards(self) -> np.ndarray:
@@ -132,7 +138,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
         max_steps: to stop early.
 
     Returns:
-        The track; without phases and parameters if the task prescribes no gait.
+        The track; without phases, duty factors and parameters if the task prescribes no gait.
 
     Raises:
         ValueError: a setting of the environment's task that JSON cannot hold, such as an `Arena`.
@@ -163,8 +169,8 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
             "foot_velocities": lowest_point_velocities(model, data, feet, radii),
             "contacts": data.cfrc_ext[feet].any(axis=-1),
         }
-        if (phase := task.phase(run.memory)) is not None:
-            row["phases"] = phase
+        if (gait := task.leg_phases(run.memory)) is not None:
+            row |= {"phases": task.phase(run.memory), "leg_phases": gait[0], "duty_factors": gait[1]}
         rows.append({name: np.array(value) for name, value in row.items()})
         terms.append(run.terms)
     recorded = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
@@ -172,7 +178,7 @@ def record(environment, policy: Policy, seed: int, max_steps: int | None = None)
         setup=setup,
         seed=int(seed),
         time_step=environment.control_timestep(),
-        **{"phases": None} | recorded,
+        **UNTIMED | recorded,
         terms={name: np.array([row[name] for row in terms]) for name in terms[0]},
         weights=dict(task.settings.weights),
         progress={name: float(value) for name, value in run.progress.items()},

@@ -123,6 +123,10 @@ class Command(ABC):
         """Return which feet (..., feet) the gait has on the ground."""
         return clock.at(clock.stance, tick)
 
+    def leg_phases(self, memory, prescribed) -> tuple[Any, Any]:
+        """Return the phase (..., legs) of each leg, rad, and the duty factor (...), given those of the task's gait."""
+        return prescribed
+
     def crouch(self, memory):
         """Return the share (...) of its height that the torso is asked to keep, at most 1."""
         return 1.0

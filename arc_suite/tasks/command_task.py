@@ -239,6 +239,10 @@ class CommandTask(Task):
         """Return the phase (...) of the gait, rad."""
         return self.settings.command.phase(self.clock, memory.core.tick, memory.command)
 
+    def leg_phases(self, memory: CommandTaskMemory) -> tuple[Any, Any]:
+        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds."""
+        return self.settings.command.leg_phases(memory.command, super().leg_phases(memory))
+
     def first(self) -> Any:
         """Return the ground's stream state."""
         return self.settings.ground.first()

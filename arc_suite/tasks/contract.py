@@ -262,6 +262,17 @@ class Task(Observed):
         """Return the phase (...) of the prescribed gait, rad in [0, 2 pi); None where the task prescribes none."""
         return None
 
+    def leg_phases(self, memory) -> tuple[Any, Any] | None:
+        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds.
+
+        The gait wants a leg in stance while its phase, less whole turns, is below 2 pi times the duty factor. None
+        where the task prescribes no gait.
+        """
+        phase, gait = self.phase(memory), self.parameters
+        if phase is None or gait is None:
+            return None
+        return phase[..., None] + gait.phase_offsets, gait.duty_factor
+
     @property
     def unwrapped(self) -> "Task":
         """The task itself, without the wrappers around it."""

@@ -259,6 +259,10 @@ class Direction(Schedule):
         """Return which feet (..., legs) the gait that holds has on the ground."""
         return _phases(memory) < memory.gait[..., -2:-1]
 
+    def leg_phases(self, memory: Directed, prescribed) -> tuple[Any, Any]:
+        """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds."""
+        return _phases(memory) * (TWO_PI / CYCLE), memory.gait[..., -2] / CYCLE
+
     def crouch(self, memory: Directed):
         """Return the share (...) of its height at rest that the torso is asked to keep, at most 1."""
         return (1.0 + memory.pose[..., 0]).clip(max=1.0)

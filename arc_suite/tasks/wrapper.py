@@ -31,8 +31,9 @@ class Wrapper(Observed):
     task: Task
 
     phase, clear_spawn, terms, observe, ended = map(_forwarded, ("phase", "clear_spawn", "terms", "observe", "ended"))
-    progress, resampled, markers = map(_forwarded, ("progress", "resampled", "markers"))
-    failed_legs, stream_state, privileged = map(_forwarded, ("failed_legs", "stream_state", "privileged"))
+    leg_phases, progress, resampled = map(_forwarded, ("leg_phases", "progress", "resampled"))
+    markers, failed_legs, stream_state = map(_forwarded, ("markers", "failed_legs", "stream_state"))
+    privileged = _forwarded("privileged")
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "task":  # also before a copy or a pickle has its fields

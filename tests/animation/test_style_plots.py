@@ -12,6 +12,7 @@ import arc_suite
 from arc_suite.animation.style_plots import BLUE, OF_GAIT, PALE, PICTURES, VERMILION, gait
 from arc_suite.cpg import Demonstrator
 from arc_suite.style import record
+from arc_suite.style.tracks import UNTIMED
 
 
 @pytest.mark.long
@@ -29,7 +30,7 @@ def test_pictures(tmp_path, count):
 def test_pictures_of_a_task_without_a_gait_or_a_way_to_go():
     walk = synthetic()
     steer, stay = (
-        walk._replace(target_velocity=math.nan, **changes) for changes in ({}, {"phases": None, "parameters": None})
+        walk._replace(target_velocity=math.nan, **changes) for changes in ({}, UNTIMED | {"parameters": None})
     )
     for track, names in ((walk, set(PICTURES)), (steer, set(PICTURES)), (stay, set(PICTURES) - set(OF_GAIT))):
         figures = {name: PICTURES[name]({"a": track}) for name in names}

@@ -14,6 +14,7 @@ from arc_suite.envs.setup import Setup
 from arc_suite.robots.generator import generate
 from arc_suite.style import METRICS, measure
 from arc_suite.style.metrics import phase_error
+from arc_suite.style.tracks import UNTIMED
 
 
 def value(name, track):
@@ -78,7 +79,7 @@ def test_heights_are_over_the_ground():
 
 
 def without_gait(track):
-    return track._replace(phases=None, parameters=None, target_velocity=math.nan)
+    return track._replace(**UNTIMED, parameters=None, target_velocity=math.nan)
 
 
 def test_a_task_without_a_gait_has_the_other_metrics():
@@ -116,9 +117,9 @@ def test_phase_error_needs_a_rhythm():
     assert_array_equal(np.isnan(errors), [False, True, False, False])
     other = synthetic(cycles=15)
     faster = 1.4 * TWO_PI * (np.arange(15 * CYCLE) + 0.5) / CYCLE  # a clock of 21 cycles in the same time
-    assert np.isnan(phase_error(other._replace(phases=faster % TWO_PI))).all()
-    never = other.parameters._replace(duty_factor=0.0)  # a schedule without stance has no middle of it
-    assert np.isnan(phase_error(other._replace(parameters=never))).all()
+    assert np.isnan(phase_error(other._replace(leg_phases=faster[:, None] + other.parameters.phase_offsets))).all()
+    never = other._replace(duty_factors=np.zeros(15 * CYCLE))  # a schedule without stance has no middle of it
+    assert np.isnan(phase_error(never)).all()
 
 
 def test_phase_scatter_ignores_a_common_lag():

@@ -38,7 +38,7 @@ def saved(leaper, tmp_path_factory):
     return path
 
 
-@pytest.mark.parametrize("task", ["walk", "steer"])
+@pytest.mark.parametrize("task", ["walk", "steer", "directed"])
 @pytest.mark.parametrize("body", ["queen", BODY], ids=["queen", "made"])
 def test_tracks_survive_the_way_there_and_back(body, task, tmp_path):
     settings = {"arena": "bumps", "gait": "ripple", "weights": {"posture": -1e-9}}
@@ -65,7 +65,7 @@ def test_tracks_of_a_task_without_a_gait_survive_too(tmp_path):
 
 def test_a_file_says_what_made_it(saved):
     with np.load(saved, allow_pickle=False) as arrays:
-        assert arrays["format"] == "arc_suite tracks 3"
+        assert arrays["format"] == "arc_suite tracks 4"
         assert '"mujoco": "3.17' in str(arrays["versions"])
 
 
@@ -122,10 +122,10 @@ archive = functools.partial(written, np.savez)
         (b"", "not a file of tracks, or a damaged one: File is not a zip file"),
         (b"walk", "not a file of tracks, or a damaged one: "),
         (written(np.save, np.zeros(3)), "not a file of tracks, or a damaged one: "),
-        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 3', got 'no tracks'; record them anew"),
-        (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 3', got 'arc_suite tracks 1'"),
-        (archive(format="arc_suite tracks 3"), "not a file of tracks, or a damaged one: 'setup'"),
-        (archive(format="arc_suite tracks 3", setup="{}"), "not a file of tracks, or a damaged one: expected robot"),
+        (archive(observations=np.zeros(3)), "expected 'arc_suite tracks 4', got 'no tracks'; record them anew"),
+        (archive(format="arc_suite tracks 1"), "expected 'arc_suite tracks 4', got 'arc_suite tracks 1'"),
+        (archive(format="arc_suite tracks 4"), "not a file of tracks, or a damaged one: 'setup'"),
+        (archive(format="arc_suite tracks 4", setup="{}"), "not a file of tracks, or a damaged one: expected robot"),
         (archive(format=np.array([print], dtype=object)), "not a file of tracks, or a damaged one: Object arrays"),
     ],
 )
@@ -136,13 +136,14 @@ def test_foreign_files_are_one_line(tmp_path, data, message):
         load(path)
 
 
-def test_a_file_that_lacks_an_array_is_one_line(saved, tmp_path):
+@pytest.mark.parametrize("lost", ["contacts", "duty_factors"])
+def test_a_file_that_lacks_an_array_is_one_line(saved, tmp_path, lost):
     path = tmp_path / "lacking.npz"
     with zipfile.ZipFile(saved) as whole, zipfile.ZipFile(path, "w") as lacking:
         for name in whole.namelist():
-            if name != "1/contacts.npy":
+            if name != f"1/{lost}.npy":
                 lacking.writestr(name, whole.read(name))
-    with pytest.raises(ValueError, match="contacts"):
+    with pytest.raises(ValueError, match=lost):
         load(path)
 
 
@@ -162,6 +163,8 @@ BAD_ARRAYS = {
     "NaN": ("1/joint_angles", np.full((12, 12), np.nan)),
     "infinite term": ("1/terms/forward", np.full(12, np.inf)),
     "short term": ("1/terms/forward", np.zeros(3)),
+    "phases of other legs": ("1/leg_phases", np.zeros((12, 3))),
+    "one duty factor": ("1/duty_factors", np.float64(0.6)),
     "numbers of feet": ("1/contacts", np.zeros((12, 4))),
     "text of a number": ("1/mass", np.array("heavy")),
     "no mass": ("1/mass", np.float64(0.0)),

@@ -1,5 +1,7 @@
 """Recorded tracks agree with the reward and the physics."""
 
+import types
+
 import gaitless
 import mujoco
 import numpy as np
@@ -15,9 +17,10 @@ from arc_suite.arenas.bumps import Bumps
 from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.models import standing as poses
-from arc_suite.robots import ROBOTS
+from arc_suite.robots import ROBOTS, gaits
 from arc_suite.style import measure, record
 from arc_suite.style.tracks import lowest_point_velocities
+from arc_suite.tasks.clock import TWO_PI, desired_contacts
 
 
 @pytest.mark.parametrize("robot", tiers(ROBOTS, lambda robot: robot == "bastion"))
@@ -73,6 +76,25 @@ def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
         assert_array_equal(track.phases, definition.clock.phases[1:41])
     else:
         assert track.phases is track.parameters is None
+
+
+def test_the_gait_of_a_track_is_the_one_that_holds():
+    environment = arc_suite.load("tick", "directed", {"poses": 0.0, "gaits": (), "time_limit": 8.0})
+    walker = Demonstrator(environment, "steered")
+
+    def reset(indices, seeds):
+        walker.reset(indices, seeds)
+        environment.command("command", (0.5, 0.0, 0.0))
+        environment.command("gait", "wave")
+
+    track = record(environment, types.SimpleNamespace(reset=reset, act=walker.act), seed=3)
+    compliance = measure(track)["gait_compliance"].value
+    assert compliance > 0.75 and compliance == pytest.approx(track.progress["gait_compliance"], rel=1e-12)
+    prescribed = desired_contacts(track.phases, track.parameters.duty_factor, track.parameters.phase_offsets)
+    assert (track.stance == prescribed).mean() < compliance - 0.1
+    wave, lags = gaits.gait(track.body, "wave"), (track.leg_phases[-1] - track.phases[-1]) / TWO_PI
+    assert_allclose(np.exp(2j * np.pi * lags), np.exp(2j * np.pi * np.array(wave.offsets)), atol=1e-5)
+    assert track.duty_factors[-1] == pytest.approx(wave.duty_factor, abs=1e-6)
 
 
 def test_recording_is_seeded():

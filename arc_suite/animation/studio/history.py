@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.animation.episodes import Episodes
-from arc_suite.tasks import Task
-from arc_suite.tasks.clock import TWO_PI, desired_contacts
+from arc_suite.tasks.clock import TWO_PI
 
 _STEPS = 120  # control steps that are kept
 
@@ -50,9 +49,10 @@ class History:
             return
         weights, run = task.settings.weights, environment.task
         stance = schedule = None
-        if task.parameters is not None:
+        if (gait := task.leg_phases(run.memory)) is not None:
+            phases, duty_factor = gait
             stance = task.read(data).foot_heights < task.parameters.stance_threshold
-            schedule = self._schedule(task, run.memory) | self._stops()
+            schedule = (phases % TWO_PI < TWO_PI * duty_factor) | self._stops()
         terms = {name: weights[name] * float(value) for name, value in run.terms.items()}
         self._moments.append(Moment(terms, stance, schedule, data.qpos[:2].copy(), self._desired()))
 
@@ -84,14 +84,6 @@ class History:
     def desired(self) -> np.ndarray:
         """Return the speeds (steps,) that the command asks for, m/s; NaN where there is no command."""
         return np.array([moment.desired for moment in self._moments])
-
-    def _schedule(self, task: Task, memory) -> np.ndarray:
-        """Which feet (feet,) the gait wants on the ground: that which holds, where it is by command."""
-        p, gait = task.parameters, self._episodes.timestep.observation.get("gait")
-        if gait is None:
-            return desired_contacts(np.asarray(task.phase(memory)), p.duty_factor, p.phase_offsets)
-        sines, cosines = gait[:-2].reshape(2, -1)
-        return np.arctan2(sines, cosines) % TWO_PI < TWO_PI * gait[-2]
 
     def _stops(self) -> bool:
         """Whether the clock of the gait rests, as at a stop."""

@@ -184,8 +184,9 @@ def test_history_and_states_of_a_walk():
     assert shares - {0.0} and 0.0 <= min(shares) <= max(shares) < 1.0
 
 
-def test_rewards_and_contacts_are_those_of_reports():
-    sketch = Sketch(legs=6, links=2, task="walk")
+@pytest.mark.parametrize("task", ["walk", "directed"])
+def test_rewards_and_contacts_are_those_of_reports(task):
+    sketch = Sketch(legs=6, links=2, task=task)
     creature = opened(sketch)
     episodes = Episodes(creature.environment, creature.act)
     history = History(episodes)
