@@ -45,6 +45,7 @@ export class Inputs {
   constructor(stick) {
     this.held = new Set();
     this.stick = [0, 0, 0];
+    this.pushed = false; // the first button of a gamepad
     this.shows = window.location.hash === "#walk";
     window.addEventListener("keydown", (event) => {
       if (!(event.code in KEYS || event.code in POSES) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -77,6 +78,13 @@ export class Inputs {
 
   pressed(keys) {
     return [...this.held].filter((code) => code in keys).map((code) => keys[code]);
+  }
+
+  // Whether the first button of a gamepad went down since the last question.
+  leaps() {
+    const before = this.pushed;
+    this.pushed = gamepads().some(({ buttons }) => buttons?.[0]?.pressed);
+    return this.pushed && !before;
   }
 
   get pose() {

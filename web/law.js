@@ -6,12 +6,46 @@ const share = (value) => value - Math.floor(value); // of a cycle
 export class Law {
   constructor(constants) {
     this.constants = constants;
-    const zero = [0, 0, 0], angles = constants.legs.map((leg) => leg.angles);
+    this.leap = null; // the targets of a leap that are left, first those of this control step
+    this.begin();
+  }
+
+  begin() {
+    const zero = [0, 0, 0], angles = this.constants.legs.map((leg) => leg.angles);
     this.state = { command: zero, integral: zero, motion: zero, size: 0, angles, off: zero };
   }
 
+  // Plays a leap by its name, unless one goes on. Until the crouch ends, joints go over from where they are.
+  play(name) {
+    if (this.leap) return;
+    const now = this.byJoint(this.state.angles);
+    this.begin();
+    const rest = this.byJoint(this.state.angles), { targets, crouched } = this.constants.leaps[name];
+    this.leap = targets.map((angles, step) =>
+      angles.map((angle, joint) => angle + Math.max(1 - step / crouched, 0) * (now[joint] - rest[joint])),
+    );
+  }
+
   // Returns actions of motors or servos for blocks of an observation, and remembers what the next step needs.
-  act({ posture, velocities, command, gait_clock: clock, pose, gait }) {
+  act(observation) {
+    const { posture, velocities } = observation, c = this.constants;
+    const [targets, next] = this.leap ? this.leapt() : this.walked(observation);
+    return targets.map((target, joint) => {
+      const speed = (next[joint] - target) / c.step, stiffness = c.stiffness[joint], damping = c.damping[joint];
+      if (c.reach) return clamp((target + (damping * speed) / stiffness) / c.reach[joint], -1, 1); // a servo's angle
+      return clamp(stiffness * (target - posture[5 + joint]) - damping * (velocities[6 + joint] - speed), -1, 1);
+    });
+  }
+
+  // Targets of a leap in this control step and in the next; after the last one the law begins anew.
+  leapt() {
+    const [targets, next] = this.leap;
+    this.leap = this.leap.length > 2 ? this.leap.slice(1) : null;
+    return [targets, next];
+  }
+
+  // Targets of the law in this control step and in the next.
+  walked({ posture, command, gait_clock: clock, pose, gait }) {
     const c = this.constants, state = this.state;
     const going = clock[0] !== 0 || clock[1] !== 0;
     const asked = command.slice(0, 3), motion = command.slice(3);
@@ -26,12 +60,7 @@ export class Law {
     const { off, posed } = this.corrected(pose, posture);
     const angles = this.planned(requested, size, going, gait, posed);
     this.state = { command: smooth, integral, motion: requested, size, angles, off };
-    const targets = this.byJoint(state.angles), next = this.byJoint(angles);
-    return targets.map((target, joint) => {
-      const speed = (next[joint] - target) / c.step, stiffness = c.stiffness[joint], damping = c.damping[joint];
-      if (c.reach) return clamp((target + (damping * speed) / stiffness) / c.reach[joint], -1, 1); // a servo's angle
-      return clamp(stiffness * (target - posture[5 + joint]) - damping * (velocities[6 + joint] - speed), -1, 1);
-    });
+    return [this.byJoint(state.angles), this.byJoint(angles)];
   }
 
   // The integral of the error of height, roll and pitch, and the pose that makes up for it.

@@ -173,6 +173,10 @@ async function main() {
     pulls(canvas, () => state.play);
     panel.offer(body.task.direction);
     for (const each of document.querySelectorAll(".directed")) each.hidden = !body.task.direction;
+    const leaps = Object.keys(body.policy.constants.leaps ?? {});
+    for (const each of document.querySelectorAll(".leaping")) each.hidden = !leaps.length;
+    byId("leap").textContent = leaps[0] ?? "";
+    byId("leaps").textContent = leaps.join(", while walking ");
     const stale = () => (state.stale = true);
     state.play.view.controls.addEventListener("change", stale);
     stale();
@@ -182,18 +186,19 @@ async function main() {
     byId("pause").textContent = playing ? "pause" : "go on";
   };
   const actions = {
+    leap: () => state.play.simulation.leap(),
     kick: () => state.play.kick(),
     restart: () => (state.play.restart(), (state.stale = true)),
     pause: () => pause(),
   };
-  const keys = { Space: actions.kick, KeyR: actions.restart, KeyP: actions.pause };
+  const keys = { Space: actions.leap, KeyB: actions.kick, KeyR: actions.restart, KeyP: actions.pause };
   Object.assign(keys, { Digit0: () => panel.reset(), Comma: () => panel.quicken(-1), Period: () => panel.quicken(1) });
   for (let number = 1; number < 10; number += 1) keys[`Digit${number}`] = () => panel.choose(number);
   window.addEventListener("resize", () => (state.stale = true));
   for (const [name, act] of Object.entries(actions))
     byId(name).addEventListener("click", (event) => {
       act();
-      if (event.detail) event.target.blur(); // by a pointer: the space bar kicks
+      if (event.detail) event.target.blur(); // by a pointer: keys are the body's
     });
   for (const list of [choice, ground]) list.addEventListener("change", () => (list.blur(), change()));
   window.addEventListener("keydown", (event) => {
@@ -210,6 +215,7 @@ async function main() {
     const seconds = last === null ? 0 : Math.min(now - last, 100) / 1000;
     last = now;
     const asked = panel.asked(inputs.command, inputs.pose);
+    if (inputs.leaps()) actions.leap();
     if (state.playing) state.play.advance(seconds, asked);
     panel.tell(asked);
     if (state.playing || state.stale) {

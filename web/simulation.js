@@ -5,6 +5,8 @@ import { Task } from "./task.js";
 
 const STIFFNESS = 4, STRONGEST = 3; // of a pull, in the body's weight for a distance of h, and at most
 const GRAVITY = 9.81; // m/s^2
+const AHEAD = 0.3; // of the command: a body that is to walk faster leaps, others jump
+const STILL = { command: [0, 0, 0], pose: [0, 0, 0, 0, 0, 0] };
 
 const dot = (first, second) => first.reduce((sum, value, index) => sum + value * second[index], 0);
 const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
@@ -74,13 +76,20 @@ export class Simulation {
     const { mujoco, model, data, task, body: { substeps } } = this;
     if (this.count % substeps === 0) {
       const action = this.driver.act(task.observe(data));
-      task.command(asked);
+      task.command(this.driver.leap ? { ...asked, ...STILL } : asked); // it leaps upright
       data.ctrl.set(action);
     }
     if (this.pull) this.drag(this.pull);
     mujoco.mj_step(model, data);
     this.count += 1;
     if (this.count % substeps === 0) task.after(data);
+  }
+
+  // Leaps ahead, or jumps where the body is slow; a body that can do only one of them does that.
+  leap() {
+    const leaps = this.policy.constants.leaps ?? {}, ahead = this.task.desired[0] > AHEAD;
+    const [name] = (ahead ? ["leap", "jump"] : ["jump", "leap"]).filter((each) => leaps[each]);
+    if (name) this.driver.play(name);
   }
 
   // Takes hold of a part at a point of the world, m.

@@ -16,7 +16,9 @@ import numpy as np
 
 from arc_suite import models, policies
 from arc_suite.animation import direction, pages
-from arc_suite.cpg import Demonstrator
+from arc_suite.cpg import Demonstrator, leaps
+from arc_suite.cpg.presets import DEFAULTS
+from arc_suite.cpg.selection import presets_of
 from arc_suite.cpg.stepping import Directed
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
@@ -146,7 +148,22 @@ def _law(task: Task, preset: str) -> dict[str, Any]:
         raise ValueError(
             f"preset {preset!r}: a page runs steered, surefooted or reactive, which follow a command by joint angles"
         )
-    return {"kind": "law", "constants": law.constants()}
+    return {"kind": "law", "constants": law.constants() | {"leaps": _leaps(law)}}
+
+
+def _leaps(law: Directed) -> dict[str, Any]:
+    """Targets of joints (steps, joints), rad, and the step at which the crouch ends, of the leaps that a body can."""
+    body, legs, rest = law.body, law.legs, law.angles
+    pose, made = tuple(legs.by_joint(rest).tolist()), {}
+    ahead = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
+    for name, choice, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", ahead, "distance")):
+        try:
+            leap = leaps.found(body, pose, choice, measure)
+        except ValueError:
+            continue  # and the page has no key for it
+        crouched = leaps.movement(body, legs, rest, leap).crouched
+        made[name] = {"crouched": crouched, "targets": leaps.keyframes(body, legs, rest, leap)}
+    return made
 
 
 def _graph(body: Body, name: str, steer: Task) -> tuple[Task, dict[str, Any]]:

@@ -38,7 +38,7 @@ class LeapingParameters(NamedTuple):
     most: float = 0.36
 
 
-_LEAST = 0.8  # standing heights by which feet get ahead: who leaps less is told so, and walks
+_LEAST = leaps.LEAST["distance"]  # who leaps less is told so, and walks
 _GATHER = 4  # cycles on the spot, after each of which it may leap, before it walks on
 _AROUND = 1.6 * footholds.AROUND
 _PROBE = 0.1  # standing heights between the points ahead of a foot that are looked at

@@ -48,6 +48,7 @@ class Leap(NamedTuple):
 
 
 _JUMP = Leap(back=0.0, forward=0.0, ahead=0.0)
+LEAST = {"clearance": 0.1, "distance": 0.8}  # standing heights: of feet in a jump and in a leap
 JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.5) for drive in (1.5, 2.5, 4.0))
 
 _SINK, _HOLD, _SETTLE = 2.0, 0.5, 3.0  # durations of the crouch, of the wait in it, and of the landing
@@ -207,3 +208,17 @@ def best(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure:
     crouched = [movement(body, legs, angles, leap).crouched for leap in choice]
     found = flights(body, np.array(rest), targets, crouched)
     return max(zip(choice, found, strict=True), key=lambda pair: pair[1].landed * getattr(pair[1], measure))
+
+
+def found(body: Body, rest: tuple[float, ...], choice: tuple[Leap, ...], measure: str) -> Leap:
+    """Return the leap of a choice by which a body gets farthest or highest; see `best`.
+
+    Raises:
+        ValueError: the body hardly leaves the ground, or does not land on its feet.
+    """
+    leap, flight = best(body, rest, choice, measure)
+    if not flight.landed:
+        raise ValueError("it does not land on its feet")
+    if (reached := getattr(flight, measure)) < LEAST[measure]:
+        raise ValueError(f"the {measure} of its feet is {reached:.2f} standing heights, less than {LEAST[measure]}")
+    return leap

@@ -23,6 +23,7 @@ function path({ creature, ground, qpos, qvel, desired, asked, replayed }) {
     return replayed ? replayed[actions.length - 1] : actions.at(-1);
   };
   for (const each of asked) {
+    if (each.leaps) simulation.leap();
     for (let count = 0; count < creature.substeps; count += 1) simulation.substep(each);
     positions.push([...data.qpos]);
     falls.push(task.fell);

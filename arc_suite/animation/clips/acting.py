@@ -25,7 +25,6 @@ _BLOW = 0.5  # change of the torso's velocity, backwards
 _STAGGER, _SINK, _HOLD, _GIVE, _FALL = 8.0, 6.0, 2.0, 1.5, 6.0
 _FLACCID = 0.05  # of the damping of joints without life
 _LIES = 0.6  # of the height at rest, below which a torso lies
-_LEAST = {"clearance": 0.1, "distance": 0.8}  # of the standing height: of feet in a jump and in a leap
 _NEAR = 0.1  # of the height at rest, within which a torso lies on the ground
 _BREATH = 0.012  # of the standing height, by which the torso sinks and rises
 _ASTRAY = 0.01  # of the standing height: a breath is shallower where a sole would be further from its place
@@ -106,11 +105,7 @@ def leap(body: Body, rest: Pose) -> Motion:
 
 def _leapt(body: Body, rest: Pose, choice: tuple[leaps.Leap, ...], measure: str) -> Recording:
     legs = Legs.of(sizing.sized(body))
-    found, flight = leaps.best(body, tuple(rest.joints.tolist()), choice, measure)
-    if not flight.landed:
-        raise ValueError("it does not land on its feet")
-    if (reached := getattr(flight, measure)) < _LEAST[measure]:
-        raise ValueError(f"the {measure} of its feet is {reached:.2f} standing heights, less than {_LEAST[measure]}")
+    found = leaps.found(body, tuple(rest.joints.tolist()), choice, measure)
     targets = leaps.keyframes(body, legs, legs.by_leg(rest.joints), found)
     held = np.tile(rest.joints, (_steps(body, _HOLD), 1))
     return _driven(body, rest, np.concatenate([targets, held]) + _holding(body, rest) - rest.joints)
