@@ -22,6 +22,7 @@ from arc_suite.cpg.selection import presets_of
 from arc_suite.cpg.stepping import Directed
 from arc_suite.envs.setup import Setup
 from arc_suite.models import posture
+from arc_suite.models.kinematics import Legs
 from arc_suite.models.standing import GRAVITY
 from arc_suite.policies import universal, zips
 from arc_suite.policies.network import Network
@@ -153,7 +154,7 @@ def _law(task: Task, preset: str) -> dict[str, Any]:
 
 def _leaps(law: Directed) -> dict[str, Any]:
     """Targets of joints (steps, joints), rad, and the step at which the crouch ends, of the leaps that a body can."""
-    body, legs, rest = law.body, law.legs, law.angles
+    body, legs, rest = law.body, Legs.of(law.body), law.angles  # whose joints use all of their ranges in a leap
     pose, made = tuple(legs.by_joint(rest).tolist()), {}
     ahead = presets_of(body)["leaping"].choice + DEFAULTS["leaping"].choice
     for name, choice, measure in (("jump", leaps.JUMPS, "clearance"), ("leap", ahead, "distance")):

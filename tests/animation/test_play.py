@@ -13,7 +13,10 @@ import pytest
 from page_data import data_of
 
 from arc_suite.animation import pages, play
+from arc_suite.cpg import leaps
+from arc_suite.cpg.presets import PRESETS
 from arc_suite.envs.setup import Setup
+from arc_suite.models.kinematics import Legs
 from arc_suite.policies import alone, network, policy, universal
 from arc_suite.robots import ROBOTS, generator
 
@@ -118,6 +121,34 @@ def test_a_short_walk_is_that_of_python(script, name, preset, steps):
 @pytest.mark.parametrize("name", BODIES)
 def test_walks_of_ten_seconds_are_those_of_python(script, name):
     assert_walks_agree(script, BODIES[name], BOUNDING.get(name, STEPS))
+
+
+@pytest.mark.slow
+@nodes.needs_node
+@pytest.mark.parametrize(("name", "speed", "plays"), [("tick", 0.0, "jump"), ("queen", 1.0, "leap")])
+def test_leaps_follow_the_keyframes_of_python(script, name, speed, plays):
+    """Standing still a body jumps, walking it leaps; actions are those of the drive towards Python's targets."""
+    body, pressed = ROBOTS[name], 60
+    creature, law = play.creature(body), policy("cpg", body, "steered", task=Setup.of(body, "directed").definition).law
+    legs, pose = Legs.of(law.body), tuple(law.legs.by_joint(law.angles).tolist())
+    choice, measure = {"jump": (leaps.JUMPS, "clearance"), "leap": (PRESETS[name]["leaping"].choice, "distance")}[plays]
+    leap, _ = leaps.best(body, pose, choice, measure)
+    targets = leaps.keyframes(body, legs, law.angles, leap)
+    asked = [upright(creature, [speed, 0.0, 0.0]) for _ in range(pressed + len(targets) + 40)]
+    asked[pressed] |= {"leaps": True}
+    episode = {"creature": creature, "ground": "level", "qvel": [], "desired": [0.0] * 3, "asked": asked}
+    (found,) = nodes.run(script, [episode | {"qpos": creature["grounds"]["level"]["start"]}])
+    crouched = leaps.movement(body, legs, law.angles, leap).crouched  # until then joints go over from where they were
+    steps = slice(pressed + crouched, pressed + len(targets) - 1)
+    angles, speeds = (
+        np.array([observation[block][first:] for observation in found["observations"][steps]])
+        for block, first in (("posture", 5), ("velocities", 6))
+    )
+    aims = targets[crouched:-1], np.diff(targets, axis=0)[crouched:] / law.step
+    np.testing.assert_allclose(found["actions"][steps], law.drive.actions(*aims, angles, speeds), rtol=0.0, atol=1e-9)
+    places, height = np.array(found["positions"])[:, :3] / body.torso.standing_height, slice(pressed, None)
+    assert places[height, 2].max() > places[pressed - 1, 2] + 0.3 and not any(found["falls"])
+    assert places[-1, 2] == pytest.approx(places[pressed - 1, 2], abs=0.1)
 
 
 def assert_networks_agree(script, setup, driver, name, tolerance=1e-9):
@@ -227,6 +258,7 @@ def test_what_a_page_holds_of_a_body(monkeypatch):
     choices = creature["task"]["direction"]
     assert choices["names"] == ["height", "forward", "left", "roll", "pitch", "yaw"] and len(choices["room"]) == 6
     assert list(choices["gaits"]) == ["own", "trot", "pace", "bound", "walk", "wave"]
+    assert creature["policy"]["constants"]["leaps"] == {}  # its feet hardly leave the ground: no key
     assert play.creature(ROBOTS["leaper"], "ppo")["task"]["direction"] is None  # and no keys for it
 
 

@@ -79,7 +79,7 @@ def test_keys_walk_and_turn(tab):
 
 def test_keys_kick_restart_and_pause(tab):
     _, before = advanced(tab, 1.0)
-    tab.keyboard.press("Space")
+    tab.keyboard.press("b")
     after = tab.evaluate("[...play.state.play.simulation.data.qvel]")
     speed = sum((new - old) ** 2 for new, old in zip(after[:2], before[:2], strict=True)) ** 0.5
     assert speed == pytest.approx(0.8 * (9.81 * ROBOTS["tick"].torso.standing_height) ** 0.5, rel=1e-6)
@@ -95,6 +95,27 @@ def test_keys_kick_restart_and_pause(tab):
     tab.keyboard.press("Space")
     qvel = tab.evaluate("[...play.state.play.simulation.data.qvel]")
     assert sum(value**2 for value in qvel) ** 0.5 == pytest.approx(speed)
+
+
+def test_keys_buttons_and_gamepads_jump(tab):
+    """The torso rises; a trained policy does not jump, and nothing says that it does."""
+    height = ROBOTS["tick"].torso.standing_height
+    assert tab.text_content("#leap") == tab.text_content("#leaps") == "jump"
+    pad = "navigator.getGamepads = () => [{ connected: true, axes: [0, 0, 0, 0], buttons: [{ pressed: true }] }]"
+    ways = lambda: tab.keyboard.press("Space"), lambda: tab.click("#leap"), lambda: tab.evaluate(pad)
+    for way in ways:
+        (_, _, before, *_), _ = advanced(tab, 2.0)
+        way()
+        tab.wait_for_function("play.state.play.simulation.driver.leap")
+        heights = [advanced(tab, 0.05)[0][2] for _ in range(20)]
+        assert max(heights) > before + 0.3 * height and tab.evaluate("!play.state.play.simulation.task.fell")
+    tab.evaluate("delete navigator.getGamepads")
+    tab.select_option("#body", "1")
+    assert tab.text_content("#leaps") == "jump, while walking leap"
+    tab.select_option("#body", "2")
+    assert not any(each.is_visible() for each in tab.locator(".leaping").all())
+    tab.keyboard.press("Space")
+    assert tab.evaluate("!play.state.play.simulation.driver.leap")
 
 
 def posed(tab):
