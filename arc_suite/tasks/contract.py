@@ -265,8 +265,8 @@ class Task(Observed):
     def leg_phases(self, memory) -> tuple[Any, Any] | None:
         """Return the phase (..., legs) of each leg, rad, and the duty factor (...) of the gait that holds.
 
-        The gait wants a leg in stance while its phase, less whole turns, is below 2 pi times the duty factor. None
-        where the task prescribes no gait.
+        The gait wants a leg in stance while its phase, less whole turns, is below 2 pi times the duty factor, of
+        which one number will do for all environments. None where the task prescribes no gait.
         """
         phase, gait = self.phase(memory), self.parameters
         if phase is None or gait is None:
