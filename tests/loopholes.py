@@ -17,7 +17,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).parent / "fixtures"))
 
 from exploits import FAILURE, METRICS, Exploit, Exploiting, earned, limits, opened  # noqa: E402
 
-TASKS = ("steer", "roam", "rough", "slopes", "stairs", "gaps", "course", "navigate")
+TASKS = ("steer", "directed", "roam", "rough", "slopes", "stairs", "gaps", "course", "navigate")
 LOW = Exploit(-1, -1, -1, 0, -0.6, -0.6, -0.4, 0, 0, 5, 0.1, -0.2)
 HIGH = Exploit(1, 1, 1, 1.2, 0.6, 0.6, 0.4, 1, 1, 80, 0.9, 0.5)
 CANDIDATES, GENERATIONS, SEEDS, OTHERS = 20, 15, (0, 1), (100, 101, 102, 103)

@@ -23,7 +23,7 @@ from arc_suite.models.outline import outline
 from arc_suite.simulation import films
 
 ROOT = Path(__file__).parents[1]
-TOTAL = 6_000_000  # bytes of all
+TOTAL = 6_400_000  # bytes of all
 
 
 class View(NamedTuple):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from exploits import FAILURE, METRICS, Exploit, Exploiting, earned, limits, opened
+from exploits import FAILURE, METRICS, Disobedient, Exploit, Exploiting, earned, limits, opened
 from tiers import never, tiers
 
 from arc_suite import evaluation, policies
@@ -10,7 +10,7 @@ from arc_suite.robots import ROBOTS
 
 SEEDS = (0, 1, 2, 3)
 LANES = ("rough", "slopes", "stairs", "gaps", "course")
-GROUNDS = [(robot, task) for robot in ROBOTS for task in ("steer", "roam", *LANES)]
+GROUNDS = [(robot, task) for robot in ROBOTS for task in ("steer", "directed", "roam", *LANES)]
 EVERY = [*GROUNDS, *((robot, "navigate") for robot in ROBOTS)]
 
 # Ways to seem busy: commands (forward, left, turning) that a demonstrator follows in place of the task's.
@@ -42,6 +42,38 @@ def test_busy_bodies_earn_little(robot, task):
     ):
         if reached < FAILURE * limit.metric:
             assert total <= limit.standing + limit.gain, name
+
+
+def _told(blocks, **changes):
+    """The blocks of a command, some of whose first numbers are those of another."""
+    return {name: np.concatenate([told, blocks[name][:, told.shape[-1] :]], axis=-1) for name, told in changes.items()}
+
+
+def _late(seen, steps=100):
+    earlier = seen[max(0, len(seen) - 1 - steps)]
+    return _told(seen[-1], command=earlier["command"][:, :3], pose=earlier["pose"])
+
+
+# What a demonstrator is told in place of the task's direction, and most that it may earn of the demonstrator's gain.
+DISOBEDIENT = {
+    "no pose": (lambda seen: _told(seen[-1], pose=0.0 * seen[-1]["pose"]), 0.5),
+    "another gait": (lambda seen: _told(seen[-1], gait=-seen[-1]["gait"][:, :-2]), 0.5),
+    "late": (_late, 0.5),
+    "stands": (lambda seen: _told(seen[-1], command=0.0 * seen[-1]["command"][:, :3]), 0.5),
+    "away": (lambda seen: _told(seen[-1], command=-seen[-1]["command"][:, :3]), 0.5),
+    # It obeys half of the time, and all of it where the command is a stop.
+    "blinks": (lambda seen: _told(seen[-1], command=(len(seen) // 20 % 2) * seen[-1]["command"][:, :3]), 0.75),
+}
+
+
+@pytest.mark.parametrize("robot", tiers(ROBOTS, never, lambda robot: robot == "tick"))
+def test_disobedience_earns_less_than_half(robot):
+    environment = opened(robot, "directed", 2 * len(SEEDS))
+    task, seeds = environment.task.definition, range(2 * len(SEEDS))
+    limit = limits(robot, "directed", seeds)
+    for name, (told, most) in DISOBEDIENT.items():
+        total = earned(environment, Disobedient(task, told), seeds)[0].mean()
+        assert total - limit.standing <= 2.0 * most * limit.gain, name
 
 
 @pytest.mark.parametrize("robot", tiers(ROBOTS, "queen".__eq__))
