@@ -397,8 +397,8 @@ def test_every_clip_can_be_made(robot):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         clips = {clip.name: clip for clip in export.clips(Setup.of(body, "steer"), list(CLIPS))}
-    # Leaper cannot walk faster than it does; the strides of Bastion to a side alternate.
-    assert len(clips) + len(caught) == len(CLIPS) and len(caught) <= 2
+    # Leaper cannot walk faster than it does, jump or leap; the strides of Bastion to a side alternate.
+    assert len(clips) + len(caught) == len(CLIPS) and len(caught) <= 3
     gltf_reader.read(export.glb(body, list(clips.values())))
     units = arc_suite.load(body, "steer").task.definition.context.units
     for name, clip in clips.items():
