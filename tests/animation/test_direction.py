@@ -17,7 +17,7 @@ def test_torsos_stay_above_the_ground(body):
     low, high = direction.room(body).T
     assert (low <= 0.0).all() and (high >= 0.0).all() and (high > low).any()
     ride, height = posture.rest(body).ride, body.torso.standing_height
-    assert (ride + low[0]) * height + torso_box(body)[0][2] > 0.1 * height
+    assert (ride + low[0]) * height + torso_box(body)[0][2] > 0.07 * height
     kept = posture.room(body, planted=False)
     np.testing.assert_allclose(direction.room(body)[1:], kept[1:], atol=1e-9)  # which stays as it was
     assert (kept[0, 0] <= low[0] + 1e-9) and kept[0, 1] == pytest.approx(high[0])
@@ -27,7 +27,7 @@ def test_what_is_set_of_a_task():
     task = Setup.of("tick", "directed").definition
     asked = direction.commands(task, (1.0, 0.0, 0.0), (-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple")
     assert asked["command"] == (1.0, 0.0, 0.0)
-    np.testing.assert_allclose(asked["pose"], (-0.23, 0.0, 0.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(asked["pose"], (-0.3, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert asked["gait"][-2:] == [0.75, task.parameters.gait_frequency]
     most = direction.room(task.scene.body)[:, 1]
     np.testing.assert_allclose(direction.commands(task, None, most, None)["pose"], most / 6.0)  # together they are less

@@ -14,8 +14,8 @@ from arc_suite.policies import POLICIES, alone, policy
 from arc_suite.robots import ROBOTS
 from arc_suite.robots.generator import generate
 
-ALL = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, planned, balanced"
-GENERAL = "slow, medium, fast, steered, surefooted, reactive, sighted, planned"
+ALL = "slow, medium, fast, tuned, refined, steered, surefooted, reactive, sighted, leaping, planned, balanced"
+GENERAL = "slow, medium, fast, steered, surefooted, reactive, sighted, leaping, planned"
 
 JOINTS = "expected a body named 'queen' to have the 18 joints of queen"
 
