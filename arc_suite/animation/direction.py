@@ -20,7 +20,7 @@ def directs(task: Task) -> bool:
 
 def room(body: Body) -> np.ndarray:
     """Return how far each number of a pose can go, (6, 2) in whole hundredths, with feet that may slide."""
-    return np.trunc(100.0 * posture.room(body, planted=False).round(6)) / 100.0
+    return np.trunc((100.0 * posture.room(body, planted=False)).round(4)) / 100.0
 
 
 def named(task: Task) -> dict[str, list[float]]:
