@@ -1,6 +1,6 @@
 """The demonstrator `leaping`: walks as `sighted`, and leaps over what no step crosses.
 
-It leaps as soon as a trench or hurdle that the scan shows is close to a foot, if every foot would land on
+It leaps as soon as a trench that the scan shows is close to a foot, if every foot would land on
 ground. How far a leap carries follows from a trial on level ground. In the air feet are shifted to where
 the scan shows ground.
 """
