@@ -66,11 +66,9 @@ export class Law {
   // The integral of the error of height, roll and pitch, and the pose that makes up for it.
   corrected(pose, posture) {
     const c = this.constants, shown = [posture[0] / c.height - c.ride, ...tilt(posture.slice(1, 5))];
-    const off = [0, 3, 4].map((number, i) => {
-      const error = clamp(pose[number] - shown[i], -c.largest, c.largest);
-      return clamp(this.state.off[i] + c.integral * error, -c.most_off, c.most_off);
-    });
-    const [rise, roll, pitch] = off;
+    const errors = [0, 3, 4].map((number, i) => clamp(pose[number] - shown[i], -c.largest, c.largest));
+    const off = errors.map((error, i) => clamp(this.state.off[i] + c.integral * error, -c.most_off, c.most_off));
+    const [rise, roll, pitch] = off.map((value, i) => value + errors[i]);
     return { off, posed: [rise, 0, 0, roll, pitch, 0].map((value, i) => pose[i] + value) };
   }
 

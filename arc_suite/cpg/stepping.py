@@ -115,15 +115,15 @@ class Stepping(CommandLaw):
         return motion.clip(-self.most, self.most) * self.units, motion[:, :2] * 0.0
 
     def _corrected(self, off, pose, height, vertical) -> tuple:
-        """The integral of the error of a pose (environments, 6), and the pose that makes up for it."""
+        """The integral of the error of a pose (environments, 6), and the pose that makes up for the error and for it."""
         numpy, p = pose.__array_namespace__(), self.parameters
         shown = numpy.concatenate(
             [(height / self.pose.height - self._rest.ride)[:, None], posture.tilt(vertical)], axis=-1
         )
         error = (pose[:, _FEEDBACK] - shown).clip(-_LARGEST, _LARGEST)
         off = (off + p.integral * self.cycles * error).clip(-_MOST_OFF, _MOST_OFF)
-        zero = numpy.zeros_like(off[:, :1])
-        return off, pose + numpy.concatenate([off[:, :1], zero, zero, off[:, 1:], zero], axis=-1)
+        added, zero = off + error, numpy.zeros_like(off[:, :1])
+        return off, pose + numpy.concatenate([added[:, :1], zero, zero, added[:, 1:], zero], axis=-1)
 
     def next_feet(self, cycle, motion, shift, size, vertical, duty, stance):
         """Return places (environments, legs, 3) of the soles in the next control step, m, under a level torso.
