@@ -115,7 +115,7 @@ class Stepping(CommandLaw):
         return motion.clip(-self.most, self.most) * self.units, motion[:, :2] * 0.0
 
     def _corrected(self, off, pose, height, vertical) -> tuple:
-        """The integral of the error of a pose (environments, 6), and the pose that makes up for the error and for it."""
+        """The integral of the error of a pose (environments, 6), and the pose that makes up for both."""
         numpy, p = pose.__array_namespace__(), self.parameters
         shown = numpy.concatenate(
             [(height / self.pose.height - self._rest.ride)[:, None], posture.tilt(vertical)], axis=-1
