@@ -108,7 +108,7 @@ def assert_walks_agree(script, body, steps, preset="steered"):
         ("leaper", "reactive", 40),
         ("random_4", "surefooted", 64),
         ("quadruped_15_kg", "steered", 100),
-        ("hexapod_2kg", "steered", 100),
+        ("hexapod_2kg", "steered", 80),
         ("with_arm", "steered", 100),
     ],
 )
