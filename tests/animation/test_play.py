@@ -84,9 +84,9 @@ def played(setup, driver, given):
 def assert_walks_agree(script, body, steps, preset="steered"):
     """A body under commands goes where it goes in Python, and so do the actions: in closed loop, each by its own.
 
-    With elliptic cones the solvers of two versions of MuJoCo take other ways to its tolerance.
+    Under stiff servos the solvers of two versions of MuJoCo take other ways to its tolerance.
     """
-    tolerance = 1e-6 if body.source and "elliptic" in body.source else 1e-9
+    tolerance = 1e-6 if body.source else 1e-9
     setup, creature = Setup.of(body, "directed", {"time_limit": 1e6}), play.creature(body, "cpg", preset)
     given = directions(steps, creature)
     start, positions, actions, observations = played(setup, policy("cpg", body, preset, task=setup.definition), given)
