@@ -68,7 +68,7 @@ export class Law {
     const c = this.constants, shown = [posture[0] / c.height - c.ride, ...tilt(posture.slice(1, 5))];
     const errors = [0, 3, 4].map((number, i) => clamp(pose[number] - shown[i], -c.largest, c.largest));
     const off = errors.map((error, i) => clamp(this.state.off[i] + c.integral * error, -c.most_off, c.most_off));
-    const [rise, roll, pitch] = off.map((value, i) => value + errors[i]);
+    const [rise, roll, pitch] = off.map((value, i) => value + c.proportional * errors[i]);
     return { off, posed: [rise, 0, 0, roll, pitch, 0].map((value, i) => pose[i] + value) };
   }
 

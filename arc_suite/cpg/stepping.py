@@ -43,6 +43,7 @@ class Stepping(CommandLaw):
 
     Attributes:
         directed: whether pose and gait are by command.
+        proportional: feedback on the error of a pose.
         legs: their kinematics.
         places: (legs, 3) of the soles at ease, m.
         angles: (legs, links) of the joints then, rad.
@@ -60,6 +61,8 @@ class Stepping(CommandLaw):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
         self.directed = {"pose", "gait"} <= task.blocks.keys()
+        # In place of an integral; beside one it disturbs gaits.
+        self.proportional = 0.0 if parameters.integral else min(1.0, parameters.gain[0])
         self._rest = posture.rest(task.scene.body)
         if self.directed:
             self.reads = (*self.reads, "pose", "gait")
@@ -122,7 +125,7 @@ class Stepping(CommandLaw):
         )
         error = (pose[:, _FEEDBACK] - shown).clip(-_LARGEST, _LARGEST)
         off = (off + p.integral * self.cycles * error).clip(-_MOST_OFF, _MOST_OFF)
-        added, zero = off + error, numpy.zeros_like(off[:, :1])
+        added, zero = off + self.proportional * error, numpy.zeros_like(off[:, :1])
         return off, pose + numpy.concatenate([added[:, :1], zero, zero, added[:, 1:], zero], axis=-1)
 
     def next_feet(self, cycle, motion, shift, size, vertical, duty, stance):
@@ -173,6 +176,7 @@ class Directed(Stepping):
             "gain": p.gain,
             "smoothing": self.smoothing,
             "integral": p.integral * cycles,
+            "proportional": self.proportional,
             "onset": self.onset,
             "lead": p.lead,
             "height": self.pose.height,
