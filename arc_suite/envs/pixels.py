@@ -5,6 +5,7 @@ dm_env's have `dm_control.suite.wrappers.pixels.Wrapper`.
 
 import gymnasium
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers import TransformObservation
 from gymnasium.wrappers.vector import TransformObservation as TransformVectors
 
@@ -34,6 +35,8 @@ def with_pixels(environment: gymnasium.Env | gymnasium.vector.VectorEnv):
     if mode not in _KEYS:
         raise ValueError(f"render_mode: pixels need one of {', '.join(_KEYS)}, got {mode}")
     key, vector = _KEYS[mode], isinstance(environment, gymnasium.vector.VectorEnv)
+    if vector and environment.metadata.get("autoreset_mode") is AutoresetMode.SAME_STEP:
+        raise ValueError("autoreset_mode: pixels need NextStep or Disabled, got SameStep")
 
     def observed(observation):
         picture = environment.render()
