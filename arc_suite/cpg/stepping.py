@@ -61,7 +61,7 @@ class Stepping(CommandLaw):
         """Fit the law to a task; see `CommandLaw`."""
         super().__init__(task, parameters)
         self.directed = {"pose", "gait"} <= task.blocks.keys()
-        # In place of an integral; beside one it disturbs gaits.
+        # In place of an integral; with both, gaits are disturbed.
         self.proportional = 0.0 if parameters.integral else min(1.0, parameters.gain[0])
         self._rest = posture.rest(task.scene.body)
         if self.directed:
