@@ -1,8 +1,9 @@
 """Blocks of an observation: the size, the mirror image and the noise of each, declared once."""
 
 import functools
+import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,12 @@ class Block(NamedTuple):
     def widths(self) -> np.ndarray:
         """The half-widths (size,) of the noise at level 1 of a block that declares it."""
         return np.broadcast_to(self.noise, self.size)
+
+
+def places(sizes: Mapping[str, int]) -> dict[str, slice]:
+    """Return where each block lies in a vector of all, by name, given their sizes in the order of the vector."""
+    ends = itertools.accumulate(sizes.values())
+    return {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends, strict=True)}
 
 
 def posture(body: Body) -> Block:

@@ -29,7 +29,6 @@ An episode, as a driver runs it, for one environment or with a leading axis for 
 import collections
 import dataclasses
 import functools
-import itertools
 import types
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Mapping
@@ -44,7 +43,7 @@ from arc_suite.robots import mirror
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors, privileged
 from arc_suite.tasks import readings as reading
-from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.mirrors import Symmetry
 from arc_suite.tasks.parameters import Parameters
 from arc_suite.tasks.readings import Layout, Readings
@@ -202,8 +201,7 @@ class Observed(ABC):
     @functools.cached_property
     def _parts(self) -> dict[str, slice]:
         """Where each block lies in the vector."""
-        ends = itertools.accumulate(self.sizes.values())
-        return {name: slice(end - size, end) for (name, size), end in zip(self.sizes.items(), ends, strict=True)}
+        return places(self.sizes)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -5,7 +5,6 @@ heights h, speeds in sqrt(g h), turning rates in sqrt(g / h). A task has those o
 episode draws, and a task of your own may add others.
 """
 
-import itertools
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,7 +14,7 @@ from arc_suite.models.standing import GRAVITY
 from arc_suite.robots.mirror import Image
 from arc_suite.robots.spec import Body
 from arc_suite.tasks import mirrors
-from arc_suite.tasks.blocks import Block
+from arc_suite.tasks.blocks import Block, places
 from arc_suite.tasks.mirrors import AXIAL, POLAR, SAME, Mirror
 
 PLANAR = Mirror.signed(1, -1)  # forward, left
@@ -95,8 +94,7 @@ def sizes(task) -> dict[str, int]:
 
 def split(named: Mapping[str, int], vectors) -> dict[str, np.ndarray]:
     """Return vectors (..., size) as blocks by name, views of them, given the sizes of all."""
-    ends = itertools.accumulate(named.values())
-    return {name: vectors[..., end - size : end] for (name, size), end in zip(named.items(), ends, strict=True)}
+    return {name: vectors[..., part] for name, part in places(named).items()}
 
 
 def _across_legs(image: Image) -> Mirror:

@@ -5,7 +5,6 @@ policy observes. Everything is a product, a sum or a root of numbers, which roun
 """
 
 import functools
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Self
@@ -15,7 +14,7 @@ import numpy as np
 from arc_suite.models.sizing import position_gains, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots.spec import Body
-from arc_suite.tasks import privileged
+from arc_suite.tasks import blocks, privileged
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach, velocity_units
 
@@ -120,8 +119,7 @@ def flat(tokens: Mapping[str, np.ndarray], legs: np.ndarray, torso: np.ndarray) 
 
 def split(vectors) -> dict[str, Any]:
     """Return vectors (..., 664) of NumPy or JAX as the blocks of `FLAT`, by name."""
-    ends = itertools.accumulate(FLAT.values())
-    return {name: vectors[..., end - size : end] for (name, size), end in zip(FLAT.items(), ends, strict=True)}
+    return {name: vectors[..., part] for name, part in blocks.places(FLAT).items()}
 
 
 def leg_inputs(vectors):
@@ -255,8 +253,8 @@ class Tokens(NamedTuple):
 
     @staticmethod
     def _places(task: Task) -> np.ndarray:
-        body, ends = task.scene.body, itertools.accumulate(task.sizes.values())
-        first = {name: end - size for (name, size), end in zip(task.sizes.items(), ends, strict=True)}
+        body = task.scene.body
+        first = {name: part.start for name, part in blocks.places(task.sizes).items()}
         posture, velocities, forces, clock = (first[name] for name in BLOCKS)
         joints = padded(body, np.arange(len(body.joint_names))).astype(int).ravel()
         upward = np.zeros(LEGS, int)
