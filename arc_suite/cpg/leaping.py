@@ -17,6 +17,7 @@ from arc_suite.cpg import footholds, leaps
 from arc_suite.cpg.command_law import Request
 from arc_suite.cpg.leaps import Leap
 from arc_suite.cpg.sighted import Paths, Sighted, SightedParameters
+from arc_suite.models import posture
 from arc_suite.tasks.contract import Task
 
 
@@ -43,7 +44,6 @@ _GATHER = 4  # cycles on the spot, after each of which it may leap, before it wa
 _AROUND = 1.6 * footholds.AROUND
 _PROBE = 0.1  # standing heights between the points ahead of a foot that are looked at
 _SUNK = 0.15  # standing heights below the others, at which a foot does not stand
-_DAMPING = 0.02  # of inverse kinematics, in standing heights
 _STEPS = 3  # of it in a control step
 
 
@@ -160,7 +160,7 @@ class Leaping(Sighted):
         flying = self.places + numpy.stack([shifts, 0.0 * shifts, 0.0 * shifts], axis=-1) + offsets[now][:, None]
         feet = _where(step > made.stretched, flying, planted)
         aims = numpy.broadcast_to(leaps.aims(len(self.places)), (*feet.shape, 3))
-        angles = self.legs.reached(before.angles, feet, aims, _DAMPING * height, _STEPS)
+        angles = self.legs.reached(before.angles, feet, aims, posture.DAMPING * height, _STEPS)
         driven = before.angles + (step == made.crouched + 1)[:, None, None] * made.driven
         stretches = _within(step, made.crouched + 1, made.stretched)
         return {"feet": feet, "angles": _where(stretches, driven, angles), "shifts": 0.0 * shifts}

@@ -13,6 +13,7 @@ import numpy as np
 
 from arc_suite import rotations
 from arc_suite.cpg.drives import drive
+from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs
 from arc_suite.models.sizing import GRAVITY, control_timestep, simulation, sized
 from arc_suite.models.standing import posed, stood
@@ -54,7 +55,6 @@ JUMPS = tuple(_JUMP._replace(crouch=crouch, drive=drive) for crouch in (0.35, 0.
 _SINK, _HOLD, _SETTLE = 2.0, 0.5, 3.0  # durations of the crouch, of the wait in it, and of the landing
 _UP = 0.6  # by which legs are to stretch, which none can
 _PLANE = 0.45  # weight of a sole's place in the plane against its height: feet may slide rather than stay behind
-_DAMPING = 0.02  # of inverse kinematics, in standing heights
 _ROUNDS = 40  # of it, for a pose
 _OFF = 0.03  # of the standing height: soles that are higher have left the ground
 _UPRIGHT = 0.7  # least cosine of the torso's tilt in a leap that lands
@@ -92,7 +92,7 @@ def movement(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> Movement:
     soles, weights = legs.soles(rest)[0], aims(len(rest))
 
     def reached(angles, offset):
-        return legs.reached(angles, soles + offset * height, weights, _DAMPING * height, _ROUNDS)
+        return legs.reached(angles, soles + offset * height, weights, posture.DAMPING * height, _ROUNDS)
 
     crouched = reached(rest, low)
     stretched = reached(crouched, np.array((-leap.forward, 0.0, -_UP)))
@@ -113,7 +113,7 @@ def keyframes(body: Body, legs: Legs, rest: np.ndarray, leap: Leap) -> np.ndarra
     """Return the targets (steps, joints) of joints in the control steps of a leap from a pose (legs, links), rad."""
     made, soles, height = movement(body, legs, rest, leap), legs.soles(rest)[0], body.torso.standing_height
     goals = soles + made.offsets[:, None]
-    angles = legs.reached(np.tile(rest, (len(goals), 1, 1)), goals, aims(len(rest)), _DAMPING * height, _ROUNDS)
+    angles = legs.reached(np.tile(rest, (len(goals), 1, 1)), goals, aims(len(rest)), posture.DAMPING * height, _ROUNDS)
     stretch = slice(made.crouched, made.stretched)
     angles[stretch] += made.driven
     return legs.by_joint(angles)

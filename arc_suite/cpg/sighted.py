@@ -13,6 +13,7 @@ import numpy as np
 from arc_suite import rotations
 from arc_suite.cpg import footholds
 from arc_suite.cpg.command_law import CommandLaw, Request
+from arc_suite.models import posture
 from arc_suite.models.kinematics import Legs, flows, rises, weights
 from arc_suite.tasks.contract import Task
 from arc_suite.tasks.fitting import reach
@@ -50,7 +51,6 @@ _SCANS = 6  # that are remembered
 _EARLY = 1.0  # control steps before landing, at which a foot is to be over its foothold
 _HELD = 0.1  # cycles before landing, in which its foothold is no longer changed
 _ACROSS = 0.3  # weight of a foot's slip across its path against its motion along it
-_DAMPING = 0.02  # of inverse kinematics, in standing heights
 _STEPS = 2  # of it in a control step
 
 
@@ -88,7 +88,7 @@ class Sighted(CommandLaw):
         self.duty_factor -= parameters.longer
         self.legs, self._reach, ride = Legs.of(self.body), reach(self.body), parameters.ride * self.pose.height
         soles = np.where((True, True, False), self.pose.soles, -ride)
-        angles = self.legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), _DAMPING * ride)
+        angles = self.legs.at_ease(soles, np.diag((0.2, 0.2, 1.0)), posture.DAMPING * ride)
         self.places = self.legs.soles(angles)[0]
         scans = np.full((_SCANS, SCAN.shape[1]), -np.inf)
         self._first = Paths(self.places, angles, np.zeros(len(angles)), scans, np.zeros((_SCANS, 2)))
@@ -106,7 +106,7 @@ class Sighted(CommandLaw):
         predicted = p.trust * motion + (1.0 - p.trust) * observation["command"][:, 3:] * self.units
         feet, shifts = self._next_feet(paths, cycle, motion, predicted, request.size, observation["posture"][:, 1:5])
         aims = weights(flows(motion, feet), _ACROSS)
-        angles = self.legs.reached(paths.angles, feet, aims, _DAMPING * height, _STEPS)
+        angles = self.legs.reached(paths.angles, feet, aims, posture.DAMPING * height, _STEPS)
         targets = self.legs.by_joint(paths.angles)
         change = self.legs.by_joint(angles) - targets
         return paths._replace(feet=feet, angles=angles, shifts=shifts), targets, change

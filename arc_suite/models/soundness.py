@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from arc_suite.models import sizing, stride
-from arc_suite.models.outline import solid_corners
+from arc_suite.models.outline import torso_box
 from arc_suite.models.overlap import overlaps
 from arc_suite.models.standing import Standing, by_leg, standing
 from arc_suite.robots.spec import Body, Leg, Link
@@ -74,8 +74,7 @@ def _height(body: Body, pose: Standing) -> Iterator[Flaw]:
         names = ", ".join(short[:4]) + ", ..." * (len(short) > 4)
         text = f"feet of {names} end up to {missing:.3g} m above the lowest foot: legs longer by that fit"
         yield Flaw(text, False, _lengthened(body, soles - soles.min()))
-    lowest = min(solid_corners(solid)[:, 2].min() for solid in body.torso.solids)
-    deeper = float(soles.min() - lowest)
+    deeper = float(soles.min() - torso_box(body)[0][2])
     if deeper > 0.0:
         text = f"the torso reaches {deeper:.3g} m lower than the feet: legs longer by more than that fit"
         yield Flaw(text, deeper > _GAP * height)

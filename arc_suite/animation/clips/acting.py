@@ -14,7 +14,7 @@ from arc_suite.cpg.drives import drive
 from arc_suite.cpg.selection import presets_of
 from arc_suite.models import posture, sizing
 from arc_suite.models.kinematics import Legs
-from arc_suite.models.outline import solid_corners
+from arc_suite.models.outline import torso_box
 from arc_suite.models.standing import posed, stood
 from arc_suite.robots.spec import Body
 from arc_suite.simulation.model import compiled
@@ -33,7 +33,6 @@ _ROUNDS = 50  # of the search for joint angles
 _TURN, _OF_ROOM, _LEAST_TURN = 0.2, 0.8, 0.03  # rad, that a torso turns, at most a share of its room, and at least
 _EASE, _SHOWN = 3.0, 4.0  # durations of a turn, and of the pose after it
 _WEIGHTS = np.diag((1.0, 1.0, 8.0))  # of a sole's place: legs of two joints slide rather than sink
-_DAMPING = 0.02  # of the standing height
 
 
 def idle(body: Body, rest: Pose) -> Motion:
@@ -127,7 +126,7 @@ def death(body: Body, rest: Pose) -> Motion:
 
 def _depth(body: Body, rest: Pose) -> float:
     """Return the height of the torso's lowest point over the ground at rest, m."""
-    return rest.position[2] + min(solid_corners(solid)[:, 2].min() for solid in body.torso.solids)
+    return rest.position[2] + torso_box(body)[0][2]
 
 
 def _check_lies(body: Body, rest: Pose, pose: np.ndarray) -> None:
@@ -245,5 +244,5 @@ def over_feet(body: Body, rest: Pose, poses: np.ndarray) -> tuple[np.ndarray, fl
     legs = legs._replace(low=np.minimum(legs.low, angles), high=np.maximum(legs.high, angles))
     goals = posture.moved(legs.soles(angles)[0] @ frame.T, poses, height) @ frame
     angles = np.tile(angles, (len(poses), 1, 1))
-    angles = legs.reached(angles, goals, _WEIGHTS, _DAMPING * height, _ROUNDS)
+    angles = legs.reached(angles, goals, _WEIGHTS, posture.DAMPING * height, _ROUNDS)
     return legs.by_joint(angles), float(abs(legs.soles(angles)[0] - goals).max())
