@@ -12,7 +12,7 @@ from arc_suite.cpg.prescribed import PrescribedLaw, Preset
 from arc_suite.cpg.presets import BALANCING, DEFAULTS, DEFAULTS_OF_SERVOS, PRESETS
 from arc_suite.cpg.sighted import Sighted, SightedParameters
 from arc_suite.cpg.steering import Steered, SteeringParameters
-from arc_suite.cpg.stepping import Directed
+from arc_suite.cpg.stepping import Directed, directed
 from arc_suite.cpg.stride import StrideLaw
 from arc_suite.robots.spec import Body
 from arc_suite.tasks.contract import Task
@@ -42,7 +42,7 @@ def law(task: Task, preset: Any):
         ValueError: the preset is of no kind of `LAWS`, or does not fit.
     """
     kind = _kind(preset)
-    return (_DIRECTED.get(kind, kind) if "pose" in task.blocks else kind)(task, preset)
+    return (_DIRECTED.get(kind, kind) if directed(task) else kind)(task, preset)
 
 
 def _kind(preset: Any):
