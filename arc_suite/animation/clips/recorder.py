@@ -15,6 +15,7 @@ from arc_suite.tasks.fitting import velocity_units
 _SETTLE = 200  # control steps, after which starts and changes of command are forgotten
 _LONG = 700  # control steps without a command: a speed that varies is that of most of an episode
 _CYCLES = 20  # of the gait in a recording under a command, to choose loops from
+_UNDRAWN = {"poses": 0.0, "gaits": ()}  # of a task whose pose and gait are by command
 _OF_ROOM, _LEAST_CROUCH = 0.7, 0.05  # share of the room in which a body crouches, and least crouch, standing heights
 _BEFORE, _REST, _AFTER = 2, 5, 4  # gait cycles before a stop, at rest, and after the start
 
@@ -89,7 +90,7 @@ class Recorder:
             setup = _changed(setup, gait_frequency=1.0 / (steps * step))
         self.units = velocity_units(self.body, task.parameters.target_velocity) if self.follows else None
         if "pose" in task.commands:
-            setup = _changed(setup, poses=0.0, gaits=())
+            setup = _changed(setup, **_UNDRAWN)
         self._setup = setup
 
     def walk(self, command: tuple[float, float, float], failing: int | None = None, crouch: float = 0.0) -> Recorded:
@@ -159,7 +160,7 @@ class Recorder:
             return self._setup
         if self._policy != "cpg":
             raise ValueError(f"the policy {self._policy} takes no pose")
-        return Setup.of(self.body, "directed", self._setup.task_kwargs | {"poses": 0.0, "gaits": ()})
+        return Setup.of(self.body, "directed", self._setup.task_kwargs | _UNDRAWN)
 
     def _crouch(self, depth: float) -> float:
         room = _OF_ROOM * abs(posture.room(self.body, planted=False)[0, 0])
