@@ -36,6 +36,24 @@ def name(value, valid: Iterable[str], kind: str, near: Iterable[str] = ()) -> st
     raise ValueError(f"unknown {kind} {shown(value)}{hint(value, valid)} (there are: {', '.join(valid)})")
 
 
+def names(what: str, value, valid: Iterable[str], kind: str) -> tuple[str, ...]:
+    """Return the value as valid names; one name stands for a list of it.
+
+    Args:
+        what: name of the value, with which an error about all of it begins.
+        value: a name, or a list or tuple of names.
+        valid: all names there are.
+        kind: what they name.
+
+    Raises:
+        ValueError: it is neither, or one of them is not valid; see `name`.
+    """
+    given = (value,) if isinstance(value, str) else value
+    if not isinstance(given, tuple | list):
+        raise ValueError(f"{what}: expected names of {kind}s, got {shown(value)}")
+    return tuple(name(each, valid, kind) for each in given)
+
+
 def hint(value, valid: Iterable[str]) -> str:
     """Return how an error goes on that names an unknown value: with a valid one that is near, if there is any."""
     close = difflib.get_close_matches(shown(value).strip("'"), valid, n=1)

@@ -135,7 +135,10 @@ def checked_command(task: Task, name: str, value, leading: tuple[int, ...] = ())
         raise ValueError(f"command {checks.shown(name)}: task {task.name} has no commands")
     size = task.commands[checks.name(name, task.commands, "command")]
     if isinstance(value, str):
-        value = task.named_command(name, value)
+        named = task.named_command(name, value)
+        if named is None:
+            raise ValueError(f"command {name!r}: expected numbers, got {checks.shown(value)}")
+        value = named
     numbers = np.full(size, np.nan) if value is None else _real(value)
     if numbers is None or numbers.shape not in ((size,), (*leading, size)) or (abs(numbers) > LARGEST).any():
         raise ValueError(

@@ -79,13 +79,13 @@ class Command(ABC):
         """Return the lowest and highest numbers of those that are bounded, by name, given a control step, s."""
         return {}
 
-    def named(self, body: Body, name: str, value: str) -> np.ndarray:
-        """Return the numbers of what is set by a name.
+    def named(self, body: Body, name: str, value: str) -> np.ndarray | None:
+        """Return the numbers of what is set by a name; None where names stand for nothing.
 
         Raises:
-            ValueError: names stand for nothing here.
+            ValueError: no such name.
         """
-        raise ValueError(f"command {name!r}: expected numbers, got {checks.shown(value)}")
+        return None
 
     def reference(self, scene, parameters) -> Any:
         """Return what else it measures a body by, `Context.reference`."""
@@ -308,7 +308,7 @@ class Schedule(Command):
 
     def resampled(self, memory: Scheduled, steps) -> Any:
         """Return whether (...) the next command of the schedule holds since step `steps`, unless a live one does."""
-        return begins(memory.ends, steps) & memory.ends.__array_namespace__().isnan(memory.live).any(axis=-1)
+        return begins(memory.ends, memory.live, steps)
 
 
 def held(ends, values, steps):
@@ -324,10 +324,14 @@ def held(ends, values, steps):
     return ends.__array_namespace__().take_along_axis(values, current, axis=-2)[..., 0, :]
 
 
-def begins(ends, steps):
-    """Return whether (...) the next of the values of a schedule holds since step `steps` (...); see `held`."""
+def begins(ends, live, steps):
+    """Return whether (...) the next of the values of a schedule holds since step `steps` (...); see `held`.
+
+    It does not where a value (..., size) from outside is complete.
+    """
     step = steps % ends[..., -1]
-    return (step[..., None] == ends).any(axis=-1) | ((step == 0) & (steps > 0))
+    changes = (step[..., None] == ends).any(axis=-1) | ((step == 0) & (steps > 0))
+    return changes & ends.__array_namespace__().isnan(live).any(axis=-1)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -197,7 +197,7 @@ class CommandTask(Task):
         """The lowest and highest numbers of the commands that are bounded, by name."""
         return self.settings.command.limits(self.scene.body, self.scene.control_timestep)
 
-    def named_command(self, name: str, value: str) -> np.ndarray:
+    def named_command(self, name: str, value: str) -> np.ndarray | None:
         """Return the numbers of a command that is given by a name."""
         return self.settings.command.named(self.scene.body, name, value)
 

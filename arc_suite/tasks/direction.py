@@ -126,12 +126,10 @@ class Direction(Schedule):
     def with_settings(self, body: Body, overrides: Mapping[str, Any]) -> "Direction":
         """Return the direction with checked settings in place of its own."""
         asked = super().with_settings(body, overrides)
-        names = _listed(overrides.get("gaits", self.gaits))
-        if names is not None:
-            names = tuple(checks.name(name, gaits.fitting(body), "gait") for name in names)
-        return dataclasses.replace(
-            asked, poses=checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0), gaits=names
-        )
+        poses = checks.number("poses", overrides.get("poses", self.poses), 0.0, 1.0)
+        names = overrides.get("gaits", self.gaits)
+        names = None if names is None else checks.names("gaits", names, gaits.fitting(body), "gait")
+        return dataclasses.replace(asked, poses=poses, gaits=names)
 
     def live(self, body: Body) -> dict[str, int]:
         """Return the sizes of what may be set from outside while an episode runs, by name."""
@@ -221,9 +219,8 @@ class Direction(Schedule):
 
     def resampled(self, memory: Directed, steps) -> Any:
         """Return whether (...) another drawn velocity, pose or gait holds since step `steps`, unless live."""
-        numpy = memory.pose.__array_namespace__()
-        pose = begins(memory.pose_ends, steps) & numpy.isnan(memory.live_pose).any(axis=-1)
-        gait = begins(memory.gait_ends, steps) & numpy.isnan(memory.live_gait).any(axis=-1)
+        pose = begins(memory.pose_ends, memory.live_pose, steps)
+        gait = begins(memory.gait_ends, memory.live_gait, steps)
         return super().resampled(memory, steps) | pose | gait
 
     def with_command(self, memory: Directed, name: str, value) -> Directed:
@@ -236,14 +233,14 @@ class Direction(Schedule):
         least = np.append(-np.ones(len(body.legs)), (_DUTIES[0], 1.0 / (CYCLE * step)))
         return {"pose": (-np.ones(6), np.ones(6)), "gait": (least, most)}
 
-    def named(self, body: Body, name: str, value: str) -> np.ndarray:
+    def named(self, body: Body, name: str, value: str) -> np.ndarray | None:
         """Return the numbers of a gait that is named, at the frequency that the task asks for.
 
         Raises:
-            ValueError: another command, no such gait, or one that does not fit the body.
+            ValueError: no such gait, or one that does not fit the body.
         """
         if name != "gait":
-            return super().named(body, name, value)
+            return None
         made = gaits.gait(body, value)
         return np.array((*made.offsets, made.duty_factor, np.nan))
 
@@ -296,15 +293,6 @@ class Direction(Schedule):
     def progress(self, context: Context, memory: Directed, judged) -> dict:
         """Return how well the pose was kept, on average."""
         return {"pose_tracking": memory.all_posed / judged}
-
-
-def _listed(value: Any) -> tuple | None:
-    """The names of gaits; one stands for a list of it."""
-    if value is None or isinstance(value, tuple | list):
-        return value and tuple(value)
-    if isinstance(value, str):
-        return (value,)
-    raise ValueError(f"gaits: expected names of gaits, got {checks.shown(value)}")
 
 
 def counted(gait, step) -> np.ndarray:

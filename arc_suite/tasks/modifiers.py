@@ -146,10 +146,7 @@ def _delay(value) -> tuple[int, int]:
 
 
 def _exclude_blocks(value, blocks: Iterable[str]) -> tuple[str, ...]:
-    names = (value,) if isinstance(value, str) else value
-    if not isinstance(names, tuple | list):
-        raise ValueError(f"exclude_blocks: expected names of blocks, got {checks.shown(value)}")
-    names = tuple(checks.name(name, blocks, "block") for name in names)
+    names = checks.names("exclude_blocks", value, blocks, "block")
     if set(names) == set(blocks):
         raise ValueError(f"exclude_blocks: expected to leave a block, got all of them: {', '.join(names)}")
     return names
