@@ -47,7 +47,7 @@ export class Panel {
     this.tempo.stepUp(sign);
   }
 
-  // What is asked for by a command and by keys that are held, shares of the room from -1 to 1.
+  // The command, the pose of sliders and of keys that are held, shares of the room from -1 to 1, and the gait.
   asked(command, shares) {
     if (!this.direction) return { command };
     const { room, gaits, frequency } = this.direction;
@@ -61,7 +61,7 @@ export class Panel {
     return { command, pose, gait: [...gaits[this.list.value], frequency * this.tempo.value] };
   }
 
-  // Tells the numbers of what is asked for.
+  // Shows the numbers of a pose and a gait.
   tell({ pose, gait }) {
     this.sliders.forEach(({ output }, i) => (output.value = pose[i].toFixed(2)));
     if (gait) this.hertz.value = `${gait.at(-1).toFixed(1)} Hz`;

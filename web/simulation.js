@@ -70,8 +70,8 @@ export class Simulation {
     this.count = 0; // substeps
   }
 
-  // Takes one substep, at the start of a control step with a new action and what is asked for: a command [forward, left,
-  // turning], and of some bodies a pose and a gait.
+  // Takes one substep, at the start of a control step with a new action and the commands: a velocity [forward,
+  // left, turning], and for some bodies a pose and a gait.
   substep(asked) {
     const { mujoco, model, data, task, body: { substeps } } = this;
     if (this.count % substeps === 0) {

@@ -44,7 +44,7 @@ export class Task {
     return [xpos[3 * torso], xpos[3 * torso + 1], yaw(qpos.subarray(3, 7))];
   }
 
-  // Sets what is asked for in a control step: a command, from -1 to 1 each, a pose, and a gait.
+  // Sets the commands of a control step: a velocity, from -1 to 1 each, a pose, and a gait.
   command(asked) {
     const { headed: commanded, units, step } = this.constants;
     this.asked = asked;

@@ -44,8 +44,8 @@ def commands(
     Args:
         task: whose other commands are left out.
         desired: (3,) velocity, or None.
-        pose: (6,), of which as much is taken as the room has, or None.
-        gait: name of it, in place of which its own stands where it does not fit, or None.
+        pose: (6,), reduced to the body's room, or None.
+        gait: its name, or None; a gait that does not fit is replaced by the body's own.
     """
     asked: dict[str, Any] = {"command": desired} if task.commands.get("command") == 3 else {}
     if directs(task):
@@ -56,7 +56,7 @@ def commands(
 
 
 def _within(bounds: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """As much of a pose (6,) as bounds (6, 2) have; not all numbers go to their bounds at once."""
+    """A pose (6,) reduced to bounds (6, 2); not all numbers go to their bounds at once."""
     pose = pose.clip(*bounds.T)
     most = abs(np.where(pose < 0.0, bounds[:, 0], bounds[:, 1]))
     return pose / max(1.0, (abs(pose) / np.maximum(most, 1e-9)).sum())

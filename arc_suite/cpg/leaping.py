@@ -26,7 +26,7 @@ class LeapingParameters(NamedTuple):
 
     Attributes:
         walk: between leaps.
-        choice: leaps, of which it takes the farthest that lands on level ground.
+        choice: leaps to choose from; the body takes the farthest one that lands on level ground.
         widest: trench that it steps over.
         near: distance of a foot from a trench at which it leaps.
         most: by which a foot may be shifted in the air.
@@ -39,8 +39,8 @@ class LeapingParameters(NamedTuple):
     most: float = 0.36
 
 
-_LEAST = leaps.LEAST["distance"]  # who leaps less is told so, and walks
-_GATHER = 4  # cycles on the spot, after each of which it may leap, before it walks on
+_LEAST = leaps.LEAST["distance"]  # least leap; a body with a shorter one gets a warning, and walks
+_GATHER = 4  # cycles on the spot before it walks on; it may leap after each
 _AROUND = 1.6 * footholds.AROUND
 _PROBE = 0.1  # standing heights between the points ahead of a foot that are looked at
 _SUNK = 0.15  # standing heights below the others, at which a foot does not stand

@@ -39,19 +39,19 @@ def script(tmp_path_factory):
 
 
 def commands(steps):
-    """What is asked for in each step: a command alone."""
+    """The commands of each step: velocities alone."""
     held = math.ceil(steps / len(SCRIPT))
     return [{"command": SCRIPT[step // held]} for step in range(steps)]
 
 
 def upright(creature, command):
-    """What is asked for by a command, in the pose at rest and in the body's own gait."""
+    """The commands of a velocity, the pose at rest and the body's own gait."""
     constants = creature["task"]["direction"]
     return {"command": command, "pose": [0.0] * 6, "gait": [*constants["gaits"]["own"], constants["frequency"]]}
 
 
 def directions(steps, creature):
-    """What is asked for in each step: commands, with poses within the body's room and gaits of it."""
+    """The commands of each step: velocities, poses within the body's room, and gaits that fit it."""
     constants = creature["task"]["direction"]
     low, high = np.transpose(constants["room"])
     numbers = [[*gait, tempo * constants["frequency"]] for gait in constants["gaits"].values() for tempo in TEMPI]

@@ -47,7 +47,7 @@ def tab(opened):
 
 
 def advanced(tab, seconds):
-    """Positions and velocities after some seconds of what is asked for."""
+    """Positions and velocities after some seconds under commands."""
     tab.evaluate(f"play.state.play.advance({seconds}, {ASKED}, Infinity)")
     return tab.evaluate("[[...play.state.play.simulation.data.qpos], [...play.state.play.simulation.data.qvel]]")
 

@@ -1,4 +1,4 @@
-"""Poses and gaits by command: what is asked, what holds, and what is earned for it."""
+"""Poses and gaits by command: how they glide, what they earn, and which are refused."""
 
 import numpy as np
 import pytest
