@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from arc_suite import rotations
-from arc_suite.animation.clips import shapes
+from arc_suite.animation.clips import bones, shapes
 from arc_suite.animation.clips.clips import Clip
 from arc_suite.animation.clips.gltf import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
 from arc_suite.animation.clips.metadata import ROOT_MOTIONS, animations, metadata
@@ -40,10 +40,13 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         generator: what the file says that it was made by.
     """
     document, (parts, looks) = Document(generator), described(body)
+    if rig == "skin":
+        parts = bones.limbs(parts)
     meshes = [part_meshes(part, _TOLERANCE * body.torso.standing_height) for part in parts]
+    bound = _bound(parts, meshes, clips)
     materials = {name: document.add("materials", _material(name, look)) for name, look in looks.items()}
     root = document.add("nodes", {"name": "root"})
-    nodes = [document.add("nodes", _node(part)) for part in parts]
+    nodes = [document.add("nodes", _node(part)) for part in bound]
     children: dict[int, list[int]] = {}
     for part, node in zip(parts, nodes, strict=True):
         children.setdefault(root if part.parent is None else nodes[part.parent], []).append(node)
@@ -51,7 +54,7 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
         document.json["nodes"][node]["children"] = below
     scene = [root]
     if rig == "skin":
-        scene.append(_skinned(document, body.name, parts, meshes, [root, *nodes], materials))
+        scene.append(_skinned(document, body.name, bound, meshes, [root, *nodes], materials))
     else:
         for part, own, node in zip(parts, meshes, nodes, strict=True):
             if not own:  # a link of an imported body may show nothing
@@ -63,6 +66,19 @@ def glb(body: Body, clips: Sequence[Clip], rig: str = "skin", root_motion: str =
     for clip in clips:
         _animations(document, clip, parts, root, nodes, ROOT_MOTIONS[root_motion])
     return document.glb()
+
+
+def _bound(parts: list[Part], meshes: list[dict[str, Mesh]], clips: Sequence[Clip]) -> list[Part]:
+    """Return the parts in the first pose of idle; without that clip, standing on the ground."""
+    for clip in clips:
+        if clip.name == "idle":
+            return bones.posed(parts, clip.motion.pose(0))
+    low = min(
+        (place + mesh.points @ turn.T)[:, 2].min()
+        for own, place, turn in zip(meshes, *frames(parts), strict=True)
+        for mesh in own.values()
+    )
+    return [part if part.parent is not None else part._replace(place=part.place - (0.0, 0.0, low)) for part in parts]
 
 
 def part_meshes(part: Part, tolerance: float) -> dict[str, Mesh]:
@@ -150,7 +166,7 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
             tracks.append((node, "translation", _float32(motion.positions[:, _AXES])))
             tracks.append((node, "rotation", _turn(motion.quaternions)))
         elif part.joint is not None:
-            tracks.append((node, "rotation", _turn(_hinged(part, motion.joints[:, part.joint]))))
+            tracks.append((node, "rotation", _turn(bones.hinged(part, motion.joints[:, part.joint]))))
     shared = [(node, target, times, document.accessor(values)) for node, target, values in tracks]
     for name, moves in animations(clip, moving).items():
         # A root that stays has keys too: in players it would otherwise be wherever the clip before left it.
@@ -167,12 +183,6 @@ def _animations(document: Document, clip: Clip, parts, root: int, nodes: list[in
         targets = [{"node": node, "path": target} for node, target, _, _ in channels]
         own = {"channels": [{"sampler": index, "target": target} for index, target in enumerate(targets)]}
         document.add("animations", own | {"name": name, "samplers": samplers, "extras": metadata(clip)})
-
-
-def _hinged(part: Part, angles: np.ndarray) -> np.ndarray:
-    """Return the orientations (frames, 4) of a part on the one above, at angles (frames,) of its joint."""
-    turn = np.concatenate([np.cos(0.5 * angles)[:, None], np.sin(0.5 * angles)[:, None] * part.axis], axis=-1)
-    return rotations.product(part.quaternion, turn)
 
 
 def _turn(quaternions: np.ndarray) -> np.ndarray:

@@ -52,7 +52,7 @@ def feet_of(body, qpos):
 
 
 def assert_kinematics(body, file, clips):
-    """The file's nodes are where MuJoCo has the clips' poses, to 1e-5 m, moving and in place."""
+    """The file's nodes are where MuJoCo has the clips' poses, to 1e-5 m, and turn as there, moving and in place."""
     axes = [1, 2, 0]
     near = 1e-5 * max(1.0, body.torso.standing_height)
     for clip in clips:
@@ -65,7 +65,9 @@ def assert_kinematics(body, file, clips):
             world = np.stack(np.broadcast_arrays(*(world[part] for part in body.part_names)), axis=1)
             places, turns = placed(body, motion.poses(), body.part_names)
             assert abs(world[..., :3, 3] - places[..., axes]).max() < near
-            assert abs(world[..., :3, :3] - turns[..., axes, :][..., axes]).max() < 1e-5
+            turns = turns[..., axes, :][..., axes]
+            given, wanted = (each @ each[0].swapaxes(-1, -2) for each in (world[..., :3, :3], turns))
+            assert abs(given - wanted).max() < 1e-5
 
 
 def test_the_bytes_of_a_walk_hold_its_kinematics():
@@ -120,6 +122,17 @@ def test_the_skin_is_where_the_rigid_parts_are(robot):
     np.testing.assert_allclose(one.mean(axis=0), other.mean(axis=0), atol=1e-6)
     np.testing.assert_allclose(np.cov(one.T), np.cov(other.T), atol=1e-6)
     np.testing.assert_allclose(one.max(axis=0), other.max(axis=0), atol=1e-6)
+
+
+@pytest.mark.parametrize("robot", EACH)
+def test_the_skin_is_bound_in_idle(robot):
+    """And, in a file without that clip, as the body stands, on the ground."""
+    for file in (read(robot), of_rest(robot)):
+        points = [file.arrays[each["attributes"]["POSITION"]] for each in file.json["meshes"][0]["primitives"]]
+        assert abs(np.concatenate(points)[:, 1].min()) < 0.01 * ROBOTS[robot].torso.standing_height
+    bound, idle = gltf_reader.played(read(robot), None), gltf_reader.played(read(robot), "idle_loop")
+    for name, place in bound.items():
+        np.testing.assert_allclose(place[0], idle[name][0], atol=1e-6)
 
 
 @pytest.mark.parametrize("robot", EACH)
