@@ -308,12 +308,12 @@ class TaskRun(TaskView, KnownAttributes, control.Task):
             RuntimeError: before the first reset.
         """
         self._check_begun()
-        return self.definition.privileged(self.memory, self._physics.data.ptr)
+        found = self.definition.privileged(self.memory, self._physics.data.ptr)
+        return found | self.definition.overruled(found, self._physics.lasting)
 
     def privileged_vector(self) -> np.ndarray:
         """Return the same as one vector (size,) float32."""
-        self._check_begun()
-        return privileged.vector(self.definition, self.memory, self._physics.data.ptr)
+        return privileged.vector(self.definition, self.privileged)
 
     def _check_begun(self) -> None:
         if self._now.memory is None:

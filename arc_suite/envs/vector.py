@@ -69,7 +69,7 @@ class VectorTask(TaskView, KnownAttributes):
         Raises:
             ResetNeeded: before the first reset.
         """
-        return self.definition.privileged(self._memory, self._environment.batch.data)
+        return self._environment._privileged_blocks(self.definition, self._memory)
 
     @property
     def _memory(self) -> Any:
@@ -568,7 +568,18 @@ class VectorEnv(KnownAttributes, Together):
         return _marked({"privileged": np.where(mask[:, None], self._privileged_vectors(), np.float32(0.0))}, mask)
 
     def _privileged_vectors(self) -> np.ndarray:
-        return privileged.vector(self._task, self._memory, self.batch.data)
+        return privileged.vector(self._task, self._privileged_blocks(self._task, self._memory))
+
+    def _privileged_blocks(self, definition: Task, memory: Any) -> dict[str, np.ndarray]:
+        """The privileged observations by block; what `change_model` has set holds in place of what was drawn."""
+        found = definition.privileged(memory, self.batch.data)
+        for index, task in enumerate(self._tasks if self.batch.changed else ()):
+            fields = self.batch.lasting(index)
+            own = task.overruled({name: block[index] for name, block in found.items()}, fields) if fields else {}
+            for name, block in own.items():
+                found[name] = found[name].copy()  # of the memory
+                found[name][index] = block
+        return found
 
     def _seed(self, seeds: Sequence[int | None], mask: np.ndarray) -> None:
         """Start new streams of random numbers in some environments, except those whose seed is None."""

@@ -177,7 +177,7 @@ class Batch:
         changes = []
         for index, fields in zip(np.flatnonzero(mask).tolist(), models, strict=True):
             unchanged = {name: field(compiled[index], name) for name in self._changed}
-            changes.append({**unchanged, **fields, **self._lasting_of(index)})
+            changes.append({**unchanged, **fields, **self.lasting(index)})
         self._write(mask, changes)
 
     def _write(self, mask: np.ndarray, models: Sequence[Mapping[str, np.ndarray]]) -> None:
@@ -190,7 +190,8 @@ class Batch:
             for own in (self._own[index], self._silent[index]):
                 change(own, fields, scratch)
 
-    def _lasting_of(self, index: int) -> dict[str, np.ndarray]:
+    def lasting(self, index: int) -> dict[str, np.ndarray]:
+        """Return fields of a simulation's model that stay over resets, by name."""
         return {name: each[index] for name, each in self._lasting.items() if not np.isnan(each[index]).any()}
 
     def snapshot(self) -> dict[str, np.ndarray]:

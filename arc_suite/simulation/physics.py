@@ -89,6 +89,11 @@ class Physics(dm_mujoco.Physics):
         self._lasting = {**self._lasting, **fields} if lasting else self._lasting
         self._change({**fields, **{name: self._lasting[name] for name in fields if name in self._lasting}})
 
+    @property
+    def lasting(self) -> Mapping[str, np.ndarray]:
+        """Fields of the model that stay over resets, by name."""
+        return self._lasting
+
     def _change(self, fields: Mapping[str, np.ndarray]) -> None:
         if self._scratch is None:
             self._scratch = mujoco.MjData(self.model.ptr)

@@ -52,7 +52,7 @@ STEPS = 1000  # control steps of an episode
 # Fields of `MjModel` that an episode can have its own values of: masses, frictions, armatures and servos.
 CHANGEABLE = (
     *("body_mass", "body_inertia", "body_ipos", "body_iquat", "pair_friction", "geom_friction"),
-    *("dof_armature", "jnt_actfrcrange", "actuator_gainprm", "actuator_biasprm"),
+    *("dof_armature", "jnt_actfrcrange", "actuator_gainprm", "actuator_biasprm", "actuator_gear"),
 )
 
 # Settings of a curriculum: whether there is one, and the level at which it begins. Evaluation leaves them out.
@@ -400,6 +400,10 @@ class Task(Observed):
     def privileged(self, memory, data) -> dict:
         """Return the privileged observation's blocks, each (..., size), of `MjData` or anything with its fields."""
         return privileged.observed(self.scene, data)
+
+    def overruled(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
+        """Return those privileged blocks of one environment, each (size,), that changed fields of the model decide."""
+        return {}
 
     def progress(self, memory) -> dict:
         """Return how well the episode has gone so far, figures (...) by name; no part of the reward."""

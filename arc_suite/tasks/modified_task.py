@@ -17,7 +17,7 @@ from arc_suite.markers import Marker
 from arc_suite.models.sizing import position_gains, reaches, sized
 from arc_suite.models.standing import GRAVITY, standing
 from arc_suite.robots import mirror
-from arc_suite.tasks import noise, privileged, randomization
+from arc_suite.tasks import noise, overruled, privileged, randomization
 from arc_suite.tasks.blocks import Block
 from arc_suite.tasks.contract import Inputs, Start, Task
 from arc_suite.tasks.mirrors import Symmetry
@@ -323,6 +323,10 @@ class Modified(Wrapper):
             "kick": rotations.headed(kick, heading),
             "force": rotations.headed(force, heading),
         }
+
+    def overruled(self, blocks: Mapping[str, Any], fields: Mapping[str, Any]) -> dict:
+        """Return the privileged blocks that changed fields of the model decide; see `overruled.told`."""
+        return {**self.task.overruled(blocks, fields), **overruled.told(self.scene, blocks, fields)}
 
     def progress(self, memory: ModifiedMemory) -> dict:
         """Return the other task's metrics, and whether the body `fell`, 0 or 1."""

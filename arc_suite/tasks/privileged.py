@@ -74,13 +74,13 @@ def observed(scene, data) -> dict:
     }
 
 
-def vector(task, memory, data, dtype=np.float32):
-    """Return the privileged observation of a task as one vector (..., size), blocks as in `task.privileged_blocks`.
+def vector(task, found: Mapping, dtype=np.float32):
+    """Return blocks of the privileged observation of a task as one vector (..., size), as in `task.privileged_blocks`.
 
     Raises:
         ValueError: blocks are not those that the task declares.
     """
-    found, expected = task.privileged(memory, data), sizes(task)
+    expected = sizes(task)
     if (got := {name: block.shape[-1] for name, block in found.items()}) != expected:
         raise ValueError(f"privileged observation of {task.name}: expected blocks {expected}, got {got}")
     arrays = [found[name] for name in expected]

@@ -17,6 +17,7 @@ from arc_suite.envs.worlds import mjx
 from arc_suite.envs.worlds.randomization import randomization_fn
 from arc_suite.robots import generator
 from arc_suite.simulation import device
+from arc_suite.tasks import privileged
 
 ROBOT = "leaper"  # the fastest to compile
 
@@ -81,6 +82,24 @@ def test_privileged_observations_are_those_of_the_suite():
     close = abs(state.info["privileged"] - info["privileged"]).max(axis=-1) < 1e-3
     assert close.sum() >= 2, "a capsule on its end takes another friction: see test_one_step"
     assert "privileged" not in mjx.load(ROBOT, "walk", num_starts=1).start(0).info
+
+
+def test_privileged_observations_show_randomised_models(monkeypatch):
+    """As wrappers put them in place, with what an episode draws beside them."""
+    env = mjx.load(ROBOT, "walk", {"mass": (0.5, 0.8)}, num_starts=1, privileged=True)
+    drawn = randomization_fn(friction=(0.5, 0.9), motor_strength=(0.5, 0.9))
+    model, axes = drawn(env.mjx_model, rng=jax.random.split(jax.random.key(0), 2))
+    plain, sizes = env.mjx_model, privileged.sizes(env.task)
+
+    def start(model):
+        monkeypatch.setattr(env, "_mjx_model", model)
+        return env.start(0).info["privileged"]
+
+    found = privileged.split(sizes, jax.vmap(start, in_axes=(axes,))(model))
+    np.testing.assert_allclose(found["friction"][:, 0], (model.pair_friction / plain.pair_friction)[:, 0, 0], rtol=1e-6)
+    gears = model.actuator_gear[..., 0] / plain.actuator_gear[:, 0]
+    np.testing.assert_allclose(found["strength"], gears, rtol=1e-6)
+    assert (found["mass"] < 0.8).all() and (found["armature"] == 1.0).all()
 
 
 def test_interface():

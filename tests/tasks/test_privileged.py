@@ -1,6 +1,7 @@
 """Privileged observations: their values, and how many bodies share one layout."""
 
 import gymnasium
+import imports
 import numpy as np
 import pytest
 from episodes import begun, load
@@ -50,6 +51,46 @@ def test_what_an_episode_draws_is_there(task):
     assert (found["strength"] < 0.8).all() and len(set(found["strength"])) == 12
     assert (abs(found["joint_offset"]) <= 0.05).all() and (abs(found["centre_of_mass"]) <= 0.1).all()
     assert_array_equal(found["gains"], 1.0)
+
+
+def changed(model):
+    """Fields with half of the friction, a third more mass and so on, and with a load beside the torso's middle."""
+    multiples = {"pair_friction": 0.5, "dof_armature": 2.0, "body_mass": 1.5, "actuator_gear": 0.25}
+    fields = {name: multiple * getattr(model, name) for name, multiple in multiples.items()}
+    fields["body_mass"][1] += 1.5 * 0.3 * model.body_mass.sum()
+    return fields | {"body_ipos": model.body_ipos + np.eye(len(model.body_ipos))[:, 1:2] * (0.0, 0.02, 0.0)}
+
+
+def test_what_is_changed_for_good_takes_the_place_of_what_is_drawn():
+    settings = {"payload": (0.1, 0.3), "joint_strength": (0.5, 1.0), "friction": (0.7, 1.0), "mass": (0.7, 1.0)}
+    options = {"domain_name": "leaper", "task_name": "walk", "task_kwargs": settings, "privileged": True}
+    single, vector = Env(**options), VectorEnv(num_envs=2, **options)
+    fields = changed(load("leaper", "walk").physics.model.ptr)
+    drawn, _ = single.reset(seed=1)[1], vector.reset(seed=0)
+    single.change_model(fields)
+    vector.change_model(fields, np.array([False, True]))
+    layout, found = privileged.sizes(vector.task.definition), vector.task.privileged
+    own = {"friction": 0.5, "armature": 2.0, "mass": 1.5}
+    for name, value in own.items():
+        assert_allclose(found[name][1], value, rtol=1e-12)
+    assert_allclose(found["payload"][1], (0.3, 0.0, 0.04, 0.0), atol=1e-12)
+    assert_allclose(found["centre_of_mass"][1], (0.0, 0.04, 0.0), atol=1e-12)
+    drawn = privileged.split(layout, drawn["privileged"])
+    assert_allclose(found["strength"][1], 0.25 * drawn["strength"], rtol=1e-6)
+    assert found["friction"][0] > 0.7 and found["mass"][0] < 1.0 and found["payload"][0, 0] < 0.3
+    for action in np.random.default_rng(0).uniform(-1.0, 1.0, (3, 12)):
+        one, other = single.step(action)[-1], vector.step(np.stack([action] * 2))[-1]
+        assert_array_equal(one["privileged"], other["privileged"][1])
+    assert_array_equal(single.reset(seed=3)[1]["privileged"], vector.reset(seed=[2, 3])[1]["privileged"][1])
+    assert single.reset()[1]["privileged"][layout["velocity"] + layout["ground"]] == 0.5
+
+
+def test_gains_of_servos_that_are_changed_are_there():
+    environment = begun(imports.quadruped(), "walk", gains=(0.5, 0.5), actions="position")
+    model = environment.physics.model.ptr
+    environment.change_model({"actuator_biasprm": 3.0 * model.actuator_biasprm, "jnt_actfrcrange": 0.0})
+    assert_allclose(environment.task.privileged["gains"], (0.5, 1.5), rtol=1e-12)
+    assert_array_equal(environment.task.privileged["strength"], 0.0)
 
 
 def test_kicks_forces_and_failures_are_there_in_the_step_in_which_they_act():

@@ -23,8 +23,8 @@ from arc_suite.envs.prepare import prepared
 from arc_suite.envs.worlds import starts
 from arc_suite.robots.spec import Body
 from arc_suite.simulation import device, pictures
+from arc_suite.tasks import overruled, terms
 from arc_suite.tasks import privileged as seen
-from arc_suite.tasks import terms
 from arc_suite.tasks.contract import Inputs
 
 _MOST_ENVS = 1 << 20
@@ -120,7 +120,7 @@ class Env:
             why = "as its starts depend on the episode before"
             raise ValueError(f"task {self.task.name}: expected no curriculum, {why}")
         model = device.adapted(self.mj_model, self.impl)
-        self._mjx_model = device.put(model, self.impl)
+        self._mjx_model = self._compiled = device.put(model, self.impl)
         self._data = device.made(model, self.impl, self.num_envs)
         self.episode_length = self.task.step_limit
         self.observation_size, self.action_size = self.task.size, len(self.task.scene.body.joint_names)
@@ -153,7 +153,8 @@ class Env:
         zero = jnp.zeros(())
         info = {name: jnp.full(size, jnp.nan) for name, size in self.task.commands.items()}
         info |= {"memory": start.memory, "first_memory": start.memory, "model": start.model, "truncation": zero}
-        info |= {} if start.privileged is None else {"privileged": start.privileged}
+        if start.privileged is not None:
+            info["privileged"] = self._seen(start.model, seen.split(seen.sizes(self.task), start.privileged))
         names = (*(f"reward_{name}" for name in self.task.settings.weights), "diverged", "overflow")
         return WorldState(data, start.observation, zero, zero, dict.fromkeys(names, zero), info)
 
@@ -211,6 +212,15 @@ class Env:
         pose = {"qpos": alone["qpos"], "mocap_pos": alone["mocap_pos"], "markers": markers}
         return pictures.picture(scene.body, scene.arena, **pose, failed_legs=self.task.failed_legs(memory), **options)
 
+    def _seen(self, model, blocks):
+        """The privileged observation (size,), given fields of the episode's model, and its blocks.
+
+        Fields that wrappers have changed for good hold in place of what was drawn.
+        """
+        pairs = {name: (getattr(self._mjx_model, name), getattr(self._compiled, name)) for name in overruled.FIELDS}
+        changed = {name: new for name, (new, old) in pairs.items() if new is not old and name not in model}
+        return seen.vector(self.task, {**blocks, **self.task.overruled(blocks, changed)}, jnp.float32)
+
     def _step(self, state: WorldState, action) -> WorldState:
         task, info, before = self.task, state.info, state.data
         # Wrappers may put the data of the start in place, and leave the memory.
@@ -243,7 +253,7 @@ class Env:
         metrics |= {"diverged": diverged, "overflow": overflow}
         told = {"memory": after, "truncation": _float(truncated & ~(terminated | diverged))}
         if "privileged" in info:
-            told["privileged"] = jnp.where(diverged, 0.0, seen.vector(task, after, fields, jnp.float32))
+            told["privileged"] = jnp.where(diverged, 0.0, self._seen(info["model"], task.privileged(after, fields)))
         return WorldState(
             data=data,
             obs=jnp.where(diverged, 0.0, observation),
