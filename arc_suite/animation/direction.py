@@ -11,6 +11,7 @@ from arc_suite.robots.spec import Body
 from arc_suite.tasks import Task, clock
 
 OWN = "own"  # the gait that a task prescribes
+TEMPI = (0.6, 1.4)  # of a gait, multiples of the prescribed frequency
 
 
 def directs(task: Task) -> bool:
@@ -38,6 +39,7 @@ def commands(
     desired: Sequence[float] | np.ndarray | None,
     pose: Sequence[float] | np.ndarray | None,
     gait: str | None,
+    tempo: float = 1.0,
 ) -> dict[str, Any]:
     """Return what a person sets of a task's commands, by name; None leaves it to the task.
 
@@ -46,11 +48,12 @@ def commands(
         desired: (3,) velocity, or None.
         pose: (6,), reduced to the body's room, or None.
         gait: its name, or None; a gait that does not fit is replaced by the body's own.
+        tempo: multiple of the prescribed frequency of a gait.
     """
     asked: dict[str, Any] = {"command": desired} if task.commands.get("command") == 3 else {}
     if directs(task):
         numbers = named(task)
-        own = [*numbers.get(gait, numbers[OWN]), task.parameters.gait_frequency] if gait else None
+        own = [*numbers.get(gait, numbers[OWN]), tempo * task.parameters.gait_frequency] if gait else None
         asked |= {"pose": None if pose is None else _within(room(task.scene.body), np.asarray(pose)), "gait": own}
     return asked
 

@@ -36,7 +36,7 @@ class Episodes:
         self.follows_velocities = environment.task.definition.commands.get("command") == 3
         self.desired: np.ndarray | None = None
         self._pose: Sequence[float] | np.ndarray | None = None
-        self._gait: str | None = None
+        self._gait: tuple[str | None, float] = None, 1.0
         self.control_timestep = environment.control_timestep()
         self.restart()
 
@@ -52,9 +52,15 @@ class Episodes:
             self.desired = None if desired is None else np.clip(desired, -1.0, 1.0)
             self._command()
 
-    def direct(self, pose: Sequence[float] | np.ndarray | None, gait: str | None) -> None:
-        """Set pose and gait, or leave them to the task; one that has no such commands ignores it."""
-        self._pose, self._gait = pose, gait
+    def direct(self, pose: Sequence[float] | np.ndarray | None, gait: str | None, tempo: float = 1.0) -> None:
+        """Set pose and gait, or leave them to the task; one that has no such commands ignores it.
+
+        Args:
+            pose: see `direction.commands`, as `gait` and `tempo`.
+            gait: its name.
+            tempo: multiple of its frequency.
+        """
+        self._pose, self._gait = pose, (gait, tempo)
         self._command()
 
     def step(self, forces: np.ndarray | float = 0.0) -> None:
@@ -94,7 +100,7 @@ class Episodes:
 
     def _command(self) -> None:
         task = self.environment.task.definition
-        for name, value in direction.commands(task, self.desired, self._pose, self._gait).items():
+        for name, value in direction.commands(task, self.desired, self._pose, *self._gait).items():
             self.environment.command(name, value)
 
     def _asked(self) -> list[Marker]:

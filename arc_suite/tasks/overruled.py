@@ -1,6 +1,6 @@
 """What changed fields of a model tell of a body, in place of what an episode has drawn.
 
-A privileged observation shows the body as it is, whoever has changed it.
+A privileged observation shows the body as it is, also where a user has changed it.
 """
 
 import math

@@ -29,6 +29,8 @@ def test_what_is_set_of_a_task():
     assert asked["command"] == (1.0, 0.0, 0.0)
     np.testing.assert_allclose(asked["pose"], (-0.29, 0.0, 0.0, 0.0, 0.0, 0.0))
     assert asked["gait"][-2:] == [0.75, task.parameters.gait_frequency]
+    quick = direction.commands(task, None, None, "ripple", 1.2)["gait"]
+    assert quick == [*asked["gait"][:-1], 1.2 * task.parameters.gait_frequency]
     most = direction.room(task.scene.body)[:, 1]
     np.testing.assert_allclose(direction.commands(task, None, most, None)["pose"], most / 6.0)  # together they are less
     own = direction.commands(task, None, None, "trot")["gait"]  # which does not fit

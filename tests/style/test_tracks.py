@@ -18,7 +18,7 @@ from arc_suite.cpg import Demonstrator
 from arc_suite.envs.setup import Setup
 from arc_suite.models import standing as poses
 from arc_suite.robots import ROBOTS, gaits
-from arc_suite.style import measure, record
+from arc_suite.style import measure, record, report
 from arc_suite.style.tracks import lowest_point_velocities
 from arc_suite.tasks.clock import TWO_PI, desired_contacts
 
@@ -80,12 +80,14 @@ def test_tracks_of_any_task_and_ground(task, arena, monkeypatch):
 
 def test_the_gait_of_a_track_is_the_one_that_holds():
     environment = arc_suite.load("tick", "directed", {"poses": 0.0, "gaits": (), "time_limit": 8.0})
-    walker = Demonstrator(environment, "steered")
+    walker, task = Demonstrator(environment, "steered"), environment.task.definition
+    quick = task.named_command("gait", "wave")
+    quick[-1] = 1.2 * task.parameters.gait_frequency
 
     def reset(indices, seeds):
         walker.reset(indices, seeds)
         environment.command("command", (0.5, 0.0, 0.0))
-        environment.command("gait", "wave")
+        environment.command("gait", quick)
 
     track = record(environment, types.SimpleNamespace(reset=reset, act=walker.act), seed=3)
     compliance = measure(track)["gait_compliance"].value
@@ -95,6 +97,8 @@ def test_the_gait_of_a_track_is_the_one_that_holds():
     wave, lags = gaits.gait(track.body, "wave"), (track.leg_phases[-1] - track.phases[-1]) / TWO_PI
     assert_allclose(np.exp(2j * np.pi * lags), np.exp(2j * np.pi * np.array(wave.offsets)), atol=1e-5)
     assert track.duty_factors[-1] == pytest.approx(wave.duty_factor, abs=1e-6)
+    stride = report([track])["metrics"]["stride_frequency"]
+    assert stride["prescribed"] == pytest.approx(quick[-1], rel=0.01)  # to which it glides
 
 
 def test_recording_is_seeded():

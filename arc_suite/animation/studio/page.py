@@ -164,10 +164,11 @@ class Page:
         self._direction = gui.add_folder("Pose and gait")
         with self._direction:
             self._gait = gui.add_dropdown("Gait now", [direction.OWN], initial_value=direction.OWN)
+            self._tempo = gui.add_slider("Frequency", *direction.TEMPI, 0.05, 1.0, hint="Multiple of the gait's own")
             hint = "Standing heights or rad"
             self._pose = [gui.add_slider(label, -1.0, 1.0, 0.01, 0.0, hint=hint) for label in _POSE]
             gui.add_button("Upright").on_click(lambda event: self._stand())
-        for widget in (self._by_hand, *self._sticks, self._gait, *self._pose):
+        for widget in (self._by_hand, *self._sticks, self._gait, self._tempo, *self._pose):
             widget.on_update(lambda event: self._command())
         for label, key, change in _KEYS:
             command = gui.add_command(label, hotkey=key)
@@ -260,12 +261,12 @@ class Page:
     def _command(self) -> None:
         by_hand = self._by_hand.value
         self._session.command([stick.value for stick in self._sticks] if by_hand else None)
-        pose, gait = [slider.value for slider in self._pose], self._gait.value
-        self._session.direct(*((pose, gait) if by_hand else (None, None)))
+        pose, gait = [slider.value for slider in self._pose], (self._gait.value, self._tempo.value)
+        self._session.direct(*((pose, *gait) if by_hand else (None, None)))
 
     def _stand(self) -> None:
-        """Ask for the pose at rest and the body's own gait."""
-        self._gait.value = direction.OWN
+        """Ask for the pose at rest and the body's own gait, at its own frequency."""
+        self._gait.value, self._tempo.value = direction.OWN, 1.0
         for slider in self._pose:
             slider.value = 0.0
 

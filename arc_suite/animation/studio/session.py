@@ -33,7 +33,7 @@ class Session:
         error: one line, why the latest sketch made no creature; empty if it did.
         desired: (3,) command that visitors have set; None for that of the task.
         pose: (6,) that they have set, or None; see `posture`.
-        gait: name of the gait that they have set, or None.
+        gait: name of the gait that they have set, or None, and multiple of its frequency.
         paused: whether time stands still.
         pace: simulated seconds a second, of late.
         open: whether `run` goes on.
@@ -48,7 +48,7 @@ class Session:
         self.pace = 1.0
         self.desired: np.ndarray | None = np.array((1.0, 0.0, 0.0))
         self.pose: np.ndarray | None = np.zeros(6)
-        self.gait: str | None = direction.OWN
+        self.gait: tuple[str | None, float] = direction.OWN, 1.0
         self._replace(opened(sketch))
 
     def ask(self, sketch: Sketch) -> None:
@@ -69,12 +69,12 @@ class Session:
 
         self.do(change)
 
-    def direct(self, pose: Sequence[float] | None, gait: str | None) -> None:
-        """Set pose and gait, now and for later creatures, from any thread; None leaves them to the task."""
+    def direct(self, pose: Sequence[float] | None, gait: str | None, tempo: float = 1.0) -> None:
+        """Set pose and gait, now and for later creatures, from any thread; see `Episodes.direct`."""
 
         def change():
-            self.pose, self.gait = None if pose is None else np.array(pose), gait
-            self.episodes.direct(self.pose, self.gait)
+            self.pose, self.gait = None if pose is None else np.array(pose), (gait, tempo)
+            self.episodes.direct(self.pose, *self.gait)
 
         self.do(change)
 
@@ -82,7 +82,7 @@ class Session:
     def commands(self) -> dict[str, Any]:
         """What visitors have set of the commands of the creature's task, by name."""
         task = self.creature.environment.task.definition
-        return direction.commands(task, self.desired, self.pose, self.gait)
+        return direction.commands(task, self.desired, self.pose, *self.gait)
 
     def kick(self, angle: float) -> None:
         """Kick the torso in a direction of the world, rad, from any thread."""
@@ -155,5 +155,5 @@ class Session:
         self.creature, self.error = creature, ""
         self.episodes = Episodes(creature.environment, creature.act)
         self.episodes.command(self.desired)
-        self.episodes.direct(self.pose, self.gait)
+        self.episodes.direct(self.pose, *self.gait)
         self.history = History(self.episodes)

@@ -80,7 +80,7 @@ def test_another_creature_walks_under_the_same_command():
 def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
     with running() as (session, shown):
         session.command((0.0, 0.0, 0.0))
-        session.direct((-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple")
+        session.direct((-9.0, 0.0, 0.0, 0.0, 0.0, 0.0), "ripple", 1.3)
         observed = lambda name: session.episodes.timestep.observation[name]  # noqa: E731
         shown.until(lambda: observed("gait")[-2] == pytest.approx(0.75))
         low = direction.room(session.creature.setup.body)[0, 0]
@@ -89,7 +89,7 @@ def test_pose_and_gait_hold_for_later_creatures_as_far_as_they_can():
         session.ask(Sketch(legs=4, links=3))  # whose legs do not ripple
         shown.until(lambda: session.creature.sketch.legs == 4)
         own = session.episodes.environment.task.definition.parameters
-        assert session.commands["gait"][-2:] == [own.duty_factor, own.gait_frequency]
+        assert session.commands["gait"][-2:] == [own.duty_factor, 1.3 * own.gait_frequency]
         session.ask(Sketch(legs=4, links=3, task="steer"))
         shown.until(lambda: session.creature.sketch.task == "steer")
         assert list(session.commands) == ["command"]
