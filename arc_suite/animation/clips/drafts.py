@@ -132,9 +132,9 @@ def _in_step(body: Body, recorded: Mapping[str, Recorded], most: int, bound: flo
             left_out[name] = f"the pose does not return within {bound:.0f} degrees: {seam:.1f} after {cycles} cycles"
             continue
         first = loops.usual(each.recording, closing.samples)
-        draft = Draft(loops.loop(each.recording, first, closing.samples), cycles, each.cycle)
+        draft = Draft(loops.loop(each.recording, first, closing.samples), cycles, each.cycle).grounded(body)
         begin = _first_touchdown(body, draft) if each.phase is None else each.wait(first)
-        found[name] = draft._replace(motion=draft.motion.begun(begin)).grounded(body)
+        found[name] = draft._replace(motion=draft.motion.begun(begin))
     return found
 
 

@@ -17,6 +17,7 @@ TOUCH_DOWN, LIFT_OFF = "touch_down", "lift_off"
 _RISES, _LASTS = 0.5, 0.2
 _BOUNCE = 0.1  # cycles: a foot that touches for less in a swing bounces
 _LEAST_LIFT = 0.005  # of the standing height: a foot that rises less never leaves the ground
+_NEAR = 0.005  # of the standing height: a sole that is lower touches
 
 
 class FootContact(NamedTuple):
@@ -78,6 +79,29 @@ def swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.
     return np.roll(up, begin)
 
 
+def touching(heights: np.ndarray, up: np.ndarray, near: float, loops: bool) -> np.ndarray:
+    """Return when a foot touches the ground, (samples,) booleans: from the first time it is near in a stance to the last.
+
+    Args:
+        heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.
+        up: (samples,) when it swings.
+        near: m; a foot that stays higher throughout a stance touches where it is within this of its lowest point. One
+            that still sinks at the end of the samples, or already rises at the start, does not touch there.
+        loops: whether the first sample follows the last.
+    """
+    begin = int(up.argmax()) if loops else 0  # in swing, so that no stance is cut in two
+    heights, up = np.roll(heights, -begin), np.roll(up, -begin)
+    down = np.zeros(len(up), bool)
+    for start, end in zip(*_runs(~up), strict=True):
+        lowest = start + int(heights[start:end].argmin())
+        if heights[lowest] > near and not loops and lowest in (0, len(up) - 1):
+            continue
+        bound = near if heights[lowest] <= near else heights[lowest] + near
+        low = start + np.flatnonzero(heights[start:end] <= bound)
+        down[low[0] : low[-1] + 1] = True
+    return np.roll(down, begin)
+
+
 def _runs(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return where runs of true values start, and where they have ended."""
     edges = np.diff(mask.astype(int), prepend=0, append=0)
@@ -96,14 +120,14 @@ def foot_contacts(
         cycle: of the gait, s.
         loops: whether the motion is a loop; its last sample is its first one then, and has no events.
     """
-    least, bounce = _LEAST_LIFT * body.torso.standing_height, _BOUNCE * cycle / motion.step
-    end = len(heights) - 1 if loops else len(heights)
+    height, end = body.torso.standing_height, len(heights) - 1 if loops else len(heights)
     found, swing = [], np.zeros(heights.shape, bool)
 
     for leg, foot in enumerate(body.foot_names):
-        up = swings(heights[:end, leg], least, bounce, loops)
-        before = np.roll(up, 1) if loops else np.concatenate([up[:1], up[:-1]])
-        for event, at in ((LIFT_OFF, up & ~before), (TOUCH_DOWN, ~up & before)):
+        up = swings(heights[:end, leg], _LEAST_LIFT * height, _BOUNCE * cycle / motion.step, loops)
+        down = touching(heights[:end, leg], up, _NEAR * height, loops)
+        before = np.roll(down, 1) if loops else np.concatenate([down[:1], down[:-1]])
+        for event, at in ((LIFT_OFF, ~down & before), (TOUCH_DOWN, down & ~before)):
             samples = np.flatnonzero(at).tolist()
             found += [FootContact(foot, event, sample, sample * motion.step) for sample in samples]
         swing[:end, leg] = up
