@@ -182,7 +182,7 @@ check-glb: RUN = mkdir -p .node-glb && cp tests/engines/package.json tests/engin
 
 # Blender's wheels are each for one version of Python: of 5.0, 3.11.
 check-blender: RUN = tools/ensure_venv.sh .venv-blender && .venv-blender/bin/python -m pip install -q bpy==5.0.1 && \
-	$(PYTHON) tests/engines/make_files.py $(ENGINES) few && .venv-blender/bin/python tests/engines/blender.py $(ENGINES)
+	$(PYTHON) tests/engines/make_files.py $(ENGINES) bones && .venv-blender/bin/python tests/engines/blender.py $(ENGINES)
 
 check-godot: DEBIAN := godot3-server
 check-godot: RUN = tools/ensure_venv.sh .venv-godot && .venv-godot/bin/python -m pip install -q gdtoolkit==4.5.0 && \

@@ -1,15 +1,25 @@
-"""Open clips in Blender: one armature, an action for each clip, every bone where MuJoCo has the part.
+"""Open clips in Blender: one armature, an action for each clip, every bone where MuJoCo has the part, in its limb.
 
 python tests/engines/blender.py FOLDER, in an environment with Blender's `bpy`
+
+Of bodies with all of FEW, FBX, BVH and Blender's own file are written by tools/to_fbx.py and read back.
 """
 
+import json
 import pathlib
 import sys
+import tempfile
 
 import bpy
 import numpy as np
 
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "tools"))
+import to_fbx  # noqa: E402
+
 NEAR = 1e-5  # m
+STRAIGHT = 1e-6  # of a cosine: a hinge is an axis of its bone
+BOUND = 0.01  # standing heights of the lowest point from the ground
+CONVERTED = ("queen", "spider")
 
 
 def main(folder: str) -> None:
@@ -17,38 +27,127 @@ def main(folder: str) -> None:
     files = sorted(pathlib.Path(folder).glob("*-skin.glb"))
     assert files
     for path in files:
-        worst, actions = check(path)
-        print(f"{path.name}: {actions} actions, bones within {worst:.1e} m")
+        name = path.name.removesuffix("-skin.glb")
+        truth = dict(np.load(path.with_name(f"{name}.npz")))
+        parts = truth.pop("parts").tolist()
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.context.scene.render.fps = 60  # frames of the file then fall on frames of the scene
+        bpy.ops.import_scene.gltf(filepath=str(path))
+        armature = only("ARMATURE")
+        assert sorted(bone.name for bone in armature.data.bones) == sorted(["root", *parts])
+        told = f"{name}: {len(truth)} actions, bones within {posed(armature, truth, parts):.1e} m, "
+        told += limbs(armature, parts, **np.load(path.with_name(f"{name}.bound.npz")))
+        print(told + (f", {converted(path, truth, parts)}" if name in CONVERTED else ""), flush=True)
 
 
-def check(path: pathlib.Path) -> tuple[float, int]:
-    """Return how far the farthest bone is from where it should be, m, and the number of actions."""
-    truth = dict(np.load(path.with_name(path.name.replace("-skin.glb", ".npz"))))
-    parts = truth.pop("parts").tolist()
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.fps = 60  # frames of the file then fall on frames of the scene
-    bpy.ops.import_scene.gltf(filepath=str(path))
-    (armature,) = [thing for thing in bpy.data.objects if thing.type == "ARMATURE"]
-    assert sorted(bone.name for bone in armature.data.bones) == sorted(["root", *parts])
-    actions = [action.name for action in bpy.data.actions]
-    assert sorted(actions) == sorted(truth), actions
+def only(kind: str) -> bpy.types.Object:
+    """Return the one object of a kind that deforms or is deformed."""
+    (found,) = [
+        thing for thing in bpy.data.objects if thing.type == kind and (kind == "ARMATURE" or thing.parent is not None)
+    ]
+    return found
+
+
+def seen(place) -> np.ndarray:
+    """Return a vector (3,) in the axes of glTF in Blender's, whose z is up, and -y ahead."""
+    x, y, z = place
+    return np.array((x, -z, y))
+
+
+def posed(armature, truth, parts) -> float:
+    """Return how far the farthest bone is from where it should be in all actions, m."""
+    actions = {action.name.split("|")[-1]: action for action in bpy.data.actions}
+    assert sorted(actions) == sorted(truth), list(actions)
     worst = 0.0
+    for track in armature.animation_data.nla_tracks:
+        track.mute = True
     for name, places in truth.items():
-        for track in armature.animation_data.nla_tracks:
-            track.mute = True
-        armature.animation_data.action = bpy.data.actions[name]
-        armature.animation_data.action_slot = armature.animation_data.action.slots[0]
-        first, last = bpy.data.actions[name].frame_range
-        for frame in range(0, len(places), 5):
-            time = first + (last - first) * frame / (len(places) - 1)
-            scene.frame_set(int(time), subframe=time % 1.0)
-            for bone, (x, y, z) in zip(parts, places[frame], strict=True):
-                head = armature.matrix_world @ armature.pose.bones[bone].head
-                miss = np.linalg.norm(np.array(head) - (x, -z, y))  # Blender's z is up, and its -y ahead
-                worst = max(worst, float(miss))
-                assert miss < NEAR, f"{path.name}, {name}, frame {frame}, {bone}: {miss} m"
-    return worst, len(actions)
+        armature.animation_data.action = action = actions[name]
+        armature.animation_data.action_slot = action.slots[0]
+        first, last = action.frame_range
+        assert last - first == len(places) - 1
+        for frame in (*range(0, len(places), 5), len(places) - 1):
+            bpy.context.scene.frame_set(int(first) + frame)
+            heads = [armature.matrix_world @ armature.pose.bones[part].head for part in parts]
+            worst = max(
+                worst, np.linalg.norm(np.array(heads) - [seen(place) for place in places[frame]], axis=-1).max()
+            )
+            assert worst < NEAR, f"{name}, frame {frame}: {worst} m"
+    return worst
+
+
+def limbs(armature, parts, hinges, height) -> str:
+    """Assert that hinges are axes of bones, that bones point along their links, and that the mesh is on the ground."""
+    along, missed = 0, 0.0
+    for part, hinge in zip(parts, hinges, strict=True):
+        if np.isnan(hinge).any():
+            continue
+        bone = armature.data.bones[part]
+        cosines = abs(seen(hinge) @ np.array(bone.matrix_local)[:3, :3])
+        assert cosines.max() > 1.0 - STRAIGHT, f"{part}: {cosines}"
+        (child,) = bone.children
+        link = np.array(child.head_local - bone.head_local)
+        length = np.linalg.norm(link)
+        slope = np.arccos(min(abs(seen(hinge) @ link) / length, 1.0))
+        off = min(slope, 0.5 * np.pi - slope)  # what the hinge costs
+        miss = np.linalg.norm(np.array(bone.tail_local - child.head_local))
+        assert miss <= 2.0 * length * np.sin(0.5 * off) + NEAR, f"{part}: {miss} m from the child"
+        if off < np.radians(1.0):
+            along, missed = along + 1, max(missed, miss / length)
+    mesh = only("MESH")
+    low = min((mesh.matrix_world @ vertex.co).z for vertex in mesh.data.vertices) / height
+    assert abs(low) < BOUND, low
+    joints = int((~np.isnan(hinges[:, 0])).sum())
+    return (
+        f"{joints} hinges along axes, {along} tails at the child within {missed:.1e} of the link, lowest at {low:.4f} h"
+    )
+
+
+def converted(path: pathlib.Path, truth, parts) -> str:
+    """Read back what tools/to_fbx.py makes of a file."""
+    clips = json.loads(path.with_suffix(".clips.json").read_text())["clips"]
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for kind in to_fbx.WRITERS:
+            to_fbx.converted(path, folder / f"body{kind}")
+        told = [f"{kind} within {read(folder / f'body{kind}', truth, parts):.1e} m" for kind in (".fbx", ".blend")]
+        marked(clips)
+        walk = "walk_loop"
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.import_anim.bvh(filepath=str(folder / f"body_{walk}.bvh"), update_scene_fps=True)
+        bpy.data.actions[0].name = walk
+        told.append(f".bvh within {posed(only('ARMATURE'), {walk: truth[walk]}, parts):.1e} m")
+    return ", ".join(told)
+
+
+def read(path: pathlib.Path, truth, parts) -> float:
+    """Open a file, and return how far the farthest bone is from where it should be."""
+    if path.suffix == ".blend":
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+    else:
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.context.scene.render.fps = 60
+        bpy.ops.import_scene.fbx(filepath=str(path))
+    armature, mesh = only("ARMATURE"), only("MESH")
+    assert len(bpy.data.objects) == 2
+    assert [bone.name for bone in armature.data.bones if bone.name not in parts] == ["root"]
+    np.testing.assert_allclose([*armature.matrix_world.to_scale(), *mesh.matrix_world.to_scale()], 1.0, atol=1e-6)
+    return posed(armature, truth, parts)
+
+
+def marked(clips) -> None:
+    """Assert that actions of the open file repeat and have markers as the metadata says, and one curve a joint."""
+    for action in bpy.data.actions:
+        clip = clips[action.name]
+        assert action.use_cyclic == clip["loops"]
+        assert action.use_frame_range and action.frame_end - action.frame_start == round(60.0 * clip["seconds"])
+        wanted = [(f"{each['foot']} {each['event']}", round(60.0 * each["time"])) for each in clip["foot_contacts"]]
+        assert sorted((marker.name, marker.frame) for marker in action.pose_markers) == sorted(wanted)
+        curves = [curve.data_path for curve in action.layers[0].strips[0].channelbags[0].fcurves]
+        for pose in bpy.data.objects[to_fbx.ARMATURE].pose.bones:
+            if pose.rotation_mode == "XYZ":
+                own = [curve for curve in curves if curve.startswith(f'pose.bones["{pose.name}"]')]
+                assert own == [f'pose.bones["{pose.name}"].rotation_euler'], own
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from arc_suite.cli.flags import define_walk, only_setup, policy_name
 from arc_suite.cli.program import VERSION, progress
 
 _COLUMNS = ("clip", "seconds", "frames", "cycles", "forward m/s", "left m/s", "turn deg/s", "seam deg")
+_CONVERTED = (".fbx", ".bvh", ".blend")  # what tools/to_fbx.py writes
 
 FLAGS = flags.FLAGS
 define_walk(task="steer")
@@ -45,6 +46,10 @@ def main() -> None:
     setup = only_setup()
     if not FLAGS.output:
         raise ValueError("no file to write; say --output=FILE.glb")
+    if (extension := Path(FLAGS.output).suffix.lower()) in _CONVERTED:
+        raise ValueError(
+            f"{FLAGS.output}: this program writes .glb; tools/to_fbx.py makes {extension} of it, by Blender"
+        )
     checks.extension(FLAGS.output, [".glb"])
     sidecar = Path(FLAGS.output).with_suffix(".clips.json")
     names = list(export.CLIPS) if FLAGS.clips == [export.ALL] else FLAGS.clips

@@ -80,7 +80,7 @@ def swings(heights: np.ndarray, least: float, bounce: float, loops: bool) -> np.
 
 
 def touching(heights: np.ndarray, up: np.ndarray, near: float, loops: bool) -> np.ndarray:
-    """Return when a foot touches the ground, (samples,) booleans: from the first time it is near in a stance to the last.
+    """Return when a foot touches the ground, (samples,) booleans: while it is near, once in each stance.
 
     Args:
         heights: (samples,) of its lowest point, m; of a loop without the last sample, which is the first one.

@@ -45,6 +45,7 @@ def test_any_body_as_rigid_parts(tmp_path):
     [
         ((), "no file to write; say --output=FILE.glb"),
         (("-o", "a.gltf"), "unknown extension '.gltf'; did you mean '.glb'?"),
+        (("-o", "a.fbx"), "a.fbx: this program writes .glb; tools/to_fbx.py makes .fbx of it, by Blender"),
         (("-o", "a.glb", "--rig=bones"), "unknown rig 'bones'; did you mean 'nodes'?"),
         (("-o", "a.glb", "--root_motion=none"), "unknown root_motion 'none'"),
         (("-o", "a.glb", "--clips=walk,run"), "unknown clip 'run'"),
