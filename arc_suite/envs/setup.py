@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import gymnasium
@@ -20,7 +20,7 @@ from arc_suite.envs.vector import VectorEnv
 from arc_suite.robots import is_robot
 from arc_suite.robots.spec import Body
 from arc_suite.robots.spec_files import body_to_json
-from arc_suite.tasks.contract import CURRICULUM, STEPS, Task
+from arc_suite.tasks.contract import STEPS, Task
 
 ATTRIBUTE = "arc_suite"  # of an observation space: the setup that an agent was trained in, as `Setup.to_dict`
 HELD_OUT = 100_000  # first seed of the bodies of a family that validate what others trained
@@ -152,29 +152,28 @@ class Setup:
 
     def members(self) -> tuple["Setup", ...]:
         """Return the setup of each body; of several bodies with positions as actions."""
-        settings = checks.json_text("task_kwargs", self.task_kwargs | ({"actions": "position"} if self.several else {}))
-        return tuple(Setup(body, self.task, settings) for body in self.bodies)
+        shared = self.with_settings({"actions": "position"} if self.several else {})
+        return tuple(dataclasses.replace(shared, domain=body) for body in self.bodies)
+
+    def with_settings(self, changes: Mapping[str, Any], without: Iterable[str] = ()) -> "Setup":
+        """Return the setup with some settings changed, and without others.
+
+        Raises:
+            ValueError: a setting that JSON cannot hold.
+        """
+        kept = {name: value for name, value in self.task_kwargs.items() if name not in without}
+        return Setup._checked(self.domain, self.task, kept | dict(changes))
 
     def validation(self, count: int) -> "Setup":
         """Return the setup that evaluates a policy while it learns.
 
-        It has no curriculum, which begins at its first level in an evaluation: policies are compared at `difficulty`
-        instead. Several bodies of families become at most `count` of seeds from 100,000 on; others their first `count`.
+        Several bodies of families become at most `count` of seeds from 100,000 on; others their first `count`.
         """
-        domain = _held_out(self.domain, count) if isinstance(self.domain, str) else self.domain
-        settings = self.task_kwargs
-        if settings.get(CURRICULUM[0]):
-            settings = {name: value for name, value in settings.items() if name not in CURRICULUM}
-        return dataclasses.replace(self, domain=domain, settings_json=checks.json_text("task_kwargs", settings))
+        return dataclasses.replace(self, domain=_held_out(self.domain, count)) if isinstance(self.domain, str) else self
 
     def judging(self) -> "Setup":
-        """Return the setup that judges a policy trained in this one: without curriculum, with all blocks.
-
-        A policy leaves out what it does not read.
-        """
-        made = self.validation(1)
-        settings = {name: value for name, value in made.task_kwargs.items() if name != "exclude_blocks"}
-        return dataclasses.replace(made, domain=self.domain, settings_json=checks.json_text("task_kwargs", settings))
+        """Return the setup that judges a policy of this one: with all blocks, as a policy leaves out the others."""
+        return self.with_settings({}, without=["exclude_blocks"])
 
     def load(self, seed: int | None = None, **options) -> dm.Environment:
         """Open a dm_env.

@@ -24,6 +24,7 @@ class Algorithm(NamedTuple):
         extends: whether a run can be extended to more steps, as no schedule depends on them.
         source: what it learns from, other than its own steps: nothing, prior data, a demonstrator or a policy.
         several: whether it can learn with several bodies.
+        acts: whether it steps environments.
     """
 
     learn: Callable[[Any, Any], Iterator[Any]]
@@ -35,6 +36,7 @@ class Algorithm(NamedTuple):
     extends: bool = False
     source: str = "nothing"
     several: bool = False
+    acts: bool = True
 
     def steps_of(self, setup: Setup) -> int:
         """Return the environment steps of a run, by default.
@@ -131,7 +133,7 @@ ALGORITHMS = {
         steps=100_000,
     ),
     # Noise falls over the length of a run: uneven ground takes a longer one.
-    "ppo": _on_policy(ProximalPolicy(), "proximal policy optimisation", 100_000, terrain_steps=3_000_000),
+    "ppo": _on_policy(ProximalPolicy(hidden=128), "proximal policy optimisation", 100_000, terrain_steps=3_000_000),
     # Small steps around a good policy: the noise of `ppo` would undo it.
     "finetune": _finetune(
         ProximalPolicy(
@@ -175,7 +177,9 @@ ALGORITHMS = {
         steps=270_336,
     ),
     # Its steps are updates.
-    "bc": Algorithm(_learn, BehaviourCloning(), "behaviour cloning of a dataset", 2500, 5000, source="prior data"),
+    "bc": Algorithm(
+        _learn, BehaviourCloning(), "behaviour cloning of a dataset", 2500, 5000, source="prior data", acts=False
+    ),
 }
 
 

@@ -4,6 +4,7 @@ An architecture is a frozen value with the methods of `Perceptron`: how networks
 they give actions (..., joints) and values (...). Learners draw its parameters, normalise its observations and apply it.
 """
 
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Self
 
 import jax.numpy as jnp
@@ -30,20 +31,23 @@ class Perceptron(NamedTuple):
     Attributes:
         blocks: sizes of the observation's blocks, in order.
         joints: of an action.
+        privileged: sizes of blocks that follow those of the observation, and that values alone depend on.
         size: of an observation.
-        inputs: numbers whose moments normalise observations.
+        inputs: numbers whose moments normalise observations, privileged ones counted.
     """
 
     blocks: tuple[int, ...]
     joints: int
+    privileged: tuple[int, ...] = ()
 
     size = property(lambda self: sum(self.blocks))
-    inputs = size
+    inputs = property(lambda self: self.size + sum(self.privileged))
 
     @classmethod
-    def of(cls, task: Task) -> Self:
-        """Return the architecture for a task."""
-        return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names))
+    def of(cls, task: Task, critic_blocks: Iterable[str] = ()) -> Self:
+        """Return the architecture for a task, given names of privileged blocks for networks of values."""
+        privileged = tuple(task.privileged_blocks[name].size for name in critic_blocks)
+        return cls(tuple(task.sizes.values()), len(task.scene.body.joint_names), privileged)
 
     def drawn(self, random, hidden, last_gain=1.0):
         """Draw the parameters of a network of actions."""
@@ -52,22 +56,20 @@ class Perceptron(NamedTuple):
 
     def drawn_values(self, random, hidden):
         """Draw the parameters of a network of values."""
-        return networks.mlp(random, (self.size, hidden, hidden, 1), "orthogonal", gain=2**0.5)
+        return networks.mlp(random, (self.inputs, hidden, hidden, 1), "orthogonal", gain=2**0.5)
 
     def actions(self, parameters, observations):
-        """Return the actions (..., joints) for normalised observations (..., size)."""
-        return networks.forward(parameters, observations * self.scale, ACTIVATION)
+        """Return the actions (..., joints) for normalised observations (..., size or inputs)."""
+        return networks.forward(parameters, observations[..., : self.size] * self.scale, ACTIVATION)
 
     def values(self, parameters, observations):
-        """Return the values (...) of normalised observations (..., size)."""
-        return networks.forward(parameters, observations * self.scale, ACTIVATION)[..., 0]
+        """Return the values (...) of normalised observations (..., inputs)."""
+        return networks.forward(parameters, observations * _scale(self.blocks + self.privileged), ACTIVATION)[..., 0]
 
     @property
     def scale(self) -> np.ndarray:
         """(size,) factors of normalised numbers; their mean square is 1, so that gains of first weights hold."""
-        counts = [count for count in self.blocks if count]
-        squares = [self.size / (len(counts) * count) for count in counts]
-        return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
+        return _scale(self.blocks)
 
     def seen(self, observations):
         """Return the vectors (n, inputs) whose moments normalise observations (..., size)."""
@@ -163,16 +165,18 @@ class PerLeg(NamedTuple):
 Architecture = Perceptron | PerLeg
 
 
-def of(environment: VectorEnv | BodiesEnv) -> Architecture:
-    """Return the architecture that suits environments."""
+def of(environment: VectorEnv | BodiesEnv, critic_blocks: Iterable[str] = ()) -> Architecture:
+    """Return the architecture that suits environments, given names of privileged blocks for networks of values."""
     if isinstance(environment, BodiesEnv):
         return PerLeg()
-    return Perceptron.of(environment.task.definition)
+    return Perceptron.of(environment.task.definition, critic_blocks)
 
 
 def policy(architecture: Architecture, normalise: Normalizer, parameters) -> Graph:
     """Return the graph of a policy: a normalizer and a network of actions."""
-    return traced(lambda x: architecture.exported(parameters, normalise(x)).clip(-1.0, 1.0), architecture.size)
+    mean, factor, limit = normalise
+    own = Normalizer(mean[: architecture.size], factor[: architecture.size], limit)
+    return traced(lambda x: architecture.exported(parameters, own(x)).clip(-1.0, 1.0), architecture.size)
 
 
 def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
@@ -191,6 +195,12 @@ def read(architecture: Architecture, graph: Graph) -> tuple[Normalizer, Any]:
     if not same:
         raise ValueError("a policy of dagger, bc or ppo, with two hidden layers")
     return normalise, parameters
+
+
+def _scale(blocks: Sequence[int]) -> np.ndarray:
+    counts = [count for count in blocks if count]
+    squares = [sum(counts) / (len(counts) * count) for count in counts]
+    return np.sqrt(np.repeat(squares, counts)).astype(np.float32)
 
 
 def _layer(weight: np.ndarray, bias: np.ndarray) -> dict[str, np.ndarray]:

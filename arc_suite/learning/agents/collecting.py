@@ -5,10 +5,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from arc_suite.learning.agents import architectures, learner
+from arc_suite.learning.agents import architectures, inputs, learner
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
-from arc_suite.learning.agents.learner import Diverged, RunContext, generator
+from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext, generator
 from arc_suite.learning.agents.normaliser import Normalizer
 
 # Names of the arrays of a rollout.
@@ -20,6 +20,16 @@ def ages(num_envs: int, step_limit: float) -> np.ndarray:
     return np.arange(num_envs) * (int(step_limit) if math.isfinite(step_limit) else 0) // num_envs
 
 
+def correlated(hp: ProximalPolicy, before, drawn):
+    """Return the noise of a control step, given that of the step before and independent noise, float32.
+
+    Its standard deviation is 1. Slow noise explores more than fast noise, which motors average (Hollenstein et al.,
+    "Colored noise in PPO: improved exploration and performance through correlated action sampling", 2024).
+    """
+    kept = hp.noise_correlation
+    return np.float32(kept) * before + np.float32(math.sqrt(1.0 - kept**2)) * drawn
+
+
 class Environments:
     """Environments in which a policy acts; they go on from horizon to horizon.
 
@@ -27,14 +37,19 @@ class Environments:
         environment: the vector environment.
         task: of the environments.
         architecture: of networks for it.
-        observation: (num_envs, size) before the next step.
+        observation: (num_envs, inputs) before the next step, privileged blocks last.
     """
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
         """Begin the first episodes."""
-        self._hp, self._seed, self.environment = hp, context.seed, context.environment(hp.num_envs)
-        self.task, self.architecture = self.environment.task.definition, architectures.of(self.environment)
-        self.observation, _ = self.environment.reset()
+        self._hp, self._seed, self._names = hp, context.seed, hp.critic_blocks
+        self.environment = context.environment(hp.num_envs, privileged=bool(self._names))
+        self.task = self.environment.task.definition
+        self._shape = hp.num_envs, self.environment.single_action_space.shape[0]
+        if self._names:
+            self._columns = inputs.privileged_columns(self.task, self._names)
+        self.architecture = architectures.of(self.environment, self._names)
+        self.observation = self._seen(*self.environment.reset())
         steps = ages(hp.num_envs, self.task.step_limit)
         self.environment.restore(self.environment.snapshot() | {"steps": steps})
 
@@ -57,18 +72,25 @@ class Environments:
         """
         random = generator(self._seed, "noise", iteration)
         rollout = {name: [] for name in TRANSITIONS}
+        noise = generator(self._seed, "noise before", iteration).standard_normal(self._shape, np.float32)
         for _ in range(self._hp.horizon):
             normalised = normalise(self.observation)
             mean = np.asarray(ppo.mean_action(self.architecture, policy, normalised))
             if not np.isfinite(mean).all():
                 raise Diverged("an action is not finite", step)
-            action = mean + np.float32(std) * random.standard_normal(mean.shape, np.float32)
-            after, rewards, terminated, truncated, info = self.environment.step(action)
-            ended, resampled = terminated | truncated, self.environment.resampled()
+            noise = correlated(self._hp, noise, random.standard_normal(mean.shape, np.float32))
+            action = mean + np.float32(std) * noise
+            observation, rewards, terminated, truncated, info = self.environment.step(action)
+            after, ended, resampled = (
+                self._seen(observation, info),
+                terminated | truncated,
+                self.environment.resampled(),
+            )
             next_observation = after.copy()
             next_observation[resampled] = self.observation[resampled]
             for index in np.flatnonzero(ended):
-                next_observation[index] = info["final_obs"][index]
+                last = {name: array[index] for name, array in info["final_info"].items() if name == "privileged"}
+                next_observation[index] = self._seen(info["final_obs"][index], last)
             ended = ended | resampled
             values = self.observation, action, mean, rewards, terminated, ended, next_observation
             for array, value in zip(rollout.values(), values, strict=True):
@@ -78,8 +100,15 @@ class Environments:
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the environments as part of a checkpoint."""
-        return learner.environment_arrays(self.environment)
+        return learner.environment_arrays(self.environment) | {f"{ENVIRONMENT}seen": self.observation}
 
     def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
         """Go on from the arrays of a checkpoint."""
-        self.observation = learner.restore_environment(self.environment, arrays)
+        learner.restore_environment(self.environment, arrays)
+        self.observation = arrays[f"{ENVIRONMENT}seen"]
+
+    def _seen(self, observation: np.ndarray, info: Mapping) -> np.ndarray:
+        """Observations (..., size) with the critic's privileged blocks after them."""
+        if not self._names:
+            return observation
+        return np.concatenate([observation, info["privileged"][..., self._columns]], axis=-1)

@@ -11,9 +11,10 @@ from arc_suite import checks, evaluation, files, versions
 from arc_suite.envs.setup import Setup
 from arc_suite.learning.agents import algorithms
 from arc_suite.learning.agents.learner import MOST_SEEDS
+from arc_suite.tasks.contract import CURRICULUM
 
 # Names in the file of a configuration.
-_OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior")
+_OWN = ("algorithm", "hyperparameters", "seed", "steps", "evaluate_every", "prior", "training")
 CONFIGURATION = ("robot", "task", "task_kwargs", *_OWN)
 # Names in the record of a run that follow from its configuration, the data and the installed packages; `learner` is in
 # records of earlier versions.
@@ -34,6 +35,7 @@ class Configuration:
         steps: environment steps.
         evaluate_every: environment steps between evaluations.
         prior: id of a dataset of prior data; None for none.
+        training_json: JSON of the task's settings in training that differ from those of `setup`, keys in order.
     """
 
     setup: Setup
@@ -43,6 +45,7 @@ class Configuration:
     steps: int
     evaluate_every: int
     prior: str | None = None
+    training_json: str = "{}"
 
     @classmethod
     def of(
@@ -54,8 +57,15 @@ class Configuration:
         steps: int | None = None,
         evaluate_every: int | None = None,
         prior: str | None = None,
+        training: Mapping[str, Any] | None = None,
     ) -> Self:
         """Return a configuration with the algorithm's defaults for all that is not given.
+
+        Args:
+            setup: body, or bodies, task and settings by which the policy is judged.
+            algorithm, seed, steps, evaluate_every, prior: see `Configuration`.
+            hyperparameters: those that differ from the algorithm's.
+            training: settings of the task in training alone, such as kicks or a curriculum.
 
         Raises:
             ValueError: an unknown algorithm or hyperparameter, or a value out of its range.
@@ -71,7 +81,46 @@ class Configuration:
         checks.integer("evaluate_every", evaluate_every, 1)
         if not isinstance(prior, str | None):
             raise ValueError(f"prior: expected the id of a dataset, got {checks.shown(prior)}")
-        return cls(setup, algorithm, definition.hyperparameters, seed, steps, evaluate_every, prior)
+        training = checks.mapping("training", training)
+        _check_training(setup, definition, training)
+        text = checks.json_text("training", dict(training))
+        return cls(setup, algorithm, definition.hyperparameters, seed, steps, evaluate_every, prior, text)
+
+    @property
+    def training(self) -> dict[str, Any]:
+        """Settings of the task in training that differ from those of `setup`; a new dictionary."""
+        return json.loads(self.training_json)
+
+    @property
+    def policy_setup(self) -> Setup:
+        """Setup of the policy: `setup`, whose task leaves out the blocks that networks do not see."""
+        return self.setup.with_settings(self._excluded())
+
+    @property
+    def training_setup(self) -> Setup:
+        """Setup in which the algorithm learns: that of the policy, with the settings of training.
+
+        Raises:
+            ValueError: a setting that does not fit, or one by which observations or actions are others.
+        """
+        judged, found = self.policy_setup, self.policy_setup.with_settings(self.training)
+        if found != judged:
+            here, there = found.definition, judged.definition
+            if (here.sizes, here.actions) != (there.sizes, there.actions):
+                others = "other observations or actions than those that it is judged by"
+                raise ValueError(f"training: expected settings of the same observations and actions, got {others}")
+        return found
+
+    def _excluded(self) -> dict[str, Any]:
+        """Setting of the blocks that networks do not see: those of the task, then those of the hyperparameters."""
+        names = getattr(self.hyperparameters, "exclude_blocks", ())
+        if not names or self.setup.several:  # networks of many bodies see tokens, without contact forces
+            return {}
+        there = self.setup.judging().definition.sizes
+        kept = self.setup.task_kwargs.get("exclude_blocks", ())
+        own = [kept] if isinstance(kept, str) else list(kept)
+        found = own + [name for name in names if name in there and name not in own]
+        return {"exclude_blocks": found} if found else {}
 
     @property
     def validation(self) -> Setup:
@@ -95,14 +144,14 @@ class Configuration:
         changed = {n: v for n, v in dataclasses.asdict(self.hyperparameters).items() if v != usual[n]}
         names = ("task", "algorithm", "steps", "seed", "evaluate_every", *["prior"] * (self.prior is not None))
         flags = [f"--{name}={getattr(self.setup if name == 'task' else self, name)}" for name in names]
-        for flag, values in (("set", self.setup.task_kwargs), ("hp", changed)):
+        for flag, values in (("set", self.setup.task_kwargs), ("train_set", self.training), ("hp", changed)):
             flags += [f"--{flag}={n}={v if isinstance(v, str) else json.dumps(v)}" for n, v in values.items()]
         return shlex.join(["arc-suite", "train", f"--robot={self.setup.robot}", *flags])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as files hold it, JSON-able."""
         own = {"algorithm": self.algorithm, "hyperparameters": dataclasses.asdict(self.hyperparameters)}
-        own |= {name: getattr(self, name) for name in ("seed", "steps", "evaluate_every", "prior")}
+        own |= {name: getattr(self, name) for name in ("seed", "steps", "evaluate_every", "prior", "training")}
         return self.setup.to_dict() | own
 
     @classmethod
@@ -134,6 +183,21 @@ class Configuration:
         packages = {name: versions.installed(name) for name in ("jax", "jaxlib", "optax")}
         own = {"episodes": evaluation.CURVE_EPISODES, "versions": provenance["versions"] | packages}
         return self.to_dict() | provenance | own
+
+
+def _check_training(setup: Setup, definition: algorithms.Algorithm, training: Mapping[str, Any]) -> None:
+    """Raise ValueError for settings of training that nothing would follow, and for a curriculum that judges."""
+    if setup.task_kwargs.get(CURRICULUM[0]):
+        raise ValueError(
+            f"setting {CURRICULUM[0]}: expected among the settings of training (--train_set), as an evaluation would "
+            f"begin at the first level, got {checks.shown(setup.task_kwargs[CURRICULUM[0]])}"
+        )
+    if training and not definition.acts:
+        raise ValueError(f"training: expected no settings, as the algorithm makes no step, got {', '.join(training)}")
+    for name in training:
+        if name in ("random", "exclude_blocks"):
+            other = "as every run has a seed" if name == "random" else "as it is a hyperparameter"
+            raise ValueError(f"training: setting {name}: expected none, {other}, got {checks.shown(training[name])}")
 
 
 def read(path: Path) -> Configuration:

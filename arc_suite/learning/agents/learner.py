@@ -38,7 +38,8 @@ class RunContext(NamedTuple):
     """The run that a learner learns in.
 
     Attributes:
-        setup: body, or bodies, task and settings.
+        setup: body, or bodies, task and settings in which the policy is judged.
+        training: the same in which it learns; it sees the same blocks.
         seed: of the run.
         steps: environment steps of the run.
         evaluate_every: environment steps between evaluations.
@@ -49,6 +50,7 @@ class RunContext(NamedTuple):
     """
 
     setup: Setup
+    training: Setup
     seed: int
     steps: int
     evaluate_every: int
@@ -62,12 +64,13 @@ class RunContext(NamedTuple):
         """The first seed of the environments to learn in, apart from those of evaluation and of other runs."""
         return seed_ranges.of_run(self.seed).start
 
-    def environment(self, num_envs: int = 1, mode: AutoresetMode = AutoresetMode.SAME_STEP) -> VectorEnv | BodiesEnv:
+    def environment(self, num_envs: int = 1, **options) -> VectorEnv | BodiesEnv:
         """Return environments to learn in, seeded apart from evaluation and from other runs.
 
-        Their `reset()` begins the first episodes.
+        Their `reset()` begins the first episodes; for the options see `VectorEnv`.
         """
-        return self.setup.make_vec(num_envs, seed=self.first_seed, num_threads=self.threads, autoreset_mode=mode)
+        options = {"num_threads": self.threads, "autoreset_mode": AutoresetMode.SAME_STEP} | options
+        return self.training.make_vec(num_envs, seed=self.first_seed, **options)
 
     def next_evaluation(self, step: int) -> int:
         """Return the environment step of the first evaluation after `step`."""

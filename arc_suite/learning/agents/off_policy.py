@@ -71,13 +71,13 @@ def learn(hp: SoftActorCritic, context: RunContext) -> Iterator[Slice]:
         raise ValueError(f"prior: the algorithm takes {expected}, got {checks.shown(context.prior)}")
     seed, core, environment = context.seed, sac.core(hp), context.environment(hp.num_envs)
     task, joints = environment.task.definition, environment.single_action_space.shape[0]
-    inputs = Inputs.of(task, hp.exclude_blocks, hp.normalize, hp.symmetry_augmentation)
+    inputs = Inputs.of(task, hp.normalize, hp.symmetry_augmentation)
     prior = None if context.prior is None else priors.mapped(context, task)
     mode = "w+" if context.checkpoint is None else "r+"
     size = min(hp.buffer_size, -(-context.steps // hp.num_envs) * hp.num_envs)
     buffer = Replay(context.folder / "replay", size, task.size, joints, SLICE, mode, hp.num_envs)
     sources = _SOURCES[hp.prior](buffer, prior)
-    state = sac.begin(hp, generator(seed, "networks", 0), len(inputs.columns), joints)
+    state = sac.begin(hp, generator(seed, "networks", 0), task.size, joints)
     observations = environment.reset()[0]
     steps = updates = phase_updates = 0
     sums, summed = zeros(METRICS), 0  # of metrics since the latest line

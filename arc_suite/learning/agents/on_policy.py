@@ -38,11 +38,13 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
         raise ValueError("start: expected the folder of a run whose policy is where learning starts, got none")
     seed, collector = context.seed, _environments(hp, context)
     task, architecture = collector.task, collector.architecture
-    symmetry = inputs.symmetry(task) if hp.symmetry_augmentation else None
+    symmetry = inputs.symmetry(task, hp.critic_blocks) if hp.symmetry_augmentation else None
     moments, policy = Moments.none(architecture.inputs), None
     normalise = architecture.normalise(moments)
     if hp.start and context.checkpoint is None:
-        normalise, policy = _read(hp, context, task, architecture)
+        (mean, factor, limit), policy = _read(hp, context, task, architecture)
+        more = normalise.mean[len(mean) :], normalise.factor[len(mean) :]  # of privileged blocks, in units of about 1
+        normalise = Normalizer(np.append(mean, more[0]), np.append(factor, more[1]), limit)
     state = ppo.begin(hp, architecture, generator(seed, "networks", 0), policy)
     iterations = 0
 
@@ -97,6 +99,8 @@ def learn(hp: ProximalPolicy, context: RunContext) -> Iterator[Slice]:
 
 
 def _environments(hp: ProximalPolicy, context: RunContext):
+    if hp.critic_blocks and context.setup.several:
+        raise ValueError(f"critic_blocks: expected none with several bodies, got {', '.join(hp.critic_blocks)}")
     if hp.simulation == "mujoco":
         return collecting.Environments(hp, context)
     from arc_suite.learning.agents import worlds  # needs the extra `gpu`

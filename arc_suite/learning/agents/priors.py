@@ -7,6 +7,8 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
 from arc_suite import checks, files, seed_ranges
 from arc_suite.learning.agents.learner import Damaged, RunContext
 from arc_suite.learning.agents.replay import Replay
@@ -41,12 +43,15 @@ def seeds(prior: str) -> range:
 def mapped(context: RunContext, task: Task) -> Replay:
     """Return the prior data of a run; its files are written from the dataset first, where they are missing.
 
+    Observations are those of the task, which may leave out blocks of the dataset's.
+
     Raises:
         ValueError: no such dataset, one that is damaged, or of another body or task, or damaged files.
         OSError: the disk is full, or the like.
     """
     dataset = _opened(context.prior)
     found, setup = dataset.settings.setup, context.setup
+    whole = setup.definition.sizes
     if found.body != setup.body:
         raise ValueError(f"prior {checks.shown(context.prior)}: of {found.body.name}, and not of {setup.body.name}")
     if found != setup:
@@ -60,14 +65,17 @@ def mapped(context: RunContext, task: Task) -> Replay:
     count = sum(summary["length"] for summary in summaries)
     if not count:
         raise ValueError(f"prior {checks.shown(context.prior)}: holds no episode")
-    folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}")
+    columns = np.concatenate([np.full(count, name in task.sizes) for name, count in whole.items()])
+    left_out = "".join(f"-{name}" for name in whole if name not in task.sizes)
+    folder = files.folder(Path(context.folder).parent / f"prior-{_digest(summaries)[:16]}{left_out}")
     with files.locked(folder / ".lock"):
         if not (folder / _COUNT).exists():
             replay = Replay(folder, count, size, joints)
             for episode in dataset:
                 last = episode.length - 1
+                observations = episode.observations[:, columns]
                 for step in range(episode.length):
-                    here, there = episode.observations[step], episode.observations[step + 1]
+                    here, there = observations[step], observations[step + 1]
                     ended = bool(episode.terminations[step])
                     replay.add(here, episode.actions[step], episode.rewards[step], ended, there, step == last)
             with files.writing_json(folder / _COUNT) as file:

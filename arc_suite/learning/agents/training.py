@@ -59,16 +59,20 @@ def train(
     training_seeds = _training_seeds(configuration, Path(folder))
     record[TRAINING_SEEDS] = seed_ranges.to_json(training_seeds)
     evaluation.check_ends(setup.definition.step_limit)
+    training_setup, policy_setup = configuration.training_setup, configuration.policy_setup
     growing = ("steps",) if definition.extends else ()
     with run_folder.opened(folder, record, growing) as run_files, contextlib.ExitStack() as stack:
         state = {"evaluated": 0, "wall": 0.0, "cpu": 0.0} | run_files.progress
         run_folder.check_evaluated(folder, state["evaluated"])
         own = {name: getattr(configuration, name) for name in ("setup", "seed", "steps", "evaluate_every", "prior")}
-        context = RunContext(**own, folder=Path(folder), threads=threads, checkpoint=run_files.arrays)
+        context = RunContext(
+            **own, training=training_setup, folder=Path(folder), threads=threads, checkpoint=run_files.arrays
+        )
         slices = stack.enter_context(contextlib.closing(definition.learn(definition.hyperparameters, context)))
         options = {"num_threads": threads, "autoreset_mode": AutoresetMode.DISABLED}
         vector = configuration.validation.make_vec(evaluation.CURVE_EPISODES, **options)
         environment = stack.enter_context(contextlib.closing(vector))
+        sizes = dict((environment.task if setup.several else policy_setup.definition).sizes)
         wall, cpu = time.monotonic() - state["wall"], time.process_time() - state["cpu"]
         bar = progress(
             total=context.steps, initial=state["evaluated"], desc=Path(folder).name, unit="step", unit_scale=True
@@ -90,7 +94,7 @@ def train(
                 on_metrics(found.step, found.metrics)
                 bar.set_postfix_str(_postfix(found.metrics, state), refresh=False)
             if is_evaluated:
-                policy = Network(found.policy, setup, dict(environment.task.sizes), training_seeds)
+                policy = Network(found.policy, policy_setup, sizes, training_seeds)
                 state["return"] = _evaluate(configuration, environment, run_files, found.step, policy)
                 state["evaluated"] = found.step
                 on_metrics(found.step, {"return": state["return"]})

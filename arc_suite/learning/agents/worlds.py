@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from arc_suite.envs.worlds import mjx
-from arc_suite.learning.agents import networks
+from arc_suite.learning.agents import inputs, networks
 from arc_suite.learning.agents import proximal_policy as ppo
 from arc_suite.learning.agents.architectures import Perceptron
-from arc_suite.learning.agents.collecting import TRANSITIONS, ages
+from arc_suite.learning.agents.collecting import TRANSITIONS, ages, correlated
 from arc_suite.learning.agents.hyperparameters import ProximalPolicy
 from arc_suite.learning.agents.learner import ENVIRONMENT, Diverged, RunContext
 from arc_suite.learning.agents.normaliser import Normalizer
@@ -27,11 +27,14 @@ class Worlds:
 
     def __init__(self, hp: ProximalPolicy, context: RunContext):
         """Begin the first episodes."""
-        setup, self._hp = context.setup, hp
+        setup, self._hp = context.training, hp
         impl = _IMPLEMENTATIONS[hp.simulation]
         first = context.first_seed
-        self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, first_seed=first, num_envs=hp.num_envs)
-        self.task, self.architecture = self.env.task, Perceptron.of(self.env.task)
+        options = {"first_seed": first, "num_envs": hp.num_envs, "privileged": bool(hp.critic_blocks)}
+        self.env = mjx.load(setup.body, setup.task, setup.task_kwargs, impl, **options)
+        self.task, self.architecture = self.env.task, Perceptron.of(self.env.task, hp.critic_blocks)
+        if hp.critic_blocks:
+            self._columns = inputs.privileged_columns(self.task, hp.critic_blocks)
         self._key = jax.random.key(context.seed)
         self._state = jax.jit(jax.vmap(self.env.start))(np.uint32(first) + np.arange(hp.num_envs, dtype=np.uint32))
         self._steps = jnp.asarray(ages(hp.num_envs, self.task.step_limit), int)
@@ -39,9 +42,11 @@ class Worlds:
 
     def roll_out(self, policy, normalise: Normalizer, std: float, iteration: int, step: int) -> dict[str, jax.Array]:
         """Act in all worlds for a horizon."""
-        keys = jax.random.split(jax.random.fold_in(self._key, iteration), self._hp.horizon)
-        carry = self._state, self._steps
-        (self._state, self._steps), rollout = self._act(carry, policy, normalise, np.float32(std), keys)
+        key = jax.random.fold_in(self._key, iteration)
+        keys = jax.random.split(key, self._hp.horizon)
+        noise = jax.random.normal(jax.random.fold_in(key, 1), (self._hp.num_envs, self.architecture.joints))
+        carry = self._state, self._steps, noise
+        (self._state, self._steps, _), rollout = self._act(carry, policy, normalise, np.float32(std), keys)
         if not jnp.isfinite(rollout["means"]).all():
             raise Diverged("an action is not finite", step)
         return rollout
@@ -51,21 +56,29 @@ class Worlds:
 
     def _step(self, policy, normalise: Normalizer, std, carry, key):
         """Step all worlds; return what the next step goes on from, and the transitions."""
-        state, steps = carry
-        noise, restart = jax.random.split(key)
-        mean = ppo.mean_action(self.architecture, policy, normalise(state.obs))
-        action = mean + std * jax.random.normal(noise, mean.shape)
+        state, steps, noise = carry
+        drawn, restart = jax.random.split(key)
+        seen = self._seen(state)
+        mean = ppo.mean_action(self.architecture, policy, normalise(seen))
+        noise = correlated(self._hp, noise, jax.random.normal(drawn, mean.shape))
+        action = mean + std * noise
         after = jax.vmap(self.env.step)(state, action)
         steps = steps + 1
         time_is_up = steps >= self.task.step_limit
         terminated = (after.done > 0.0) & (after.info["truncation"] == 0.0) & ~time_is_up
         ended = (after.done > 0.0) | time_is_up
         resampled = self.task.resampled(after.info["memory"]) & ~ended
-        next_obs = jnp.where(resampled[:, None], state.obs, after.obs)
-        values = state.obs, action, mean, after.reward, terminated, ended | resampled, next_obs
+        next_obs = jnp.where(resampled[:, None], seen, self._seen(after))
+        values = seen, action, mean, after.reward, terminated, ended | resampled, next_obs
         fresh = jax.vmap(self.env.reset)(jax.random.split(restart, self._hp.num_envs))
-        carry = jax.vmap(mjx.restarted)(after, fresh, ended), jnp.where(ended, 0, steps)
+        carry = jax.vmap(mjx.restarted)(after, fresh, ended), jnp.where(ended, 0, steps), noise
         return carry, dict(zip(TRANSITIONS, values, strict=True))
+
+    def _seen(self, state):
+        """Observations (num_envs, inputs), the critic's privileged blocks last."""
+        if not self._hp.critic_blocks:
+            return state.obs
+        return jnp.concatenate([state.obs, state.info["privileged"][:, self._columns]], axis=-1)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the state of the worlds, from which simulation goes on."""

@@ -8,6 +8,7 @@ checkpoint, the policy, and a picture of its returns, drawn anew after each eval
   arc-suite train --robot tick --algorithm sac_parallel --minutes 5
   arc-suite train --robot queen --task steer --algorithm finetune --hp start=runs/queen-steer-dagger-0
   arc-suite train --robot queen --algorithm sope --prior arc_suite/queen/walk/cpg-medium-v0 -o runs/queen-sope
+  arc-suite train --robot tick --task steer --train_set kicks=1.5
   arc-suite train --spec spider --algorithm speq --hp phase_updates=7500
   arc-suite train --config runs/queen-sope/config.json -o runs/queen-sope-again
   arc-suite train --robot varied:0-127 --algorithm dagger_bodies
@@ -41,6 +42,9 @@ flags.DEFINE_string(
     "ppo",
     f"One of {', '.join(algorithms.ALGORITHMS)}, or module:attribute, an Algorithm on Python's path.",
 )
+flags.DEFINE_multi_string(
+    "train_set", [], "Setting of the task in training alone, name=value, in place of that of --set."
+)
 flags.DEFINE_multi_string("hp", [], "Hyperparameter of the algorithm, name=value; repeat it for several.")
 flags.DEFINE_integer("seed", 0, "Seed of the run.", lower_bound=0)
 flags.DEFINE_integer("steps", None, "Environment steps. [default: the algorithm's]", lower_bound=1)
@@ -53,7 +57,20 @@ flags.DEFINE_bool("tensorboard", False, "Write metrics for TensorBoard too, into
 flags.DEFINE_string("output", None, "Folder of the run. [default: runs/ROBOT-TASK-ALGORITHM-SEED]", short_name="o")
 
 # Flags that make up the configuration.
-_OF_THE_RUN = ("robot", "spec", "legs", "links", "task", "set", "algorithm", "hp", "seed", "steps", "prior")
+_OF_THE_RUN = (
+    "robot",
+    "spec",
+    "legs",
+    "links",
+    "task",
+    "set",
+    "train_set",
+    "algorithm",
+    "hp",
+    "seed",
+    "steps",
+    "prior",
+)
 
 
 def main() -> int:
@@ -98,7 +115,7 @@ def configured() -> Configuration:
                 raise ValueError(f"--{name}: expected none with --config, which has the whole configuration")
         return configuration.read(Path(FLAGS.config))
     hyperparameters = named_values("hp", FLAGS.hp)
-    run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior
+    run = FLAGS.seed, FLAGS.steps, FLAGS.evaluate_every, FLAGS.prior, named_values("train_set", FLAGS.train_set)
     several = registry.names_several(FLAGS.robot) and made_body() is None
     setup = Setup.of(FLAGS.robot if several else only_body(), *task())
     return Configuration.of(setup, FLAGS.algorithm, hyperparameters, *run)
